@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
-from kahanmaps import draw_with_eigenvalues, normal_form
+from kahanmaps import normal_form, random_member_with_eigenvalues
 from kahanmaps.maps.floats.blocks import planar_blocks
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.kernels import has_numba
@@ -75,7 +75,7 @@ def compiled(folder: str) -> Any:
 
 def measure() -> list[dict[str, Any]]:
     """All rows: contestant, work, seconds a step (and start), ratio of speeds to the first row of the work, note."""
-    member = draw_with_eigenvalues([1, -2, 3], seed=7)
+    member = random_member_with_eigenvalues([1, -2, 3], seed=7)
     system, form = member.chosen.system, normal_form(member)
     blocks = planar_blocks(form, EPS)
     # Starts on bounded stretches: near 0 every orbit is regular for a while, so that no contestant meets anything odd.

@@ -38,8 +38,8 @@ for finding in km.check_measure(lotka_volterra).findings:
 if find_spec("matplotlib"):
     from kahanmaps.plots.figures import write_picture
     from kahanmaps.plots.point_functions import point_function
-    from kahanmaps.plots.portraits.portrait import draw_portrait, portrait_of
+    from kahanmaps.plots.portraits.portrait import plot_portrait, portrait_of
     from kahanmaps.plots.style import Style
 
     axes = [point_function(name, system.variables) for name in system.variables]
-    write_picture(draw_portrait(portrait_of(kahan, axes), Style()), "lotka_volterra.pdf", "pdf", Style())
+    write_picture(plot_portrait(portrait_of(kahan, axes), Style()), "lotka_volterra.pdf", "pdf", Style())

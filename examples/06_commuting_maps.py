@@ -6,7 +6,7 @@ orders at a rational point, and the pairwise commutativity is proved. The maps o
 
 import kahanmaps as km
 
-member = km.draw_with_eigenvalues([1, -2, 3], seed=7)
+member = km.random_member_with_eigenvalues([1, -2, 3], seed=7)
 print("A has eigenvalues", ", ".join(str(factor.root) for factor in member.factors), "each twice")
 
 associated = list(member.associated())

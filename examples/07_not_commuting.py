@@ -10,7 +10,7 @@ from math import log2
 
 import kahanmaps as km
 
-member = km.draw_with_eigenvalues([1, -2], seed=7)
+member = km.random_member_with_eigenvalues([1, -2], seed=7)
 h_0, h_1 = member.hamiltonians
 f_0, f_1 = h_0.system, h_1.system
 f_s = member.associate([1, -1]).system

@@ -11,7 +11,7 @@ from flint import fmpq_poly
 
 import kahanmaps as km
 
-member = km.draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=1)
+member = km.random_member_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=1)
 file = km.SystemFile.from_member(member, "cube root of 2")
 
 report = km.verify(file)

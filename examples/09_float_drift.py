@@ -39,8 +39,8 @@ for name in ("I1", "I2"):
     print(f"{file.name}, {name}: below 1e-6: {error['generic'] < 1e-6}; in normal form smaller: {better}")
 
 if find_spec("matplotlib"):
-    from kahanmaps.plots.drifts.drift import draw_drift
+    from kahanmaps.plots.drifts.drift import plot_drift
     from kahanmaps.plots.figures import write_picture
     from kahanmaps.plots.style import Style
 
-    write_picture(draw_drift(survey), "drift.pdf", "pdf", Style())
+    write_picture(plot_drift(survey), "drift.pdf", "pdf", Style())

@@ -1,7 +1,7 @@
 """Kahan (Hirota-Kimura) maps of quadratic systems, exactly: orbits, integrals, commutativity, with proofs.
 
 >>> import kahanmaps as km
->>> member = km.draw_with_eigenvalues([1, -2, 3], seed=7)
+>>> member = km.random_member_with_eigenvalues([1, -2, 3], seed=7)
 >>> f, g = member.associate([1, 1, 1]), member.associate([1, 1, -1])
 >>> phi_f, phi_g = km.KahanMap(f.system, "1/10"), km.KahanMap(g.system, "1/10")
 >>> x = phi_f.point(["1/2", "-1/3", 0, 1, "2/5", -1])
@@ -32,10 +32,10 @@ _COMMANDS = {  # functions that are also called like their commands
     "heights": "height_survey",
     "lyapunov": "lyapunov_exponents",
     "map": "map_at",
-    "portrait": "draw_orbits",
+    "portrait": "plot_orbits",
 }
 # `import *` leaves the builtin `map` alone.
-__all__ = sorted({*_NAMES, *_COMMANDS} - {"map", "map_at", "draw_orbits"})
+__all__ = sorted({*_NAMES, *_COMMANDS} - {"map", "map_at", "plot_orbits"})
 
 
 def __getattr__(name: str) -> Any:

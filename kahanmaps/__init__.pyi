@@ -44,14 +44,14 @@ from .experiments.spec import read_spec as read_spec
 from .family.associated import AssociatedSystem as AssociatedSystem
 from .family.associated import FamilyMember as FamilyMember
 from .family.cubics import cubic_space as cubic_space
-from .family.draw import draw_generic as draw_generic
-from .family.draw import draw_with_chi as draw_with_chi
-from .family.draw import draw_with_eigenvalues as draw_with_eigenvalues
 from .family.planar import NormalForm as NormalForm
 from .family.planar import normal_form as normal_form
-from .family.recognise import RecognisedMember as RecognisedMember
-from .family.recognise import recognised_member as recognised_member
-from .family.recognise import recognised_member_of as recognised_member_of
+from .family.random_members import random_member as random_member
+from .family.random_members import random_member_with_chi as random_member_with_chi
+from .family.random_members import random_member_with_eigenvalues as random_member_with_eigenvalues
+from .family.recognition import FamilyStructure as FamilyStructure
+from .family.recognition import find_family_structure as find_family_structure
+from .family.recognition import find_family_structure_of as find_family_structure_of
 from .family.system_normal_form import SystemNormalForm as SystemNormalForm
 from .family.system_normal_form import system_normal_form as system_normal_form
 from .family.tensor import TensorStructure as TensorStructure
@@ -61,7 +61,7 @@ from .hard_stop import time_limit as time_limit
 from .invariants.heights import HeightGrowth as HeightGrowth
 from .invariants.heights import height as height
 from .invariants.heights import height_growth as height_growth
-from .invariants.poisson import GivenTensor as GivenTensor
+from .invariants.poisson import MatrixPoissonTensor as MatrixPoissonTensor
 from .laboratory.analysis import Analysis as Analysis
 from .laboratory.analysis import analyze as analyze
 from .laboratory.cycles import Census as Census
@@ -111,9 +111,9 @@ from .maps.floats.fast import FloatOrbit as FloatOrbit
 from .maps.floats.fast import to_floats as to_floats
 from .maps.floats.lyapunov import Lyapunov as Lyapunov
 from .maps.floats.lyapunov import lyapunov_exponents as lyapunov_exponents
-from .maps.implicit import BirationalMap as BirationalMap
 from .maps.implicit import ImplicitMap as ImplicitMap
-from .maps.kahan import Kahan as Kahan
+from .maps.implicit import MapFamily as MapFamily
+from .maps.kahan import KahanFamily as KahanFamily
 from .maps.kahan import KahanMap as KahanMap
 from .maps.normal_form.iterate import NthIterate as NthIterate
 from .maps.normal_form.periods import orbit_period as orbit_period
@@ -126,8 +126,8 @@ from .maps.orbits.orbit import orbit as orbit
 from .maps.polarised import polarised_map as polarised_map
 from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
-from .plots.plot import draw_orbits as draw_orbits
 from .plots.plot import plot as plot
+from .plots.plot import plot_orbits as plot_orbits
 from .reports.report import report_html as report_html
 from .reports.report import write_report as write_report
 from .systems.hamiltonian import CubicHamiltonian as CubicHamiltonian
@@ -143,4 +143,4 @@ find_symmetry = linear_symmetries
 heights = height_survey
 lyapunov = lyapunov_exponents
 map = map_at
-portrait = draw_orbits
+portrait = plot_orbits

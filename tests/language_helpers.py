@@ -50,7 +50,7 @@ CATALOGUE = ("riccati", "weierstrass", "euler_top", "lorenz", "henon_heiles")
 @cache
 def systems() -> dict[str, km.SystemFile]:
     """Systems of the catalogue, a member of the family, and names that are hard to write."""
-    member = km.SystemFile.from_member(km.draw_with_eigenvalues([1, -2], seed=7))
+    member = km.SystemFile.from_member(km.random_member_with_eigenvalues([1, -2], seed=7))
     nasty = {name: km.parse_system(text, name) for name, text in NASTY.items()}
     return {name: km.load(name) for name in CATALOGUE} | {"member": member} | nasty
 

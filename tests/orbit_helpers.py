@@ -6,24 +6,24 @@ from flint import fmpq
 
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 from kahanmaps import load
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (-2, 7)))
 
 
-def over(name: str, eps: str = "3/11") -> MapOver:
+def over(name: str, eps: str = "3/11") -> Map:
     """The map of a system of the catalogue."""
-    found: MapOver = load(name).map.at(eps)
+    found: Map = load(name).map.at(eps)
     return found
 
 
-def begin(map_over: MapOver) -> IntegerPoint:
+def begin(map_over: Map) -> IntegerPoint:
     """A start without special properties."""
     return IntegerPoint.from_rationals(START[: map_over.dim])
 
 
-def single_steps(map_over: MapOver, start: IntegerPoint, steps: int) -> list[IntegerPoint]:
+def single_steps(map_over: Map, start: IntegerPoint, steps: int) -> list[IntegerPoint]:
     """The points of an orbit, by one linear system each, as far as there are any."""
     points = [start]
     for _ in range(steps):
@@ -34,7 +34,7 @@ def single_steps(map_over: MapOver, start: IntegerPoint, steps: int) -> list[Int
     return points
 
 
-def walked(map_over: MapOver, start: IntegerPoint, steps: int) -> tuple[list[Any], rational_orbit.RationalOrbit]:
+def walked(map_over: Map, start: IntegerPoint, steps: int) -> tuple[list[Any], rational_orbit.RationalOrbit]:
     """The points as orbits have them, and the orbit."""
     orbit = rational_orbit.RationalOrbit(map_over, start)
     return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit

@@ -15,7 +15,7 @@ from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
@@ -214,22 +214,22 @@ def _drawn(member: Any, R: fmpq_mat | None = None) -> tuple[QuadraticSystem, Cub
 
 _t = fmpq_poly([0, 1])
 SPLIT: dict[str, tuple[QuadraticSystem, CubicHamiltonian]] = {
-    "m = 1": _drawn(draw_with_eigenvalues([2], 3)),
-    "m = 2": _drawn(draw_with_eigenvalues([1, -2], 7)),
-    "m = 3": _drawn(draw_with_eigenvalues([1, -2, 3], 7)),
-    "m = 3, fractions": _drawn(draw_with_eigenvalues(["1/2", "-2/3", 4], 1)),
-    "m = 2, another J": _drawn(draw_with_eigenvalues([1, -2], 5), invertible(4, 3)),
-    "m = 3, another J": _drawn(draw_with_eigenvalues([1, -2, 3], 2), invertible(6, 4)),
+    "m = 1": _drawn(random_member_with_eigenvalues([2], 3)),
+    "m = 2": _drawn(random_member_with_eigenvalues([1, -2], 7)),
+    "m = 3": _drawn(random_member_with_eigenvalues([1, -2, 3], 7)),
+    "m = 3, fractions": _drawn(random_member_with_eigenvalues(["1/2", "-2/3", 4], 1)),
+    "m = 2, another J": _drawn(random_member_with_eigenvalues([1, -2], 5), invertible(4, 3)),
+    "m = 3, another J": _drawn(random_member_with_eigenvalues([1, -2, 3], 2), invertible(6, 4)),
     "m = 2, undisguised": _plain([(1, 2, 0, 5), (0, 2, 1, 3)]),
     "m = 3, undisguised": _plain([(1, 2, 0, 5), (0, 2, 1, 0), (0, 1, -3, 2)]),
     "m = 3, one plane at rest, one double root": _plain([(1, 1, -3, -1), (1, 0, -3, 2), (1, 0, 0, 0)]),
 }
 UNSPLIT: dict[str, tuple[QuadraticSystem, CubicHamiltonian]] = {
-    "m = 2, sqrt 2": _drawn(draw_with_chi(_t**2 - 2, 1)),
-    "m = 2, i": _drawn(draw_with_chi(_t**2 + 1, 1)),
-    "m = 3, partly split": _drawn(draw_with_chi((_t - 1) * (_t**2 + 1), 1)),
-    "m = 3, a cubic field": _drawn(draw_with_chi(_t**3 - _t - 1, 2)),
-    "m = 2, sqrt 2, another J": _drawn(draw_with_chi(_t**2 - 2, 4), invertible(4, 8)),
+    "m = 2, sqrt 2": _drawn(random_member_with_chi(_t**2 - 2, 1)),
+    "m = 2, i": _drawn(random_member_with_chi(_t**2 + 1, 1)),
+    "m = 3, partly split": _drawn(random_member_with_chi((_t - 1) * (_t**2 + 1), 1)),
+    "m = 3, a cubic field": _drawn(random_member_with_chi(_t**3 - _t - 1, 2)),
+    "m = 2, sqrt 2, another J": _drawn(random_member_with_chi(_t**2 - 2, 4), invertible(4, 8)),
 }
 MEMBERS = {**SPLIT, **UNSPLIT}
 DAILY = ["m = 1", "m = 2", "m = 2, another J", "m = 3, undisguised", "m = 3, one plane at rest, one double root"]

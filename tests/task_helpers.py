@@ -5,14 +5,14 @@ from typing import Any
 
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.experiments.registry import task_kind
-from kahanmaps.experiments.results.recipes import recipe_of, system_from
 from kahanmaps.experiments.results.records import canonical
+from kahanmaps.experiments.results.system_spec import spec_of, system_from
 
 
 def made(file: SystemFile) -> SystemFile:
     """The system as a child has it: from the recipe of the file."""
     documents: dict[str, str] = {}
-    return system_from(recipe_of(file, documents), documents.__getitem__)
+    return system_from(spec_of(file, documents), documents.__getitem__)
 
 
 def member(m: int = 2, seed: int = 1, **recipe: Any) -> SystemFile:

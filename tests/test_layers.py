@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # From the ground up, one folder or file of kahanmaps/ a floor.
 FLOORS = [
-    *("errors", "version", "sources", "displayed", "whole_files", "processes", "hard_stop"),
+    *("errors", "version", "sources", "displayed", "atomic_files", "processes", "hard_stop"),
     *("algebra", "systems", "family", "maps", "documents", "invariants"),
     *("checks", "paper", "laboratory", "experiments"),
     *("display", "languages", "plots", "reports"),
@@ -38,7 +38,7 @@ NUMPY_WHILE_LOADING = (
 CLOCKS = {"time", "datetime", "timeit", "sched"}
 WITH_A_CLOCK = ("kahanmaps/errors.py", "kahanmaps/experiments/running/")
 # A file of compiled kernels may import numba or llvmlite at its top if nobody imports the file while being loaded.
-KERNELS = ("kahanmaps/maps/floats/machine_code.py", "kahanmaps/maps/kept_code.py")
+KERNELS = ("kahanmaps/maps/floats/machine_code.py", "kahanmaps/maps/numba_cache.py")
 
 
 _PARTS = ("body", "orelse", "finalbody", "handlers", "cases")  # of statements, where statements stand

@@ -47,7 +47,7 @@ def test_an_exact_orbit_does_not_load_numpy():
 
 
 def test_a_short_orbit_loads_no_normal_forms():
-    heavy = {"kahanmaps.family.recognise", "kahanmaps.maps.normal_form.rational_iterate"}
+    heavy = {"kahanmaps.family.recognition", "kahanmaps.maps.normal_form.rational_iterate"}
     assert modules_loaded_by(COMMAND.format(arguments=SHORT)) & heavy == set()
     member = ["orbit", "paper_m2", "--start", "1,2,3,4", "--eps", "1/10", "--at", "100"]
     assert heavy <= modules_loaded_by(COMMAND.format(arguments=member))

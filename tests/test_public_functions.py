@@ -39,7 +39,7 @@ def test_all_that_stands_for_a_map_gives_the_same(path):
 
 
 def test_members_of_the_family_stand_for_their_maps():
-    member = km.draw_with_eigenvalues([2, -3], seed=1)
+    member = km.random_member_with_eigenvalues([2, -3], seed=1)
     f, g = member.associate([1, 1]), member.associate([1, -1])
     assert km.check_commute(f, g).verdict is km.Certainty.PROVED
     assert km.check_commute(f, km.System("x' = y; y' = x; z' = w; w' = x^2")).verdict is km.Certainty.REFUTED
@@ -122,8 +122,10 @@ COUNTS = {
     "the power": lambda value: (km.map("weierstrass", "1/10") ** value == km.map("weierstrass", "1/10") ** 3) * 3,
     "the modulus": lambda value: km.GF(value).characteristic,
     "prime": lambda value: km.cycles("x' = y; y' = x - x^2", "1/5", value).prime,
-    "m": lambda value: km.draw_generic(value, 1).m,
-    "the seed": lambda value: 3 * (km.draw_with_eigenvalues([1, 2], value) == km.draw_with_eigenvalues([1, 2], 3)),
+    "m": lambda value: km.random_member(value, 1).m,
+    "the seed": lambda value: (
+        3 * (km.random_member_with_eigenvalues([1, 2], value) == km.random_member_with_eigenvalues([1, 2], 3))
+    ),
     "an entry": lambda value: 3 if km.find_recurrence([value, 6, 12, 24, 48, 96]).rate.text == "2" else 0,
 }
 
@@ -210,7 +212,7 @@ km.check_commute("x' = y; y' = x^2", "x' = 2*y; y' = 2*x^2")
 str(km.find_integrals("weierstrass")), km.find_integrals("weierstrass").rows()
 km.find_symmetry("euler_top"), km.find_commuting("euler_top"), km.constant_structures("euler_top")
 km.affine_darboux("lorenz"), km.affine_integrals("lorenz"), km.tensor_structure("lorenz")
-km.recognised_member_of("henon_heiles"), km.system_normal_form("paper_m2"), km.equivalent_system("lorenz")
+km.find_family_structure_of("henon_heiles"), km.system_normal_form("paper_m2"), km.equivalent_system("lorenz")
 km.convert("euler_top", "latex")
 km.load("euler_top").at("1/10")([1, 2, 3]) == km.load("euler_top")("1/10")([1, 2, 3])
 km.map("euler_top", time_step="1/5") @ km.map("lorenz", "1/10")

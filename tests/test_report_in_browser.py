@@ -76,8 +76,8 @@ MOVING = """<script>document.addEventListener("DOMContentLoaded", () => {
 
 def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
     page = report_html(km.analyze(km.load("euler_top")), explore=True)
-    _, _, (refusal,) = dumped(tmp_path, page.replace("</body>", MOVING))
-    assert "violates the following Content Security Policy" in refusal, "the page runs its own script alone"
+    _, _, (error,) = dumped(tmp_path, page.replace("</body>", MOVING))
+    assert "violates the following Content Security Policy" in error, "the page runs its own script alone"
     without_policy = re.sub("<meta http-equiv=.*?/>", "", page)
     dom, asked, console = dumped(tmp_path, without_policy.replace("</body>", MOVING))
     assert (asked, console) == ([], [])

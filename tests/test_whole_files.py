@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps import whole_files
-from kahanmaps.whole_files import whole_file, write_whole
+from kahanmaps import atomic_files
+from kahanmaps.atomic_files import atomic_write, write_atomically
 
 
 def interrupted(*_):
@@ -20,9 +20,9 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, where):
     target = tmp_path / "x.svg"
     target.write_bytes(b"before")
     if where == "at the end":
-        monkeypatch.setattr(whole_files.os, "replace", interrupted)
+        monkeypatch.setattr(atomic_files.os, "replace", interrupted)
     fail = interrupted if where == "before the end" else len
-    with pytest.raises(KeyboardInterrupt), whole_file(target) as stream:
+    with pytest.raises(KeyboardInterrupt), atomic_write(target) as stream:
         fail(b"half of it" * stream.write(b"half of it"))
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"before"]
 
@@ -33,7 +33,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, where):
 def test_a_file_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path, name, number):
     (tmp_path / "loop").symlink_to("loop")
     with pytest.raises(OSError, match=r"Errno") as caught:
-        write_whole(f"{tmp_path}/{name}", b"")
+        write_atomically(f"{tmp_path}/{name}", b"")
     assert (caught.value.errno, caught.value.filename) == (number, f"{tmp_path}/{name}")
     assert (tmp_path / "loop").is_symlink()
 
@@ -41,12 +41,12 @@ def test_a_file_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path, na
 def test_a_new_file_has_the_permissions_of_the_user_and_a_replaced_one_keeps_its_own(tmp_path):
     before = os.umask(0o027)
     try:
-        write_whole(tmp_path / "new", b"")
+        write_atomically(tmp_path / "new", b"")
     finally:
         os.umask(before)
     (tmp_path / "old").write_bytes(b"")
     (tmp_path / "old").chmod(0o600)
-    write_whole(tmp_path / "old", b"new")
+    write_atomically(tmp_path / "old", b"new")
     assert [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("new", "old")] == [0o640, 0o600]
 
 
@@ -60,18 +60,18 @@ def test_a_file_is_on_the_disk_before_it_has_its_name_and_its_name_before_the_en
             done.append(f"{name} {path_of(arguments[0])}")
             return real(*arguments)
 
-        monkeypatch.setattr(whole_files.os, name, call)
+        monkeypatch.setattr(atomic_files.os, name, call)
 
     noted("fsync", lambda descriptor: "folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file")
     noted("replace", lambda path: "file" if Path(path).read_bytes() == b"new" else "a part of it")
-    write_whole(tmp_path / "x", b"new")
+    write_atomically(tmp_path / "x", b"new")
     assert done == ["fsync file", "replace file", "fsync folder"]
 
 
 def test_a_pipe_gets_everything_at_the_end_and_stays_a_pipe(tmp_path):
     os.mkfifo(tmp_path / "p")
     reader = os.open(tmp_path / "p", os.O_RDONLY | os.O_NONBLOCK)
-    write_whole(tmp_path / "p", b"new")
+    write_atomically(tmp_path / "p", b"new")
     found = os.read(reader, 100)
     os.close(reader)
     assert (found, (tmp_path / "p").is_fifo(), list(tmp_path.iterdir())) == (b"new", True, [tmp_path / "p"])

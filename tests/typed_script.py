@@ -28,7 +28,7 @@ def script() -> None:
     print(km.orbit(phi @ phi, np.array([1, 2, 3]), steps=2), km.orbit(fish, [1, 0], "1/10", 5, arithmetic=km.GF(7)))
     print(km.check_integrals(fish, "p^2", eps="1/10").holds, km.check_measure(fish, "p").rows())
     print(km.check_poisson(fish, [["0", "1"], ["-1", "0"]]).to_json(), km.heights(fish, "1/5", starts=[1, 2]).to_json())
-    member = km.draw_with_eigenvalues([2, -3], seed=1)
+    member = km.random_member_with_eigenvalues([2, -3], seed=1)
     print(km.check_commute(member.associate([1, 1]), member.associate([1, -1])).verdict, km.degrees(member).degrees)
     print(
         km.heights(top.map, "1/10", effort=0).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence

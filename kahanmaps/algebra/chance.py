@@ -20,7 +20,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 PRIME_BITS = 62
 
 
-def seed_for(seed: int, *subject: Any) -> int:
+def derive_seed(seed: int, *subject: Any) -> int:
     """A seed of 256 bits for whatever is drawn about `subject`: the same for the same seed and subject.
 
     Args:
@@ -36,9 +36,9 @@ def seed_for(seed: int, *subject: Any) -> int:
 
     Source: fiat-shamir-1987.
 
-    >>> seed_for(0, "x*y") == seed_for(0, "x*y"), seed_for(0, "x*y") == seed_for(1, "x*y")
+    >>> derive_seed(0, "x*y") == derive_seed(0, "x*y"), derive_seed(0, "x*y") == derive_seed(1, "x*y")
     (True, False)
-    >>> seed_for(0, ["x", "y"]) == seed_for(0, ["xy"])
+    >>> derive_seed(0, ["x", "y"]) == derive_seed(0, ["xy"])
     False
     """
     from hashlib import sha256  # its library takes milliseconds to load, which a single orbit can do without

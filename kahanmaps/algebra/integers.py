@@ -38,10 +38,10 @@ def content(integers: Iterable[fmpz]) -> fmpz:
 
 def without(number: fmpz, power: fmpz) -> fmpz:
     """A number, not zero, without the primes of `power`."""
-    return taken_apart(number, power)[0]
+    return split_by_primes(number, power)[0]
 
 
-def taken_apart(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
+def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
     """The number without the primes of `power`, and what has been taken away, positive; zero as (0, 1)."""
     part = fmpz(1)
     if number == 0:

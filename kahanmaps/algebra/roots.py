@@ -95,7 +95,7 @@ class Root:
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
-    def rounded(self, bits: int = 256) -> fmpq:
+    def real_approximation(self, bits: int = 256) -> fmpq:
         """A rational number as close to the real root as so many bits allow."""
         middle = self._real(bits).mid()
         mantissa, exponent = middle.man_exp()
@@ -161,9 +161,9 @@ class AlgebraicPoint(NamedTuple):
         root = self.root.over(field)
         return tuple(evaluate(entry, field, (root,)) for entry in self.entries)
 
-    def rounded(self) -> tuple[fmpq, ...]:
+    def real_approximation(self) -> tuple[fmpq, ...]:
         """A rational point next to it. Raises InputError where the root is not real."""
-        root = self.root.rounded()
+        root = self.root.real_approximation()
         return tuple(evaluate(entry, QQ, (root,)) for entry in self.entries)
 
 

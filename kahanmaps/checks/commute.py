@@ -10,16 +10,16 @@ from flint import fmpq
 from kahanmaps.algebra.fields import Field, rational
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import certify
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides, decide
-from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import Kahan, SystemLike, as_map
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -31,8 +31,8 @@ _PAIRS_TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one pair takes many se
 
 
 def commutativity(
-    f: QuadraticSystem | BirationalMap,
-    g: QuadraticSystem | BirationalMap,
+    f: QuadraticSystem | MapFamily,
+    g: QuadraticSystem | MapFamily,
     eps: fmpq | None,
     names: tuple[str, str],
     ratio: fmpq = SAME_STEP,
@@ -55,7 +55,7 @@ def commutativity(
     )
 
 
-def _require_another_than_identity(file: SystemFile, letter: str, map_: BirationalMap, eps: Any, seed: int) -> None:
+def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:
     """Raise InputError for the identity, as the Kahan map of f = 0 is: that it commutes says nothing of another map.
 
     It is recognized at random points, as the identity x~ = x of rational functions, with an error below 2^-100.
@@ -113,9 +113,9 @@ def check_commute(
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         ratio = eps2 / settings.eps
         note = f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps"
-        if second.is_quadratic and isinstance(g, Kahan):
+        if second.is_quadratic and isinstance(g, KahanFamily):
             # For it depends on the product eps g only.
-            g, ratio, is_same_step = Kahan(g.system.scaled(ratio)), SAME_STEP, ratio == 1
+            g, ratio, is_same_step = KahanFamily(g.system.scaled(ratio)), SAME_STEP, ratio == 1
         else:
             note = f"the map of g is taken at eps2 = {format_number(eps2)}"
         notes.append(f"{note}; the evidence below is stated for eps")
@@ -125,12 +125,12 @@ def check_commute(
     proof = None
     if is_same_step and as_they_are and file.member is not None and second.member is not None:
         proof = theorems.commuting_by_involution_of_members(file.member, second.member)
-    if proof is None and file.is_quadratic and second.is_quadratic and isinstance(g, Kahan):
+    if proof is None and file.is_quadratic and second.is_quadratic and isinstance(g, KahanFamily):
         proof = theorems.commuting_by_splitting(file.system, g.system)
     identity = commutativity(f, g, settings.eps, ("f", "g"), ratio)
     orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
     kahan = "Kahan maps" if file.is_quadratic and second.is_quadratic else "maps"
-    finding = judge(
+    finding = certify(
         f"the {kahan} of {file.labelled('f')} and {second.labelled('g')} commute",
         identity,
         settings,
@@ -158,7 +158,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         verified[associate.label] = theorems.associated_hypotheses(member, associate)
     orbit = run_orbit(associates[0].system, settings, (member.A, member.H), is_integrable=True)
 
-    def judged(
+    def certified(
         claim: str,
         systems: tuple[QuadraticSystem, QuadraticSystem],
         names: tuple[str, str],
@@ -171,7 +171,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         if not tried and proof is not None:
             return Finding(claim, Certainty.PROVED, proof, formula=formula, **told)
         identity = commutativity(*systems, settings.eps, names)
-        return judge(claim, identity, settings, proof, orbit if tried else None, formula=formula, **told)
+        return certify(claim, identity, settings, proof, orbit if tried else None, formula=formula, **told)
 
     findings = []
     pairs = list(combinations(associates, 2))
@@ -184,14 +184,14 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         )
         names = (f"f_{first.label}", f"f_{second.label}")
         claim = f"the Kahan maps of {names[0]} and {names[1]} commute"
-        findings.append(judged(claim, (first.system, second.system), names, proof, k < tried, source=SOURCE))
+        findings.append(certified(claim, (first.system, second.system), names, proof, k < tried, source=SOURCE))
     if len(pairs) > tried:
         notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
     if len(associates) == 1:
         # Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse.
         only, inverse = associates[0].system, associates[0].system.scaled(-1)
         findings.append(
-            judged(
+            certified(
                 "the Kahan maps of f_0 and -f_0, its only rational associated system, commute "
                 "(they are inverse to each other)",
                 (only, inverse),
@@ -218,7 +218,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         claim = "control: the Kahan maps of J grad H_0 and J grad H_1, grad H_1 = A grad H_0, commute"
         g, names = others[0], ("H_0", "H_1")
     source = "petrera-suris-2016, Introduction: in general these maps do not commute"
-    control = judged(claim, (f, g), names, theorems.commuting_by_splitting(f, g), control=True, source=source)
+    control = certified(claim, (f, g), names, theorems.commuting_by_splitting(f, g), control=True, source=source)
     if not control.is_as_expected:
         notes.append(
             "the control was not refuted: these maps commute as well, so this member cannot show that the check "

@@ -8,14 +8,14 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, linear_combinations
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import MAX_DIMENSION, certify
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.judge import MAX_DIMENSION, judge
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_functions, run_orbit, settings_and_claim
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
@@ -33,7 +33,7 @@ from kahanmaps.invariants.phase_functions import (
     measured_integrals,
     orbit_about,
 )
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -42,7 +42,7 @@ _TRIED = 32
 _TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one integral takes many seconds
 
 
-def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunction, eps: fmpq | None) -> Identity:
+def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, eps: fmpq | None) -> Identity:
     """I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
     map_, labels = as_map(system), ("I(x~)", "I(x)")
     last: list[Any] = []  # along an orbit I(x~) at one point is I(x) at the next
@@ -108,7 +108,7 @@ def functions_along(
     give and the file claims, this as `measured_integrals` has it. Raises InputError for the same name twice, or one
     that is `taken` by another column.
     """
-    file = file.rounded if in_floats else file
+    file = file.real_approximation if in_floats else file
     found: list[PhaseFunction] = []
     for k, (name, text) in enumerate(asked, start=1):
         if text == "known" and not name:
@@ -199,7 +199,7 @@ def check_integrals(
             finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **told)
         else:
             identity, walked = conservation(file.map, integral, settings.eps), k < tried or proof is None
-            finding = judge(claim, identity, settings, proof, orbit if walked else None, **told)
+            finding = certify(claim, identity, settings, proof, orbit if walked else None, **told)
         findings.append(finding)
     notes = []
     proved = [finding for finding in findings if finding.verdict is Certainty.PROVED]
@@ -224,7 +224,7 @@ def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
     if H.is_homogeneous or H.dim > MAX_DIMENSION:
         return H.H.is_zero()  # it begins with a multiple of H
     # Equal values at two points mean little; expanded it is exact.
-    rng = random.Random(f"constant {seed_for(settings.seed, integral.subject, settings.eps)}")
+    rng = random.Random(f"constant {derive_seed(settings.seed, integral.subject, settings.eps)}")
     field = random_prime_field(rng)
     try:
         eps = field.random(rng) if settings.eps is None else field.convert(settings.eps)

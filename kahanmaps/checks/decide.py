@@ -27,7 +27,7 @@ from flint import fmpq
 
 from kahanmaps.algebra import work
 from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
-from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
+from kahanmaps.algebra.chance import PRIME_BITS, derive_seed, random_prime_field
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.roots import Root
 from kahanmaps.checks.claims import Certainty, Evidence, Witness
@@ -51,7 +51,7 @@ class Identity:
 
     `sides(field, x, eps)` gives both as lists of field elements; it returns None, or raises SingularStep, where
     they are not defined. `eps` is the step the identity is stated for, None for every eps. `subject` is all that
-    determines the two sides, as `seed_for` takes it: points are drawn by its hash.
+    determines the two sides, as `derive_seed` takes it: points are drawn by its hash.
     """
 
     dim: int
@@ -68,7 +68,7 @@ class Identity:
 
     def seed(self, seed: int) -> int:
         """What everything drawn for this identity is drawn from."""
-        return seed_for(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
+        return derive_seed(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
 
     @cached_property
     def bound(self) -> tuple[CoefficientSize, int]:
@@ -93,7 +93,7 @@ class Identity:
     # What `decide` asks of a statement.
 
     name = "identity"
-    patience = _MAX_POLES
+    max_failures = _MAX_POLES
 
     @property
     def conjugates(self) -> int:
@@ -188,7 +188,7 @@ class Decidable(Protocol):
     def conjugates(self) -> int: ...
 
     @property
-    def patience(self) -> int: ...
+    def max_failures(self) -> int: ...
 
     def trials(self, seed: int) -> Iterator[Trial]: ...
 
@@ -215,7 +215,7 @@ def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS
                 break
             continue
         undefined += 1
-        if undefined > statement.patience:
+        if undefined > statement.max_failures:
             text = f"the {statement.name} is not defined at any of {undefined} random points over GF(p)"
             return _undecided(f"{text}: {statement.no_value}", poles_met=undefined)
     else:

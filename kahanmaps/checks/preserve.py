@@ -9,9 +9,9 @@ from flint import fmpq
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import Contradiction, certify
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_tensor, run_orbit, settings_and_claim
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
@@ -22,21 +22,21 @@ from kahanmaps.invariants.phase_functions import (
     jacobian_determinant_sides,
 )
 from kahanmaps.invariants.poisson import (
-    GivenTensor,
     HamiltonianTensor,
+    MatrixPoissonTensor,
     PoissonTensor,
     jacobi_defects,
     tensor_condition,
     transformation_sides,
 )
-from kahanmaps.maps.implicit import BirationalMap, MapOver
-from kahanmaps.maps.kahan import Kahan, KahanMap, SystemLike, as_map
+from kahanmaps.maps.implicit import Map, MapFamily
+from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _NO_TENSOR = "the map seems to have no value, or the tensor or a denominator to vanish identically"
 
 
-def density_identity(system: QuadraticSystem | BirationalMap, density: PhaseFunction, eps: fmpq | None) -> Identity:
+def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction, eps: fmpq | None) -> Identity:
     """phi(x~) det M(x) = phi(x) det N(x, x~): the measure dx/phi is invariant; dPhi(x) is M^{-1} N.
 
     A system stands for its Kahan map, with M = I - eps f'(x) and N = I + eps f'(x~).
@@ -55,7 +55,7 @@ def density_identity(system: QuadraticSystem | BirationalMap, density: PhaseFunc
         return [after * below], [before * above]
 
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
-    if not isinstance(map_, Kahan):
+    if not isinstance(map_, KahanFamily):
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
     subject = (map_.subject, density.subject)
     no_value = "the map seems to have no inverse, or no value, or a denominator to vanish identically"
@@ -64,7 +64,7 @@ def density_identity(system: QuadraticSystem | BirationalMap, density: PhaseFunc
     )
 
 
-def _image(kahan: MapOver, point: tuple[Any, ...]) -> tuple[Any, ...]:
+def _image(kahan: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
     """x~, put into the defining equation.
 
     The formula for dPhi that both laws use comes from this equation; the laws themselves would not notice a wrong
@@ -127,7 +127,7 @@ def check_measure(
     claimed = [density.subject for density, _, _ in candidates]
     orbit = run_orbit(file.map, settings, claimed, file.member is not None)
     findings = tuple(
-        judge(
+        certify(
             f"the measure dx/phi is invariant{f', {density.condition}' if density.condition else ''}",
             density_identity(file.map, density, settings.eps),
             settings,
@@ -142,7 +142,7 @@ def check_measure(
     return Report("measure", findings, context, ended_early=settings.cut_short(orbit))
 
 
-def transformation_identity(map_: BirationalMap, tensor: PoissonTensor, eps: fmpq | None) -> Identity:
+def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | None) -> Identity:
     """dPhi P(x) dPhi^T = P(x~), multiplied out."""
     n = map_.dim
 
@@ -154,7 +154,7 @@ def transformation_identity(map_: BirationalMap, tensor: PoissonTensor, eps: fmp
 
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
     labels = ("N(x, x~) P(x) N(x, x~)^T", "M(x) P(x~) M(x)^T")
-    if isinstance(map_, Kahan):
+    if isinstance(map_, KahanFamily):
         labels = ("(I + eps f'(x~)) P(x) (I + eps f'(x~))^T", "(I - eps f'(x)) P(x~) (I - eps f'(x))^T")
     labels = (labels[0].replace("P", tensor.name), labels[1].replace("P", tensor.name))
     subject, dim = (map_.subject, tensor.subject), n + len(map_.symbols)
@@ -181,7 +181,7 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
 def check_poisson(
     system: SystemLike,
     settings: Settings | Any = None,
-    extra: GivenTensor | Any = None,
+    extra: MatrixPoissonTensor | Any = None,
     *,
     eps: Any = None,
     time_step: Any = None,
@@ -208,8 +208,8 @@ def check_poisson(
         tensor = HamiltonianTensor(file.hamiltonian)
         proof = theorems.poisson_tensor_invariant(file.hamiltonian, file.member)
         source = "petrera-suris-2016, Theorem 12" if file.member is not None else ""
-    elif file.map.refusal:
-        raise InputError(file.map.refusal)
+    elif file.map.unsupported_reason:
+        raise InputError(file.map.unsupported_reason)
     else:
         raise InputError(
             f"{file.name} is of kind [{file.kind}]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "
@@ -217,8 +217,8 @@ def check_poisson(
         )
     orbit = run_orbit(file.map, settings, tensor.subject, file.member is not None)
     name, where = tensor.name, f", {condition}" if condition else ""
-    law = judge(
-        f"the {'Kahan ' * isinstance(file.map, Kahan)}map is Poisson for {name}{where}",
+    law = certify(
+        f"the {'Kahan ' * isinstance(file.map, KahanFamily)}map is Poisson for {name}{where}",
         transformation_identity(file.map, tensor, settings.eps),
         settings,
         proof,
@@ -226,7 +226,7 @@ def check_poisson(
         formula=f"dPhi(x) {name}(x) dPhi(x)^T = {name}(x~), {tensor.formula}",
         source=source,
     )
-    jacobi = judge(
+    jacobi = certify(
         f"{name} is a Poisson tensor{where}",
         jacobi_identity(tensor, settings.eps),  # of x alone: an orbit would add nothing
         settings,

@@ -10,7 +10,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.polynomials import RationalFunction
@@ -21,9 +21,9 @@ from kahanmaps.documents.expressions import formula_text
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.iterates import parse_with_iterates
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.maps.convention import eps_record, resolve_eps
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd, require_short
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -124,7 +124,7 @@ def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
 
 
 def run_orbit(
-    system: QuadraticSystem | BirationalMap,
+    system: QuadraticSystem | MapFamily,
     settings: Settings,
     subject: Sequence[Any] = (),
     is_integrable: bool = False,
@@ -134,7 +134,7 @@ def run_orbit(
     A claim for every eps is tried at one that is drawn. Everything drawn follows the system and the `subject`, what
     is claimed of it: no claim can be written for an orbit that is known in advance.
     """
-    seed = seed_for(settings.seed, as_map(system).subject, settings.eps, subject)
+    seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, subject)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     of_field = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
@@ -233,11 +233,11 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
     return {name: claimed_function(file, claim) for name, claim in claims.items()}
 
 
-def claimed_tensor(file: SystemFile, claim: Any) -> GivenTensor | None:
+def claimed_tensor(file: SystemFile, claim: Any) -> MatrixPoissonTensor | None:
     """A matrix of formulas as a tensor. Raises InputError for what is none, and for one that is not skew."""
-    if claim is None or isinstance(claim, GivenTensor):
+    if claim is None or isinstance(claim, MatrixPoissonTensor):
         return claim
     rows = claim.tolist() if hasattr(claim, "tolist") else claim
     if not isinstance(rows, list | tuple) or not all(isinstance(row, list | tuple) for row in rows):
         raise InputError(f"found {claim!r}, expected a matrix of formulas: [['0', 'x*y'], ['-x*y', '0']]")
-    return GivenTensor([[claimed_function(file, entry) for entry in row] for row in rows])
+    return MatrixPoissonTensor([[claimed_function(file, entry) for entry in row] for row in rows])

@@ -63,9 +63,9 @@ class Check:
 
 
 def _tensor(file: SystemFile, path: str) -> Any:
-    from kahanmaps.invariants.poisson import GivenTensor
+    from kahanmaps.invariants.poisson import MatrixPoissonTensor
 
-    return GivenTensor.read(path, file.variables, file.parameters)
+    return MatrixPoissonTensor.read(path, file.variables, file.parameters)
 
 
 _CHECKS = [

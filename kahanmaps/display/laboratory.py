@@ -34,7 +34,7 @@ from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import MATRICES, Symmetries
 from kahanmaps.maps.convention import eps_record, eps_told
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _ROWS = 60  # of a table in a notebook
@@ -68,7 +68,7 @@ def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> Shown:
     return _formula(format_polynomial(polynomial), polynomial, name)
 
 
-def eps_sentence(eps: fmpq | None, *maps: BirationalMap) -> str:
+def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
     """For which eps a result is, with the time step: a phrase, empty for a map that does not depend on eps."""
     return markup.eps_phrase(eps_record(eps, *maps))
 
@@ -84,7 +84,7 @@ def result_text(found: object) -> str:
     return "\n".join("\t".join(map(str, line)) for line in lines_of(found))
 
 
-def result_html(found: Any, map_: BirationalMap | None = None) -> str:
+def result_html(found: Any, map_: MapFamily | None = None) -> str:
     """The lines of a result as a table; `map_` tells what eps is, where it is not Kahan's."""
 
     def shown(cell: object) -> str:

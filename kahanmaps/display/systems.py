@@ -28,8 +28,8 @@ from kahanmaps.errors import counted
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.composed import ComposedMap
-from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
-from kahanmaps.maps.kahan import Kahan, KahanMap
+from kahanmaps.maps.implicit import ImplicitMap, MapFamily
+from kahanmaps.maps.kahan import KahanFamily, KahanMap
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -56,9 +56,9 @@ def hamiltonian_latex(hamiltonian: CubicHamiltonian) -> str:
     return latex_aligned([("H", latex_cut(hamiltonian.H, CHARACTERS)), (r"\dot{x}", rf"J \nabla H, \quad J = {J}")])
 
 
-def map_html(map_: BirationalMap) -> str:
+def map_html(map_: MapFamily) -> str:
     """The equations of a vector field, or those of another map."""
-    if isinstance(map_, Kahan):
+    if isinstance(map_, KahanFamily):
         return equations_html(map_.system)
     return "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(map_).split("\n"))
 
@@ -164,9 +164,9 @@ def map_latex(kahan: KahanMap) -> str:
 
 
 @latex_form.register
-def birational_latex(map_: BirationalMap) -> str:
+def birational_latex(map_: MapFamily) -> str:
     """The equations between a point and its image; of a Kahan map the differential equation that it belongs to."""
-    if isinstance(map_, Kahan):
+    if isinstance(map_, KahanFamily):
         return system_latex(map_.system)
     if isinstance(map_, ComposedMap) and not map_.is_small:
         return latex_aligned([(r"\widetilde{x}", rf"\text{{{len(map_.parts)} maps one after the other}}")])

@@ -27,8 +27,8 @@ from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map, is_involution
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, why_no_map
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.implicit import ImplicitMap, MapFamily, why_no_map
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.polarised import MAX_DEGREE, polarised_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
@@ -41,17 +41,17 @@ _MOST_FACTORS = 64  # of a composition, those of its parts counted too
 _STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where a rational one shows mistakes as well
 
 
-def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> Kahan:
+def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
     """The Kahan map of right-hand sides in the variables, symbols, then eps, which may not occur."""
     symbols = names_of(rhs[0])[len(rhs) :]
     if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
-        return Kahan(QuadraticSystem(tuple(rhs), symbols))
-    return Kahan(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in rhs), symbols[:-1]))
+        return KahanFamily(QuadraticSystem(tuple(rhs), symbols))
+    return KahanFamily(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in rhs), symbols[:-1]))
 
 
 # What makes a map of right-hand sides (polynomials in the variables, symbols, then eps) and their degree, and the
 # degree: the usual one and the largest.
-_DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], BirationalMap], int, int]] = {
+_DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], MapFamily], int, int]] = {
     "kahan": (_kahan, 2, 2),
     "polarised": (polarised_map, 3, MAX_DEGREE),
 }
@@ -63,7 +63,7 @@ Values = dict[str, RationalFunction]
 class _Part(NamedTuple):
     """A map of a composition, its power, the values of its symbols, and the entry with the map as a table."""
 
-    map: BirationalMap
+    map: MapFamily
     power: int
     values: Values
     plain: dict[str, Any]
@@ -140,7 +140,7 @@ class DocumentReader(PartReader):
 
     def _read_section(
         self, kind: str, section: Mapping[str, Any] | None
-    ) -> tuple[BirationalMap | None, CubicHamiltonian | None, FamilyMember | None]:
+    ) -> tuple[MapFamily | None, CubicHamiltonian | None, FamilyMember | None]:
         """What the section says that the document is of; of a mistake nothing."""
         if section is None:
             return None, None, None
@@ -163,15 +163,15 @@ class DocumentReader(PartReader):
         else:
             map_ = self._read_given(kind, section)
         if hamiltonian is not None:
-            map_ = Kahan(hamiltonian.system)
+            map_ = KahanFamily(hamiltonian.system)
         elif map_ is not None:
             if self.root is not None:
                 parameter, root = self.root
 
-                def at_number(value: fmpq) -> BirationalMap:  # for floats
+                def at_number(value: fmpq) -> MapFamily:  # for floats
                     overrides = {**self.overrides, parameter: value}
                     reader = DocumentReader(self.document, self.where, overrides, self.other)
-                    found: BirationalMap = reader.read()["map"]
+                    found: MapFamily = reader.read()["map"]
                     return found
 
                 map_ = AlgebraicMap(map_, root, at_number)
@@ -180,7 +180,7 @@ class DocumentReader(PartReader):
                 self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
         return map_, hamiltonian, member
 
-    def read_map(self, kind: str, symbols: Sequence[str]) -> BirationalMap:
+    def read_map(self, kind: str, symbols: Sequence[str]) -> MapFamily:
         """The map of a section with these parameters as symbols. Raises InputError for a [family]."""
         if kind == "family":
             raise InputError(
@@ -197,7 +197,7 @@ class DocumentReader(PartReader):
             raise SystemFileError(f"{self.where} with {', '.join(symbols)} as symbols", self.mistakes)
         return map_
 
-    def _read_given(self, kind: str, section: Mapping[str, Any]) -> BirationalMap | None:
+    def _read_given(self, kind: str, section: Mapping[str, Any]) -> MapFamily | None:
         read = {"system": self._read_system, "composition": self._read_composition, "bilinear": self._read_bilinear}
         return read.get(kind, self._read_map)(section)
 
@@ -277,7 +277,7 @@ class DocumentReader(PartReader):
         else:
             self.variables = tuple(given)
 
-    def _read_system(self, section: Mapping[str, Any]) -> BirationalMap | None:
+    def _read_system(self, section: Mapping[str, Any]) -> MapFamily | None:
         method = section.get("discretization", "kahan")
         method = "polarised" if method == "polarized" else method
         if method not in _DISCRETIZATIONS:
@@ -294,7 +294,7 @@ class DocumentReader(PartReader):
             return None
         return self._made("system.rhs", make, known, degree)
 
-    def _read_bilinear(self, section: Mapping[str, Any]) -> BirationalMap | None:
+    def _read_bilinear(self, section: Mapping[str, Any]) -> MapFamily | None:
         new = section.get("new", [name.upper() for name in self.variables or ()])
         new = self._list("bilinear", "new", new, "name")
         given = self._list("bilinear", "equations", self._required("bilinear", section, "equations"), "equation")
@@ -319,7 +319,7 @@ class DocumentReader(PartReader):
             return None
         return self._sound(bilinear_map, "bilinear", self.variables, found)
 
-    def _read_map(self, section: Mapping[str, Any]) -> BirationalMap | None:
+    def _read_map(self, section: Mapping[str, Any]) -> MapFamily | None:
         self._required("map", section, "image")
         image, inverse = (
             self._each(f"map.{key}", self._list("map", key, section.get(key), "function"), self._claim) or None
@@ -358,7 +358,7 @@ class DocumentReader(PartReader):
         hamiltonian = self._made("hamiltonian.J", CubicHamiltonian, zero if H is None else H, J)
         return None if H is None else hamiltonian
 
-    def _read_field(self, section: Mapping[str, Any]) -> BirationalMap | None:
+    def _read_field(self, section: Mapping[str, Any]) -> MapFamily | None:
         """The Kahan map of J grad H, where both may contain symbols."""
         H, n = self._polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
         given = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
@@ -396,7 +396,7 @@ class DocumentReader(PartReader):
 
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
 
-    def _read_composition(self, section: Mapping[str, Any]) -> BirationalMap | None:
+    def _read_composition(self, section: Mapping[str, Any]) -> MapFamily | None:
         """The composition; what its parts name is put in their places, so that the document says all by itself."""
         given = self._required("composition", section, "of")
         if not isinstance(given, list) or not given:

@@ -20,6 +20,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.printing import format_number, format_polynomial
+from kahanmaps.atomic_files import write_atomically
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
@@ -30,11 +31,10 @@ from kahanmaps.documents.xpp import ENDING, is_ode, read_ode
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.algebraic import AlgebraicMap
-from kahanmaps.maps.implicit import BirationalMap, MapOver
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.implicit import Map, MapFamily
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import ConjugateAssociate, FamilyMember
@@ -57,7 +57,7 @@ class SystemFile(Displayed):
     name: str
     kind: str
     parameters: Mapping[str, fmpq]
-    map: BirationalMap
+    map: MapFamily
     hamiltonian: CubicHamiltonian | None
     member: FamilyMember | None
     integrals: Mapping[str, RationalFunction]
@@ -97,17 +97,17 @@ class SystemFile(Displayed):
     @property
     def is_quadratic(self) -> bool:
         """Whether the map is the Kahan map of a quadratic system without eps in its coefficients."""
-        return isinstance(self.map, Kahan) and not self.map.system.symbols
+        return isinstance(self.map, KahanFamily) and not self.map.system.symbols
 
     @property
     def system(self) -> QuadraticSystem:
         """The quadratic system whose Kahan map is meant. Raises InputError where it is another map."""
-        if self.is_quadratic and isinstance(self.map, Kahan):
+        if self.is_quadratic and isinstance(self.map, KahanFamily):
             return self.map.system
-        if self.map.refusal:
-            raise InputError(self.map.refusal)
-        what = "has eps in its coefficients" if isinstance(self.map, Kahan) else f"is of kind [{self.kind}]"
-        if self.kind == "system" and not isinstance(self.map, Kahan):
+        if self.map.unsupported_reason:
+            raise InputError(self.map.unsupported_reason)
+        what = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
+        if self.kind == "system" and not isinstance(self.map, KahanFamily):
             what = f"stands for a {self.map.title}"
         raise InputError(
             f"{self.name} {what}, expected a quadratic vector field without eps: what is asked for is about fields"
@@ -118,7 +118,7 @@ class SystemFile(Displayed):
         """The right-hand sides of the quadratic system. Raises InputError where it is another map."""
         return self.system.rhs
 
-    def at(self, eps: Any = None) -> MapOver:
+    def at(self, eps: Any = None) -> Map:
         """The map at an exact eps, half the time step where it has one: callable. Raises InputError where it lacks."""
         if eps is None and self.map.has_eps:
             raise InputError(f'found no eps, expected an exact number such as "1/10": {self.name} depends on it')
@@ -128,17 +128,17 @@ class SystemFile(Displayed):
 
     def save(self, path: str | Path) -> None:
         """Write the file."""
-        write_whole(str(path), self.to_toml().encode())
+        write_atomically(str(path), self.to_toml().encode())
 
     @property
-    def rounded(self) -> SystemFile:
+    def real_approximation(self) -> SystemFile:
         """The file, for floats: with a rational number next to the root where a parameter is an algebraic one.
 
         Raises InputError where that is not real.
         """
         if not isinstance(self.map, AlgebraicMap):
             return self
-        value = {self.map.given.symbols[0]: self.map.root.rounded()}
+        value = {self.map.given.symbols[0]: self.map.root.real_approximation()}
         return SystemFile(**DocumentReader(dict(self.document), self.name, value).read())
 
     @property
@@ -169,7 +169,7 @@ class SystemFile(Displayed):
         """A quadratic system without further structure."""
         rhs = [format_polynomial(polynomial) for polynomial in system.rhs]
         document = {"name": name, "variables": list(system.variables), "system": {"rhs": rhs}}
-        return cls(name, "system", {}, Kahan(system), None, None, {}, None, document)
+        return cls(name, "system", {}, KahanFamily(system), None, None, {}, None, document)
 
     @classmethod
     def from_hamiltonian(cls, hamiltonian: CubicHamiltonian, name: str = "system") -> SystemFile:
@@ -177,7 +177,7 @@ class SystemFile(Displayed):
         normal_form: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
         section = {"H": format_polynomial(hamiltonian.H), "J": normal_form}
         document = {"name": name, "variables": list(hamiltonian.variables), "hamiltonian": section}
-        return cls(name, "hamiltonian", {}, Kahan(hamiltonian.system), hamiltonian, None, {}, None, document)
+        return cls(name, "hamiltonian", {}, KahanFamily(hamiltonian.system), hamiltonian, None, {}, None, document)
 
     @classmethod
     def from_member(cls, member: FamilyMember, name: str = "member") -> SystemFile:
@@ -191,7 +191,7 @@ class SystemFile(Displayed):
         if member.variables != default_variables(member.dim):
             document["variables"] = list(member.variables)
         chosen = member.chosen
-        return cls(name, "family", {}, Kahan(chosen.system), chosen.hamiltonian, member, {}, None, document)
+        return cls(name, "family", {}, KahanFamily(chosen.system), chosen.hamiltonian, member, {}, None, document)
 
     @classmethod
     def from_conjugate(cls, given: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
@@ -297,7 +297,7 @@ def _rows(matrix: fmpq_mat) -> list[list[str]]:
     return [[format_number(entry) for entry in row] for row in matrix.tolist()]
 
 
-def matched(file: SystemFile, other: SystemFile) -> tuple[BirationalMap, str]:
+def matched(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
     """The second of two maps in the variables of the first, and a note where these are not the same in order.
 
     Variables are matched by name where the names agree, otherwise by position. Raises InputError for two dimensions,
@@ -312,5 +312,5 @@ def matched(file: SystemFile, other: SystemFile) -> tuple[BirationalMap, str]:
         return g, ""
     pair = f"{', '.join(f.variables)} with {', '.join(g.variables)}"
     if set(f.variables) == set(g.variables):
-        return Kahan(other.system.reordered(f.variables)), f"variables are matched by name: {pair}"
+        return KahanFamily(other.system.reordered(f.variables)), f"variables are matched by name: {pair}"
     return g, f"variables are matched by position: {pair}"

@@ -13,7 +13,7 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -83,7 +83,7 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> MapOver:
+def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> Map:
     """The map of a system at an exact eps: callable, and composed by @ and powers. Raises InputError where eps lacks.
 
     >>> map_at("euler_top", "1/10")([1, 2, 3])
@@ -111,7 +111,7 @@ def as_file(given: Any) -> SystemFile:
         return System(given)
     if isinstance(given, str | Path):
         return load(given)
-    if isinstance(given, MapOver):
+    if isinstance(given, Map):
         raise InputError(f"found {given!r}, a map at one eps, expected what it was made of, and eps=")
     kind = type(given).__name__
     raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")

@@ -10,12 +10,12 @@ from kahanmaps.algebra.printing import format_number
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
-def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> BirationalMap:
+def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily:
     """The map of a file, the parameters named in `symbols` without values, the others with theirs.
 
     Raises InputError as `with_symbols` does, for another map only where a name is no parameter.
@@ -26,8 +26,8 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> Birationa
     x~ = y
     y~ = (y + a)/x
     """
-    if file.map.refusal:
-        raise InputError(file.map.refusal)
+    if file.map.unsupported_reason:
+        raise InputError(file.map.unsupported_reason)
     symbols = _parameters(file, symbols)
     if not symbols:
         return file.map
@@ -71,7 +71,7 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
     """
     _ = file.system  # of another map there is none
     found = map_with_symbols(file, symbols)
-    assert isinstance(found, Kahan)
+    assert isinstance(found, KahanFamily)
     return found.system
 
 

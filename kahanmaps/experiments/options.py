@@ -19,7 +19,7 @@ from kahanmaps.algebra.parsing import parse_number, parse_point
 from kahanmaps.algebra.printing import format_number, format_point, format_univariate
 from kahanmaps.algebra.work import LEAST_EFFORT, MOST_EFFORT
 from kahanmaps.errors import InputError, show, suggestion
-from kahanmaps.family.draw import MAX_M, parse_chi
+from kahanmaps.family.random_members import MAX_M, parse_chi
 
 _LARGEST = 2**63 - 1
 _PRIME_BITS = 192

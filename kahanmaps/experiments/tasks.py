@@ -12,7 +12,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.printing import format_point
 from kahanmaps.checks.claims import Certainty, Report
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
@@ -237,7 +237,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 def _drawn(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
     """A start for the system: one of the seed alone could lie on a curve on which the system is made to be special."""
-    return next(random_starts(system.dim, seed_for(seed, system.map.subject)))
+    return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
 
 
 def _of_report(report: Report) -> Whole:

@@ -36,7 +36,7 @@ class SystemNormalForm:
 
     @property
     def A(self) -> fmpq_mat:
-        """A in the system's own coordinates, as in `RecognisedMember`."""
+        """A in the system's own coordinates, as in `FamilyStructure`."""
         return self.form.A if self.T is None else self.T.inv().transpose() * self.form.A * self.T.transpose()
 
 
@@ -54,23 +54,23 @@ def system_normal_form(
 ) -> SystemNormalForm | NoNormalForm:
     """The normal form of a system, from what is known of it: a member, its Hamiltonian, or nothing.
 
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
+    >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
+    >>> system = random_member_with_eigenvalues([1, -2, 3], seed=7).chosen.system
     >>> system_normal_form(system).text
     'a recognised member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
     """
     from kahanmaps.family.planar import normal_form
-    from kahanmaps.family.recognise import reason_against, recognised_hamiltonian, recognised_member
+    from kahanmaps.family.recognition import find_cubic_hamiltonian, find_family_structure, why_not_member
 
     system = as_system(system)
     if system.dim > _MAX_DIMENSION:
         return NoNormalForm(f"the dimension {system.dim} is above {_MAX_DIMENSION}")
     declared, T = member is not None, None
     if member is None:
-        hamiltonian = hamiltonian or recognised_hamiltonian(system)
-        found = None if hamiltonian is None else recognised_member(hamiltonian)
+        hamiltonian = hamiltonian or find_cubic_hamiltonian(system)
+        found = None if hamiltonian is None else find_family_structure(hamiltonian)
         if found is None:
-            return NoNormalForm(reason_against(hamiltonian))
+            return NoNormalForm(why_not_member(hamiltonian))
         member = found.member
         T = None if found.is_standard else found.T
     factors = "*".join(f"({one})" + f"^{one.multiplicity}" * (one.multiplicity > 1) for one in member.factors)

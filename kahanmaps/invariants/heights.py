@@ -50,7 +50,7 @@ from kahanmaps.algebra.work import Budget, count
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
@@ -195,7 +195,7 @@ def height_of(point: OrbitPoint) -> int:
 
 
 def height_growth(
-    kahan_map: MapOver,
+    kahan_map: Map,
     start: Sequence[Any],
     steps: int,
     *,

@@ -38,8 +38,8 @@ from kahanmaps.algebra.work import count
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.maps.implicit import BirationalMap, MapOver
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.implicit import Map, MapFamily
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -60,7 +60,7 @@ class PhaseFunction(ABC):
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """All that determines the function, as `seed_for` takes it."""
+        """All that determines the function, as `derive_seed` takes it."""
 
 
 class ClaimedFunction(PhaseFunction):
@@ -71,7 +71,7 @@ class ClaimedFunction(PhaseFunction):
     """
 
     def __init__(
-        self, name: str, function: RationalFunction, root: Root | None = None, map_: BirationalMap | None = None
+        self, name: str, function: RationalFunction, root: Root | None = None, map_: MapFamily | None = None
     ) -> None:
         self.name = name
         self.root = root
@@ -102,7 +102,7 @@ class ClaimedFunction(PhaseFunction):
             return self.function.value(field, (*coordinates, *values, field.convert(eps)))
 
 
-def orbit_about(over: MapOver, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
+def orbit_about(over: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
     """The points of an orbit: length steps, x in the middle or, where the inverse is not known, first.
 
     Formulas of points on both sides of x have lower degrees than those of as many points ahead of it.
@@ -176,10 +176,10 @@ class ImageFunction(PhaseFunction):
 
     def __init__(self, hamiltonian: CubicHamiltonian) -> None:
         self.hamiltonian = hamiltonian
-        self.map = Kahan(hamiltonian.system)
+        self.map = KahanFamily(hamiltonian.system)
 
 
-def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: MapOver, point: Sequence[Any]) -> Any:
+def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: Map, point: Sequence[Any]) -> Any:
     """H + grad H . (x~ - x)/3 at a point, for any map."""
     field, image = phi.field, phi.step(point)
     with field.working():
@@ -271,7 +271,7 @@ class ClaimedIntegral(ClaimedFunction):
         function: RationalFunction,
         eps: fmpq | None = None,
         root: Root | None = None,
-        map_: BirationalMap | None = None,
+        map_: MapFamily | None = None,
     ) -> None:
         super().__init__(name, function, root, map_)
         dim = len(function.names) - 1 - (root is not None)
@@ -320,7 +320,7 @@ class DeterminantDensity(PhaseFunction):
     # No condition: it is 1 at eps = 0, and where it is 0 at an eps, the map has no value and nothing is claimed.
 
     def __init__(self, system: QuadraticSystem) -> None:
-        self.map = Kahan(system)
+        self.map = KahanFamily(system)
 
     @property
     def subject(self) -> tuple[Any, ...]:
@@ -380,7 +380,7 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     return where(dim, above) if below.is_zero() else where(dim, above, below)
 
 
-def jacobian_determinant_sides(kahan: MapOver, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
+def jacobian_determinant_sides(kahan: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
     """Numerator and denominator of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x)).
 
     Of a map with several factors the products of theirs.

@@ -27,7 +27,7 @@ from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.documents.toml_text import TomlKind
 from kahanmaps.errors import InputError, SystemFileError, quoted
 from kahanmaps.invariants.phase_functions import at_eps, where
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 _TENSOR_FILE = TomlKind("tensor", 4_000_000, SystemFileError)
@@ -53,7 +53,7 @@ class PoissonTensor(ABC):
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """All that determines the tensor, as `seed_for` takes it."""
+        """All that determines the tensor, as `derive_seed` takes it."""
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -88,14 +88,14 @@ class HamiltonianTensor(PoissonTensor):
             return (second * first + first * second) * field.convert_matrix(self.hamiltonian.J) * -(eps * eps)
 
 
-class GivenTensor(PoissonTensor):
+class MatrixPoissonTensor(PoissonTensor):
     """A skew matrix of rational functions of the variables, perhaps symbols, and eps (their last variable).
 
     Raises InputError for a matrix that is not square or not skew.
 
-    >>> GivenTensor.from_text([["0", "x*y"], ["-x*y", "0"]], ["x", "y"]).formula
+    >>> MatrixPoissonTensor.from_text([["0", "x*y"], ["-x*y", "0"]], ["x", "y"]).formula
     '{x,y} = x*y'
-    >>> GivenTensor.from_text([["0", "x"], ["x", "0"]], ["x", "y"])
+    >>> MatrixPoissonTensor.from_text([["0", "x"], ["x", "0"]], ["x", "y"])
     Traceback (most recent call last):
     kahanmaps.errors.InputError: found x in row 1, column 2 and x in row 2, column 1, expected a skew matrix
     """
@@ -126,7 +126,7 @@ class GivenTensor(PoissonTensor):
     @classmethod
     def from_text(
         cls, rows: Sequence[Sequence[str]], variables: Sequence[str], parameters: Mapping[str, fmpq] | None = None
-    ) -> GivenTensor:
+    ) -> MatrixPoissonTensor:
         """The tensor with entries written as rational functions of the variables, the parameters and eps."""
         names = (*variables, "eps")
         if len(rows) != len(variables):
@@ -134,7 +134,7 @@ class GivenTensor(PoissonTensor):
         return cls([[parse_rational_function(entry, names, parameters or {}) for entry in row] for row in rows])
 
     @classmethod
-    def read(cls, path: str | Path, variables: Sequence[str], parameters: Mapping[str, fmpq]) -> GivenTensor:
+    def read(cls, path: str | Path, variables: Sequence[str], parameters: Mapping[str, fmpq]) -> MatrixPoissonTensor:
         """The tensor in a TOML file: the rows `tensor` of the section [poisson], entries numbers or text.
 
         Raises InputError for a file that cannot be read or says something else.
@@ -216,7 +216,7 @@ class GivenTensor(PoissonTensor):
         return field.matrix(n, n, entries)
 
 
-def tensor_condition(tensor: GivenTensor, eps: fmpq | None) -> str:
+def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
     """The hypothesis that P is a tensor other than 0, of which every law for tensors holds for no reason.
 
     Args:
@@ -230,7 +230,7 @@ def tensor_condition(tensor: GivenTensor, eps: fmpq | None) -> str:
         InputError: where P is identically 0, at that eps if it is given.
 
     >>> for entry in ("(10*eps - 1)*x", "x/(10*eps - 1)", "x + 10*eps - 1"):
-    ...     print([tensor_condition(GivenTensor.from_text([["0", entry], [f"-({entry})", "0"]], ["x", "y"]), None)])
+    ...     print([tensor_condition(MatrixPoissonTensor.from_text([["0", entry], [f"-({entry})", "0"]], ["x", "y"]), None)])
     ['where 10*eps - 1 is not 0']
     ['where 10*eps - 1 is not 0']
     ['']
@@ -246,7 +246,7 @@ def tensor_condition(tensor: GivenTensor, eps: fmpq | None) -> str:
 
 
 def transformation_sides(
-    map_: MapOver, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any], values: Sequence[Any] = ()
+    map_: Map, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any], values: Sequence[Any] = ()
 ) -> tuple[Any, Any] | None:
     """Both sides of the transformation law above, at x = `point` and x~ = `image`.
 

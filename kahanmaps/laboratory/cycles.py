@@ -16,7 +16,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, integer, rational
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.printing import all_fields
@@ -24,7 +24,7 @@ from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 
@@ -117,7 +117,7 @@ def cycle_census(
     census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):
         return _of_all_points(space, census, progress)
-    random_seed = seed_for(seed, map_.subject, exact_eps, prime)
+    random_seed = derive_seed(seed, map_.subject, exact_eps, prime)
     return _of_samples(space, census, samples or DEFAULT_SAMPLES, steps, random_seed, progress)
 
 
@@ -183,7 +183,7 @@ def _of_samples(
 class _ProjectiveMap:
     """A map at one eps on P^n over GF(p); points are columns of n + 1 residues, the last that is not 0 being 1."""
 
-    def __init__(self, map_: BirationalMap, eps: fmpq, prime: int) -> None:
+    def __init__(self, map_: MapFamily, eps: fmpq, prime: int) -> None:
         if not 2 < prime < MAX_PRIME or map_.dim > MAX_DIMENSION:  # modulo 2 every Kahan map is the identity
             expected = f"an odd prime below {MAX_PRIME} and a dimension of at most {MAX_DIMENSION}"
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")

@@ -21,7 +21,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, QQ, Field, rational
 from kahanmaps.algebra.functions import DEFAULT_BUDGET
@@ -39,9 +39,9 @@ from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget, count
+from kahanmaps.checks.certify import MAX_DIMENSION, try_expand
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides, decide
-from kahanmaps.checks.judge import MAX_DIMENSION, settle
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
@@ -58,8 +58,8 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
-from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.maps.implicit import ImplicitMap, MapFamily
+from kahanmaps.maps.kahan import KahanFamily, as_map
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -126,12 +126,12 @@ class Laboratory:
             self.symbols = self.map.symbols
         else:
             self.map = map_with_symbols(file, self.symbols)
-        if flow and isinstance(self.map, Kahan) and self.map.system.symbols == ("eps",):
+        if flow and isinstance(self.map, KahanFamily) and self.map.system.symbols == ("eps",):
             rhs = tuple(substitute(polynomial, {"eps": fmpq(0)}) for polynomial in self.map.system.rhs)
             self.file = SystemFile.from_system(QuadraticSystem(rhs), file.name)
             self.map = self.file.map
         self.system = None
-        if isinstance(self.map, Kahan) and "eps" not in self.map.system.symbols:
+        if isinstance(self.map, KahanFamily) and "eps" not in self.map.system.symbols:
             self.system = self.map.system
         self.field: PolynomialField | None = self.system
         if flow and isinstance(self.map, ImplicitMap) and self.map.of_field is not None:
@@ -145,7 +145,7 @@ class Laboratory:
             what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
             raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
         subject = self.map.subject if self.root is None else file.map.subject
-        self.seed = seed_for(seed, self.symbols, subject, self.eps)  # of all that is drawn for this map
+        self.seed = derive_seed(seed, self.symbols, subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
         self.primes = tuple(map_.prime for map_ in self.maps)
         self.asked = file, self.free_symbols, self.eps, seed, self.primes  # with which all results of searches begin
@@ -469,7 +469,7 @@ def is_kept_by_flow(
 
 
 def verdict_on(
-    given: QuadraticSystem | BirationalMap,
+    given: QuadraticSystem | MapFamily,
     function: RationalFunction,
     eps: fmpq | None,
     seed: int = 0,
@@ -545,13 +545,13 @@ def verdict_on(
     identity = Identity(
         n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=subject
     )
-    return judged(identity, seed, expands=expands and n <= MAX_DIMENSION)
+    return certified(identity, seed, expands=expands and n <= MAX_DIMENSION)
 
 
-def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Certainty, Evidence]:
+def certified(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Certainty, Evidence]:
     """The verdict on an identity, by random points and, if `expands`, by expansion."""
     decision = decide(identity, seed)
-    found = settle(identity, decision, seed, _BUDGET) if expands else decision
+    found = try_expand(identity, decision, seed, _BUDGET) if expands else decision
     return found.verdict, found.evidence
 
 

@@ -17,8 +17,8 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, 
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
 from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import KahanMapOver, as_map
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanMap, as_map
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -41,7 +41,7 @@ class ModularMap:
 
     def __init__(
         self,
-        system: QuadraticSystem | BirationalMap,
+        system: QuadraticSystem | MapFamily,
         prime: int,
         eps: int,
         values: Sequence[int] = (),
@@ -56,7 +56,7 @@ class ModularMap:
         if eps % prime == 0:
             raise BadPrime(f"found eps = 0 modulo {prime}: take another prime", prime)
         self.map = as_map(system).at(field.convert(eps), field, [field.convert(value) for value in values])
-        count(20 if isinstance(self.map, KahanMapOver) else 200)
+        count(20 if isinstance(self.map, KahanMap) else 200)
 
     def random_point(self) -> Point:
         """A random point modulo the prime."""
@@ -65,7 +65,7 @@ class ModularMap:
     def step(self, x: Point) -> Point | None:
         """The image of a point, None where the map has no value."""
         # Values of polynomials count themselves.
-        count(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMapOver) else 10)
+        count(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMap) else 10)
         try:
             return tuple(int(entry) for entry in self.map.step(x))
         except SingularStep:

@@ -22,8 +22,8 @@ from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.convention import eps_share
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.sources import SOURCES
 from kahanmaps.version import __version__
 
@@ -46,7 +46,7 @@ class Formulas:
         if isinstance(file.map, AlgebraicMap):
             if symbols:
                 raise InputError(f"found symbols beside a {file.map.root}, expected none: it is one")
-            self.map: BirationalMap = file.map.given
+            self.map: MapFamily = file.map.given
         else:
             self.map = map_with_symbols(file, symbols)
         map_ = self.map
@@ -56,8 +56,8 @@ class Formulas:
         while any(variable + ending in self.names for variable in self.variables):
             ending += "_"
         self.new = tuple(variable + ending for variable in self.variables)
-        has_field = isinstance(map_, Kahan) and "eps" not in map_.system.symbols
-        self.rhs: tuple[fmpq_mpoly, ...] = map_.system.rhs if has_field and isinstance(map_, Kahan) else ()
+        has_field = isinstance(map_, KahanFamily) and "eps" not in map_.system.symbols
+        self.rhs: tuple[fmpq_mpoly, ...] = map_.system.rhs if has_field and isinstance(map_, KahanFamily) else ()
         self.jacobian = [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
         self.integrals: Mapping[str, RationalFunction] = file.integrals
         self.density, self.H = file.density, None if file.hamiltonian is None else file.hamiltonian.H

@@ -8,27 +8,27 @@ from typing import Any
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import InputError
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import Map, MapFamily
 
 
-class AlgebraicMap(BirationalMap):
+class AlgebraicMap(MapFamily):
     """The map `given`, whose only symbol, if any, has the value `root`; over Q it is one over the number field Q[t]/g.
 
     `at_number` gives the map with a rational number for the symbol: for floats, where the root is rounded first.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> from kahanmaps.algebra.parsing import parse_polynomial
-    >>> from kahanmaps.maps.kahan import Kahan
+    >>> from kahanmaps.maps.kahan import KahanFamily
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> riccati = QuadraticSystem((parse_polynomial("a*x^2", ["x", "a"]),), ("a",))
-    >>> map_ = AlgebraicMap(Kahan(riccati), parse_root("root of t^2 - 2"), lambda a: Kahan(riccati.at([a])))
+    >>> map_ = AlgebraicMap(KahanFamily(riccati), parse_root("root of t^2 - 2"), lambda a: KahanFamily(riccati.at([a])))
     >>> map_.at("1/2").step([1])
     (-t - 1,)
     """
 
     root: Root
 
-    def __init__(self, given: BirationalMap, root: Root, at_number: Callable[[Any], BirationalMap]) -> None:
+    def __init__(self, given: MapFamily, root: Root, at_number: Callable[[Any], MapFamily]) -> None:
         self.given, self.root = given, root
         self.variables, self.title, self.time_steps = given.variables, given.title, given.time_steps
         self.denominator_name = given.denominator_name
@@ -48,15 +48,15 @@ class AlgebraicMap(BirationalMap):
         return self.given.digits
 
     @property
-    def rounded(self) -> BirationalMap:
+    def real_approximation(self) -> MapFamily:
         """The map with a rational number next to the root. Raises InputError where the root is not real."""
-        return self._at_number(self.root.rounded())
+        return self._at_number(self.root.real_approximation())
 
     @property
     def rows(self) -> Any:  # type: ignore[override]  # nobody writes it
-        raise InputError(self.refusal)
+        raise InputError(self.unsupported_reason)
 
-    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> MapOver:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
         """The map over a field in which the polynomial of the root has a root. Raises BadPrime where it has none."""
         over = self.root.number_field if over is QQ else over
         if self._last is None or self._last[0] is not over:
@@ -78,7 +78,7 @@ class AlgebraicMap(BirationalMap):
         return f"AlgebraicMap({self.given!r}, {self._name} = {self.root})"
 
 
-def over_number_field(map_: BirationalMap, root: Root) -> BirationalMap:
+def over_number_field(map_: MapFamily, root: Root) -> MapFamily:
     """The map with points over Q[t]/g, t the root. Raises InputError where it has another one in its coefficients."""
     if map_.root is None:
         return AlgebraicMap(map_, root, lambda _: map_)

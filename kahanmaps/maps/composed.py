@@ -14,13 +14,13 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, MapOver, nonzero_eps
+from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
 
 _BUDGET = 20_000_000  # products of terms
@@ -31,7 +31,7 @@ _TRIES = 20
 class MapFactor:
     """A map of a composition, or its inverse; `values` are those of its symbols, functions of the composition's."""
 
-    map: BirationalMap
+    map: MapFamily
     is_inverse: bool
     values: tuple[RationalFunction, ...] = ()
 
@@ -45,7 +45,7 @@ class MapFactor:
         """The same without its direction."""
         return (self.map.subject, self.values)
 
-    def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> MapOver:
+    def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
         """The map over a field. Raises BadPrime, and InputError where a value of a symbol is a pole."""
         values = [function.value(over, symbols) for function in self.values]
         if any(value is None for value in values):
@@ -56,14 +56,14 @@ class MapFactor:
         return found.inverse if self.is_inverse else found
 
 
-class ComposedMap(BirationalMap):
+class ComposedMap(MapFamily):
     """The map that takes one step of each part after the other; `composed_map` makes it."""
 
     title = "composition"
 
     def __init__(self, variables: tuple[str, ...], parts: Sequence[MapFactor], symbols: tuple[str, ...]) -> None:
         self.variables, self.parts, self._symbols = variables, tuple(parts), symbols
-        self._last: tuple[Field, Any, MapOver] | None = None
+        self._last: tuple[Field, Any, Map] | None = None
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -99,12 +99,12 @@ class ComposedMap(BirationalMap):
     def digits(self) -> int:
         return sum(part.map.digits for part in self.parts)
 
-    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> MapOver:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where a part has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         if self._last is None or values or self._last[0] is not over or self._last[1] is not element:
             parts = [part.at(element, over, values) for part in self.parts]
-            self._last = (over, None if values else element, MapOver(parts, element, self.variables))
+            self._last = (over, None if values else element, Map(parts, element, self.variables))
         return self._last[2]
 
     @cached_property
@@ -173,7 +173,7 @@ class ComposedMap(BirationalMap):
 
 
 def composed_map(
-    *maps: tuple[BirationalMap, int] | BirationalMap,
+    *maps: tuple[MapFamily, int] | MapFamily,
     variables: Sequence[str] | None = None,
     symbols: Sequence[str] | None = None,
     values: Sequence[Mapping[str, RationalFunction]] = (),
@@ -193,9 +193,9 @@ def composed_map(
         InputError: for maps of different dimensions, or with the same variables in another order, and for a negative
             power of a map without inverse.
 
-    >>> from kahanmaps.maps.kahan import Kahan
+    >>> from kahanmaps.maps.kahan import KahanFamily
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
-    >>> f, g = (Kahan(QuadraticSystem.from_text(["x"], [rhs])) for rhs in ("x^2", "x"))
+    >>> f, g = (KahanFamily(QuadraticSystem.from_text(["x"], [rhs])) for rhs in ("x^2", "x"))
     >>> conjugate = composed_map(g, f, (g, -1)).at("1/2")
     >>> conjugate.step(["1/9"]), g.at("1/2").inverse.step(f.at("1/2").step(g.at("1/2").step(["1/9"])))
     ((1/6,), (1/6,))
@@ -244,9 +244,9 @@ def _reversed(parts: Sequence[MapFactor]) -> list[MapFactor]:
     return [MapFactor(part.map, not part.is_inverse, part.values) for part in reversed(parts)]
 
 
-def is_involution(map_: BirationalMap) -> bool:
+def is_involution(map_: MapFamily) -> bool:
     """Whether Phi(Phi(x)) = x, at random points modulo primes: one of them fails by chance with probability < 2^-40."""
-    rng, tried = random.Random(f"involution {seed_for(0, *map_.subject)}"), 0
+    rng, tried = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)
         x = tuple(field.random(rng) for _ in map_.variables)

@@ -14,7 +14,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.errors import InputError
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
 NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
@@ -30,18 +30,18 @@ def resolve_eps(eps: Any, time_step: Any) -> Any:
     return rational(time_step) / 2
 
 
-def _time_steps(maps: tuple[BirationalMap, ...]) -> list[int]:
+def _time_steps(maps: tuple[MapFamily, ...]) -> list[int]:
     """The different ones of the maps of which a record speaks together, as far as they have any."""
     return sorted({map_.time_steps for map_ in maps if map_.has_eps} - {0}) if maps else [1]
 
 
-def time_step(eps: Any, *maps: BirationalMap) -> Any:
+def time_step(eps: Any, *maps: MapFamily) -> Any:
     """The time step at eps, a number or an element of a field; None where the maps have none, or not the same."""
     steps = _time_steps(maps)
     return 2 * steps[0] * eps if len(steps) == 1 else None
 
 
-def convention(*maps: BirationalMap) -> str:
+def convention(*maps: MapFamily) -> str:
     """The sentence that every record carries, for the maps of which it speaks together."""
     if maps and not any(map_.has_eps for map_ in maps):
         return NO_EPS
@@ -51,14 +51,14 @@ def convention(*maps: BirationalMap) -> str:
     return f"eps is the paper's epsilon, the time step is {steps[0]}" if steps else NO_TIME_STEP
 
 
-def eps_share(map_: BirationalMap) -> str:
+def eps_share(map_: MapFamily) -> str:
     """The same of one map, the other way round: "eps is half the time step"; empty where it has none."""
     if not map_.time_steps:
         return ""
     return f"eps is {'half' if map_.time_steps == 1 else f'{fmpq(1, 2 * map_.time_steps)} of'} the time step"
 
 
-def eps_record(eps: fmpq | None, *maps: BirationalMap) -> dict[str, str | None]:
+def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
     """What every record says of eps, None standing for every one: its value, the time step, and what eps is.
 
     The value is None where the maps do not depend on eps.
@@ -82,7 +82,7 @@ def eps_words(context: Mapping[str, Any]) -> str:
     return f", eps = {context['eps']}{'' if step is None else f' (time step {multiple} = {step})'}"
 
 
-def eps_told(eps: fmpq | None, *maps: BirationalMap) -> str:
+def eps_told(eps: fmpq | None, *maps: MapFamily) -> str:
     """The words for an eps and maps.
 
     >>> eps_told(fmpq(1, 10)), eps_told(None)

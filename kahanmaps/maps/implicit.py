@@ -4,9 +4,9 @@ M is a matrix and r a vector of polynomials. Kahan's choice is M = I - eps f', r
 by rational functions has for M the diagonal of their denominators; discretizations that are linear in the new point
 have it as they stand. Three values say it all, and everything else asks them:
 
-* `BirationalMap` is the map over Q, eps and all. A new discretization is a function that returns an `ImplicitMap`.
-* `MapOver` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is made of factors, most
-  maps of one: a `StepOver`, that has an equation.
+* `MapFamily` is the map over Q, eps and all. A new discretization is a function that returns an `ImplicitMap`.
+* `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is made of factors, most
+  maps of one: a `ElementaryMap`, that has an equation.
 * `Equation` has the coefficients of M and r over that field (equation.py). The evaluators go from factor to factor and
   start from their equations; the generic one, over any field, is here.
 
@@ -27,7 +27,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
-from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import QQ, Field, integer, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring
@@ -42,7 +42,7 @@ from kahanmaps.maps.orbits.integer_steps import IntegerSteps
 from kahanmaps.systems.polynomial import PolynomialField
 
 
-class MapOver:
+class Map:
     """Birational maps over a field, one after the other; `eps` is that of all, or None where they differ."""
 
     field: Field
@@ -50,19 +50,19 @@ class MapOver:
     dim: int
     variables: tuple[str, ...] = ()
 
-    def __init__(self, parts: Sequence[MapOver], eps: Any, variables: tuple[str, ...]) -> None:
+    def __init__(self, parts: Sequence[Map], eps: Any, variables: tuple[str, ...]) -> None:
         self.parts, self.eps, self.variables = tuple(parts), eps, variables
         self.field, self.dim = parts[0].field, parts[0].dim
 
     @cached_property
-    def factors(self) -> tuple[StepOver, ...]:
+    def factors(self) -> tuple[ElementaryMap, ...]:
         """The maps with an equation of which this one takes a step of each, the first one first: evaluators do so."""
         return tuple(one for part in self.parts for one in part.factors)
 
     @cached_property
-    def inverse(self) -> MapOver:
+    def inverse(self) -> Map:
         """The inverse map. Raises InputError where it is not known."""
-        return MapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
+        return Map([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
 
     @cached_property
     def flow(self) -> tuple[Any, Any] | None:
@@ -77,7 +77,7 @@ class MapOver:
     def __repr__(self) -> str:
         eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
         step = "" if self.flow is None else f", time step {self.field.format(self.flow[1])}"
-        return f"MapOver({', '.join(self.variables)}; {eps}{step}, over {self.field})"
+        return f"Map({', '.join(self.variables)}; {eps}{step}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
         """What it is, as plain data for records: eps is None where it differs, the time step where there is no flow."""
@@ -115,29 +115,29 @@ class MapOver:
             return self
         return self.step(point[0] if len(point) == 1 and hasattr(point[0], "__len__") else point)
 
-    def __matmul__(self, other: MapOver) -> MapOver:
+    def __matmul__(self, other: Map) -> Map:
         """A step of `other` and then one of this, as one map. Raises InputError for another dimension or field."""
-        if not isinstance(other, MapOver):
+        if not isinstance(other, Map):
             return NotImplemented
         if (self.field, self.dim) != (other.field, other.dim):
             raise InputError(f"found maps {self!r} and {other!r}, expected one field and one dimension")
         eps = self.eps if self.eps == other.eps else None
-        return MapOver([other, self], eps, self.variables)
+        return Map([other, self], eps, self.variables)
 
-    def __pow__(self, power: int) -> MapOver:
+    def __pow__(self, power: int) -> Map:
         """So many steps as one map, of the inverse for a negative number, the identity for 0."""
         power = integer(power, "the power")
         if power:
-            return MapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
+            return Map([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
         n, one = self.dim, self.field.one
         units = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
         rows = [[((n, one),) if j == i else () for j in range(n)] + [((i, -one),)] for i in range(n)]  # 1 x~ - x
         flow = self.flow and (self.flow[0], self.field.zero)
-        return StepOver(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, None, self.variables, flow)
+        return ElementaryMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, None, self.variables, flow)
 
     def __eq__(self, other: object) -> bool:
         """Whether the equations of the steps are the same, one after the other."""
-        if not isinstance(other, MapOver):
+        if not isinstance(other, Map):
             return NotImplemented
         if (self.field, self.dim, self.variables) != (other.field, other.dim, other.variables):
             return False
@@ -184,7 +184,7 @@ class MapOver:
         """The preimage of a point. Raises SingularStep where the inverse map has no value there."""
         return self.inverse.step(point)
 
-    def stages(self, point: Sequence[Any]) -> Iterator[tuple[StepOver, tuple[Any, ...]]]:
+    def stages(self, point: Sequence[Any]) -> Iterator[tuple[ElementaryMap, tuple[Any, ...]]]:
         """Every factor with the point that it is applied to. Raises SingularStep."""
         x = self.point(point)
         for k, one in enumerate(self.factors):
@@ -215,7 +215,7 @@ class MapOver:
         )
 
 
-class StepOver(MapOver):
+class ElementaryMap(Map):
     """The map of an equation M(x) x~ = r(x) over a field; `backward` gives the equation of its inverse when asked for.
 
     Without it the equation is to be of degree 1, so that exchanging the two points gives the inverse. A map that knows
@@ -234,7 +234,7 @@ class StepOver(MapOver):
         self._equation, self._backward, self._flow = equation, backward, flow
 
     @property
-    def factors(self) -> tuple[StepOver, ...]:
+    def factors(self) -> tuple[ElementaryMap, ...]:
         """The map itself."""
         return (self,)
 
@@ -249,10 +249,10 @@ class StepOver(MapOver):
         return self._equation
 
     @cached_property
-    def inverse(self) -> StepOver:
+    def inverse(self) -> ElementaryMap:
         """The inverse map. Raises InputError where it is not known."""
         backward = self._equation.transposed() if self._backward is None else self._backward()
-        return StepOver(backward, self.eps, lambda: self._equation, self.variables)
+        return ElementaryMap(backward, self.eps, lambda: self._equation, self.variables)
 
     def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
         """M(x), and r(x) as a column."""
@@ -319,7 +319,7 @@ def det_of(name: str) -> str:
     return f"det({name})" if " " in name else f"det {name}"
 
 
-class BirationalMap(DisplayedAsFormula, ABC):
+class MapFamily(DisplayedAsFormula, ABC):
     """A birational map over Q in named variables, which may depend on eps and on symbols: numbers without a value."""
 
     variables: tuple[str, ...]
@@ -354,12 +354,12 @@ class BirationalMap(DisplayedAsFormula, ABC):
         return None
 
     @property
-    def rounded(self) -> BirationalMap:
+    def real_approximation(self) -> MapFamily:
         """The map with rational coefficients from which floats start. Raises InputError where it is not real."""
         return self
 
     @property
-    def refusal(self) -> str:
+    def unsupported_reason(self) -> str:
         """Empty, or why what needs rational coefficients is not to be had."""
         if self.root is None:
             return ""
@@ -377,7 +377,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """All that determines the map, as `seed_for` takes it."""
+        """All that determines the map, as `derive_seed` takes it."""
 
     @property
     @abstractmethod
@@ -385,7 +385,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
         """About how many decimal digits the longest coefficient has, over one denominator."""
 
     @abstractmethod
-    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> MapOver:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
         """The map over a field, at eps: an exact number, or an element of the field, not zero.
 
         `values` are those of the symbols, elements of the field.
@@ -409,7 +409,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class ImplicitMap(BirationalMap):
+class ImplicitMap(MapFamily):
     """The map of M(x, eps) x~ = r(x, eps): `rows` are those of (M | -r).
 
     Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows
@@ -429,7 +429,7 @@ class ImplicitMap(BirationalMap):
     time_steps: int = 0
     backward: Rows | None = None
     of_field: PolynomialField | None = None
-    _last: list[tuple[Field, Any, StepOver]] = field(default_factory=list, init=False, repr=False)
+    _last: list[tuple[Field, Any, ElementaryMap]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         n, names = len(self.variables), self.names
@@ -495,7 +495,7 @@ class ImplicitMap(BirationalMap):
     def digits(self) -> int:
         return digits_of(entry for row in self.rows for entry in row)
 
-    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> StepOver:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         for known, at, found in self._last:
@@ -505,7 +505,7 @@ class ImplicitMap(BirationalMap):
         equation = equation_of(self.rows, over, point)
         is_needed = self.backward is not None or equation.degree > 1
         backward = (lambda: equation_of(self.inverse_rows, over, point)) if is_needed else None
-        found = StepOver(equation, element, backward, self.variables)
+        found = ElementaryMap(equation, element, backward, self.variables)
         self._last[:] = [] if values else [(over, element, found)]  # a map with symbols is not kept
         return found
 
@@ -533,7 +533,7 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     probability below 2^-40 for equations of any size that can be read, and these are three points. With a `root` the
     only symbol stands for it, and primes are those that have one.
     """
-    rng = random.Random(f"map {seed_for(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
+    rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
     tried = 0
     while tried < 3:
         over = random_prime_field(rng)

@@ -16,7 +16,7 @@ from typing import Any
 
 from flint import Ordering, fmpq_mpoly, fmpz_mod_mpoly_ctx
 
-from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.matrices import solve
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
@@ -112,7 +112,7 @@ def why_not_birational(rows: Rows) -> str:
 def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, list[Any]]:
     """A point (x, x~) of the graph modulo a random prime (of so many bits), followed by values of symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
-    rng = random.Random(f"graph {seed_for(seed, *(entry for row in rows for entry in row))}")
+    rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
     while True:
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
         given = [field.random(rng) for _ in names]

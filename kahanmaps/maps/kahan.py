@@ -28,7 +28,7 @@ from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import BirationalMap, StepOver, nonzero_eps
+from kahanmaps.maps.implicit import ElementaryMap, MapFamily, nonzero_eps
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
@@ -40,16 +40,16 @@ class HasMap(Protocol):
     """A system file."""
 
     @property
-    def map(self) -> BirationalMap: ...
+    def map(self) -> MapFamily: ...
 
 
 # What `as_map` takes.
 SystemLike: TypeAlias = (
-    "str | Path | HasMap | QuadraticSystem | BirationalMap | CubicHamiltonian | FamilyMember | AssociatedSystem"
+    "str | Path | HasMap | QuadraticSystem | MapFamily | CubicHamiltonian | FamilyMember | AssociatedSystem"
 )
 
 
-class KahanMap(DisplayedAsFormula, StepOver):
+class KahanMap(DisplayedAsFormula, ElementaryMap):
     """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
@@ -157,13 +157,13 @@ class KahanMap(DisplayedAsFormula, StepOver):
         return KahanMap, (self._given[0], self.eps, *self._given[1:])
 
 
-KahanMapOver = KahanMap  # its name in laboratory/
+KahanMap = KahanMap  # its name in laboratory/
 
 
-class Kahan(BirationalMap):
+class KahanFamily(MapFamily):
     """The Kahan map of a quadratic system; if eps is among its symbols, the map is an adjusted Kahan map.
 
-    >>> Kahan(QuadraticSystem.from_text(["x"], ["x^2"])).at("1/2").step(["1/5"])
+    >>> KahanFamily(QuadraticSystem.from_text(["x"], ["x^2"])).at("1/2").step(["1/5"])
     (1/4,)
     """
 
@@ -217,16 +217,16 @@ class Kahan(BirationalMap):
         return f"Kahan({', '.join(self.variables)})"
 
 
-def as_map(value: SystemLike) -> BirationalMap:
+def as_map(value: SystemLike) -> MapFamily:
     """Return the map that a value stands for; a system, however it is given, stands for its Kahan map.
 
     A map, a system, a system file, a member of the family, a catalogue name, a path, or equations as text. Raises
     InputError for anything else.
     """
     if isinstance(value, QuadraticSystem):
-        return Kahan(value)
-    if isinstance(value, BirationalMap):
+        return KahanFamily(value)
+    if isinstance(value, MapFamily):
         return value
     # Names and paths are read on a floor above, which is loaded only where one of them is given.
-    found: BirationalMap = import_module("kahanmaps.documents.inline").as_file(value).map
+    found: MapFamily = import_module("kahanmaps.documents.inline").as_file(value).map
     return found

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.inverse import TooLarge
 
 _MOST_TERMS = 3_000  # of a form of several factors, before a common one is divided out
@@ -36,7 +36,7 @@ class HomogeneousMap(NamedTuple):
         return max((int(form.total_degree()) for form in self.forms if not form.is_zero()), default=0)
 
 
-def homogeneous_map(map_over: MapOver) -> HomogeneousMap:
+def homogeneous_map(map_over: Map) -> HomogeneousMap:
     """The forms of a map over QQ or GF(p) with p < 2^63; exact. Their variables are named x1, ..., xn, z.
 
     Raises TooLarge where those of several factors have too many terms, put into each other.

@@ -13,7 +13,7 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.integers import divide_exactly, taken_apart
+from kahanmaps.algebra.integers import divide_exactly, split_by_primes
 
 _DIRECT = 8  # up to here quotients of s(n) are found from s(n) itself, then from those at n/2
 
@@ -60,9 +60,9 @@ class Integers:
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
         """Integer and scale of a value, not zero, that is integral but for the primes. Raises ArithmeticError."""
-        if taken_apart(value.q, self.power)[0] != 1:
+        if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
-        integer, part = taken_apart(value.p, self.power)
+        integer, part = split_by_primes(value.p, self.power)
         return integer, fmpq(part, value.q)
 
     def divisor(self, value: fmpz) -> fmpz:
@@ -75,7 +75,7 @@ class Integers:
         total = s.p * (below // s.q) * left - t.p * (below // t.q) * right
         if divisor is not None:
             total = divide_exactly([total], divisor)[0]
-        value, part = taken_apart(total, self.power)
+        value, part = split_by_primes(total, self.power)
         return value, fmpq(part, below)
 
 

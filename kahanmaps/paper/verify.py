@@ -29,13 +29,13 @@ from typing import Any, cast
 from flint import fmpq_poly
 
 from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
-from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import CC, QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.printing import format_number
+from kahanmaps.checks.certify import Contradiction
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.checks.decide import Decision, Trial, decide
-from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost, counted
@@ -45,7 +45,7 @@ from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
 from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.maps.kahan import SystemLike
-from kahanmaps.paper import objects_over
+from kahanmaps.paper import specialize
 from kahanmaps.paper.controls import CONTROLS, broken
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import (
@@ -191,8 +191,8 @@ class Verifier:
 
     def __init__(self, member: FamilyMember | None, m: int, settings: Settings, options: VerifyOptions) -> None:
         self.member, self.m, self.settings, self.options = member, m, settings, options
-        self.roots = None if member is None else objects_over.rational_roots(member)
-        self._seed = settings.seed if member is None else seed_for(settings.seed, member.A, member.H, settings.eps)
+        self.roots = None if member is None else specialize.rational_roots(member)
+        self._seed = settings.seed if member is None else derive_seed(settings.seed, member.A, member.H, settings.eps)
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
@@ -234,7 +234,7 @@ class Verifier:
             member, order = self.member, self.options.order
             if member is None:
                 rng = random.Random(f"universal {self._seed} {number}")
-                self._points[key] = objects_over.random_objects(self.m, random_prime_field(rng), rng, order)
+                self._points[key] = specialize.random_objects(self.m, random_prime_field(rng), rng, order)
                 return self._points[key]
             rng = random.Random(f"verify {self._seed} {needs_split} {number}")
             if needs_split and not member.is_generic:
@@ -245,14 +245,14 @@ class Verifier:
                     if needs_split:
                         self.settings.progress("looking for a prime at which chi splits")
                         # One prime in m! splits at worst, so that this fails with probability e^-40.
-                        found = objects_over.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
+                        found = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
                         if found is None:
                             return None
                         K, in_K = found
                     else:
                         K = random_prime_field(rng)
                         in_K = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
-                    self._points[key] = objects_over.point_over(member, K, in_K, self.settings.eps, rng, order)
+                    self._points[key] = specialize.point_over(member, K, in_K, self.settings.eps, rng, order)
         return self._points[key]
 
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
@@ -260,13 +260,13 @@ class Verifier:
         if self.member is None or (roots and self.roots is None):
             return None
         rng = random.Random(f"exact {self._seed} {number}")
-        return objects_over.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
+        return specialize.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
         """The objects as bounds."""
         if self.member is None:
-            return objects_over.universal_bound_objects(self.m, self.options.order)
-        return objects_over.bound_objects(self.member, self.settings.eps, self.options.order)
+            return specialize.universal_bound_objects(self.m, self.options.order)
+        return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
 
     def conjugates(self, roots: bool) -> int:
         """A bound for the degree of the field that the coefficients lie in."""
@@ -405,7 +405,7 @@ class Verifier:
             return None
         if "roots" in needs and self.roots is None:
             return None
-        functions = objects_over.member_functions(self.member, vectors, self.settings.eps, PROOF_BUDGET, order)
+        functions = specialize.member_functions(self.member, vectors, self.settings.eps, PROOF_BUDGET, order)
         try:
             outcome = evaluate(claim, functions)
         except (BudgetExceeded, *UNDEFINED):
@@ -422,7 +422,7 @@ class Verifier:
             return
         rng = random.Random(f"also {self._seed} {claim.key}")
         if claim.blockwise and claim.symplectic:
-            objects = objects_over.etale_objects(self.member, rng, self.settings.eps, self.options.order)
+            objects = specialize.etale_objects(self.member, rng, self.settings.eps, self.options.order)
             chi = format_univariate(chi_of(self.member.A))
             text = f"held at an exact random point of the normal form over Q[t]/({chi})"
             try:
@@ -433,7 +433,7 @@ class Verifier:
                 pass
         if self.options.ball_bits is not None:
             bits = self.options.ball_bits
-            objects = objects_over.ball_objects(self.member, bits, rng, self.settings.eps, self.options.order)
+            objects = specialize.ball_objects(self.member, bits, rng, self.settings.eps, self.options.order)
             widest, pairs = -math.inf, 0
             try:
                 with objects.K.working():
@@ -462,7 +462,7 @@ class Verifier:
             found.append(NOTE_ON_PROOFS)
         if self.options.ball_bits is not None and self.member.is_generic:
             with CC(self.options.ball_bits).working():
-                roots = objects_over.complex_roots(self.member, self.options.ball_bits)
+                roots = specialize.complex_roots(self.member, self.options.ball_bits)
                 enclosures = [str(root.str(20)) for root in roots]
             found.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
         return found
@@ -536,7 +536,7 @@ class ClaimAtPoints:
 
     name = "claim"
     no_value = "a denominator seems to vanish identically"
-    patience = _MAX_UNDEFINED
+    max_failures = _MAX_UNDEFINED
 
     def __init__(self, verifier: Verifier, claim: Claim) -> None:
         self._verifier, self._claim = verifier, claim
@@ -592,12 +592,12 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
     Raises Contradiction where the two sides are different rational functions.
     """
     claim = next(found for found in claims() if found.key == key)
-    bounds = objects_over.universal_bound_objects(blocks, order)
+    bounds = specialize.universal_bound_objects(blocks, order)
     for _ in claim.function(bounds):  # which notes the letters that are used
         pass
     vectors = sorted(bounds.used - {"roots"})
     try:
-        objects = objects_over.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
+        objects = specialize.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
         outcome = evaluate(claim, objects)
     except (BudgetExceeded, *UNDEFINED):
         return None

@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
 from kahanmaps.algebra.printing import format_number
+from kahanmaps.atomic_files import write_atomically
 from kahanmaps.display.latex import latex_name
 from kahanmaps.errors import InputError
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, Style
 from kahanmaps.version import __version__
-from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -265,7 +265,7 @@ def picture_bytes(figure: Figure, kind: str, style: Style, command: str = "", sy
 
 def write_picture(figure: Figure, path: str, kind: str, style: Style) -> None:
     """Write the figure to a file, whole or not at all."""
-    write_whole(Path(path), picture_bytes(figure, kind, style))
+    write_atomically(Path(path), picture_bytes(figure, kind, style))
 
 
 def svg_text(figure: Figure, name: str, style: Style, alt: str) -> str:

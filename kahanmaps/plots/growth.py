@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.errors import InputError, printable
 from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.growth.degree_bounds import DynamicalDegreeBounds
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
-from kahanmaps.laboratory.growth.enclosure import Enclosure
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.plots.figures import (
@@ -45,7 +45,7 @@ _MARKS = 30  # of one orbit
 _ASPECT = 0.62  # of the axes
 
 
-def draw_degrees(
+def plot_degrees(
     growths: Mapping[str, DegreeGrowth], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
     """Degrees d_n of the iterates against n, for one or more systems by their names.
@@ -58,7 +58,7 @@ def draw_degrees(
 
     >>> from kahanmaps.laboratory.growth.degrees import degree_growth
     >>> from kahanmaps.documents.catalog import load
-    >>> figure = draw_degrees({"Euler top": degree_growth(load("euler_top").system)})
+    >>> figure = plot_degrees({"Euler top": degree_growth(load("euler_top").system)})
     >>> figure.legends[0].get_texts()[0].get_text()
     'Euler top: $d_n = 2n^{2} + 1$, $\\\\lambda = 1$'
     """
@@ -136,7 +136,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
     return f"{name}: {', '.join(parts) or str(growth.growth)}"
 
 
-def draw_heights(
+def plot_heights(
     survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
     """Heights of exact orbits against the step, with the growth that was fitted, a colour for each eps.
@@ -265,7 +265,9 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             patterns = Patterns(lengths, searched, told["some_confined"], str(told["running"]), series)
         if (told := record.get("enclosure")) is not None:
             names = ("steps", "degree_below", "degree_above", "prime", "eps_residue")
-            enclosure = Enclosure(str(told["lower"]), str(told["upper"]), *(int(told[name]) for name in names))
+            enclosure = DynamicalDegreeBounds(
+                str(told["lower"]), str(told["upper"]), *(int(told[name]) for name in names)
+            )
         growth = DegreeGrowth(
             degrees,
             None if record["eps"] == "generic" else parse_number(record["eps"]),

@@ -33,18 +33,18 @@ class Plot:
 
     def degrees(self, found: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
         """What `km.degrees` found; `scale` is "linear", "log" or "loglog"."""
-        from kahanmaps.plots.growth import draw_degrees
+        from kahanmaps.plots.growth import plot_degrees
 
         _require(found, DegreeGrowth, "a result: km.plot.degrees(km.degrees(...))")
-        axes: Axes = draw_degrees({label: found}, scale=scale).axes[0]
+        axes: Axes = plot_degrees({label: found}, scale=scale).axes[0]
         return axes
 
     def heights(self, found: HeightSurvey, *, scale: str | None = None) -> Axes:
         """What `km.heights` found."""
-        from kahanmaps.plots.growth import draw_heights
+        from kahanmaps.plots.growth import plot_heights
 
         _require(found, HeightSurvey, "a result: km.plot.heights(km.heights(...))")
-        axes: Axes = draw_heights(found, scale=scale).axes[0]
+        axes: Axes = plot_heights(found, scale=scale).axes[0]
         return axes
 
     def orbit(self, found: Trajectory, x: int = 0, y: int = 1) -> Axes:
@@ -55,7 +55,7 @@ class Plot:
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
         """As `km.portrait`."""
-        return draw_orbits(given, *others, **options)
+        return plot_orbits(given, *others, **options)
 
 
 def _require(found: Any, kind: type, expected: str) -> None:
@@ -63,7 +63,7 @@ def _require(found: Any, kind: type, expected: str) -> None:
         raise InputError(f"found a {type(found).__name__}, expected {expected}")
 
 
-def draw_orbits(
+def plot_orbits(
     system: SystemLike,
     starts: Any = None,
     eps: Any = None,
@@ -81,21 +81,21 @@ def draw_orbits(
         steps: of each orbit.
         axes: the numbers of the two coordinates.
     """
-    rounded = as_file(system).rounded
-    value = rounded.at(resolve_eps(eps, time_step)).eps
+    real_approximation = as_file(system).real_approximation
+    value = real_approximation.at(resolve_eps(eps, time_step)).eps
     if starts is None:
-        starts = automatic_starts(rounded.system, value, axes)
+        starts = automatic_starts(real_approximation.system, value, axes)
     x = start_rows(starts)
-    return _drawn(walked(ensemble_for(rounded.map, value, x, steps), steps), axes)
+    return _drawn(walked(ensemble_for(real_approximation.map, value, x, steps), steps), axes)
 
 
 def _drawn(found: Trajectories, axes: Sequence[int]) -> Axes:
-    from kahanmaps.plots.portraits.portrait import draw_portrait
+    from kahanmaps.plots.portraits.portrait import plot_portrait
 
     if not all(0 <= k < len(found.variables) for k in axes):
         raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(found.variables)}")
     shown = [point_function(found.variables[k], found.variables) for k in axes]
-    drawn: Axes = draw_portrait(portrait_of(found, shown), Style()).axes[0]
+    drawn: Axes = plot_portrait(portrait_of(found, shown), Style()).axes[0]
     return drawn
 
 

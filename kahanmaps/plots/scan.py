@@ -33,7 +33,7 @@ _INNER = 0.85  # of the width and height of the picture, the axes
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
-def draw_scan(
+def plot_scan(
     found: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
 ) -> Figure:
     """Curves and points of the plane of two parameters, a colour for each kind of growth, with their conditions.
@@ -44,7 +44,7 @@ def draw_scan(
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.scan.scan import scan
-    >>> figure = draw_scan(scan(load("lotka_volterra"), ["a", "c"], terms=2, primes=[5, 7, 11]))
+    >>> figure = plot_scan(scan(load("lotka_volterra"), ["a", "c"], terms=2, primes=[5, 7, 11]))
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['linear growth']
     """

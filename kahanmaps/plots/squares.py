@@ -19,10 +19,10 @@ from flint import arb, fmpq
 from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.family.recognise import recognised_hamiltonian, recognised_member
+from kahanmaps.family.recognition import find_cubic_hamiltonian, find_family_structure
 from kahanmaps.maps.floats.doubles import to_floats
-from kahanmaps.maps.implicit import BirationalMap, MapOver
-from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.maps.implicit import Map, MapFamily
+from kahanmaps.maps.kahan import KahanFamily, as_map
 from kahanmaps.plots.curves.plane_cubics import Floats
 from kahanmaps.plots.figures import beside, drawing, label_of, new_figure, plain, wrapped
 from kahanmaps.plots.portraits.windows import outside, window_of
@@ -48,8 +48,8 @@ class MapPair:
     `names` are short texts, `note` says how variables are matched, where that needs a word.
     """
 
-    f: QuadraticSystem | BirationalMap
-    g: QuadraticSystem | BirationalMap
+    f: QuadraticSystem | MapFamily
+    g: QuadraticSystem | MapFamily
     names: tuple[str, str]
     note: str = ""
 
@@ -119,7 +119,7 @@ def squares(
     x = phi_f.point(start)
     missing: list[str] = []
 
-    def orbit(phi: MapOver, first: Point | None, name: str) -> list[Point | None]:
+    def orbit(phi: Map, first: Point | None, name: str) -> list[Point | None]:
         found = [first]
         for k in range(steps):
             progress(f"{name}, step {k + 1} of {steps}")
@@ -150,8 +150,8 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
     """
     member = file.member
     if member is None:
-        hamiltonian = file.hamiltonian or recognised_hamiltonian(file.system)
-        recognised = None if hamiltonian is None else recognised_member(hamiltonian)
+        hamiltonian = file.hamiltonian or find_cubic_hamiltonian(file.system)
+        recognised = None if hamiltonian is None else find_family_structure(hamiltonian)
         if recognised is None or not recognised.is_standard:
             raise InputError(
                 f"{file.name} is of kind [{file.kind}], and one system commutes with itself: give a second system, "
@@ -171,10 +171,10 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
 
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> MapPair:
     """Two systems of one dimension; with `eps2` the second has this step: it is scaled by eps2/eps."""
-    g: QuadraticSystem | BirationalMap
+    g: QuadraticSystem | MapFamily
     g, note = matched(file, other)
     if eps2 is not None:
-        if not other.is_quadratic or not isinstance(g, Kahan):
+        if not other.is_quadratic or not isinstance(g, KahanFamily):
             raise InputError(f"found eps2 with {other.map.kind}, expected a quadratic vector field, which it scales")
         g = g.system
         if rational(eps2) == 0:
@@ -188,7 +188,7 @@ _LARGEST = 1e150  # what can be squared
 _SEEN = 0.06  # of the width of a panel: a gap below it is shown magnified
 
 
-def draw_squares(
+def plot_squares(
     found: Sequence[Squares],
     style: Style,
     axes: tuple[int, int] | None = None,

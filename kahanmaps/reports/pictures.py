@@ -15,12 +15,12 @@ from kahanmaps.display import markup
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.floats.ensemble import starts_in_box
-from kahanmaps.plots.curves.draw_invariant_curves import draw_invariant_curves
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
+from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 from kahanmaps.plots.figures import require_matplotlib, svg_text
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import automatic_starts, plane_flow
-from kahanmaps.plots.portraits.portrait import draw_portrait, portrait_of
+from kahanmaps.plots.portraits.portrait import plot_portrait, portrait_of
 from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 from kahanmaps.plots.style import Style
 
@@ -90,21 +90,21 @@ class Pictures:
         axes = file.variables[:2] if file.dim > 1 else ("step", file.variables[0])
 
         def drawing(style: Style) -> Figure:
-            rounded = file.rounded
-            if is_field := rounded.is_quadratic:
-                starts = automatic_starts(rounded.system, at)
+            real_approximation = file.real_approximation
+            if is_field := real_approximation.is_quadratic:
+                starts = automatic_starts(real_approximation.system, at)
             else:
                 starts = starts_in_box(_INITIAL_POINTS, file.dim, 2.0, 0)
-            orbits = walked(ensemble_for(rounded.map, at, starts, _STEPS), _STEPS)
+            orbits = walked(ensemble_for(real_approximation.map, at, starts, _STEPS), _STEPS)
             functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
             shown = portrait_of(orbits, functions)
             if is_field:
-                shown = replace(shown, flow=plane_flow(rounded.system, range(file.dim), shown.window))
+                shown = replace(shown, flow=plane_flow(real_approximation.system, range(file.dim), shown.window))
             for reason, count in orbits.ended.items():
                 remarks.append(f"{count} of {counted(orbits.orbits, 'orbit')} ended early: {reason}.")
             if shown.left_out:
                 remarks.append(f"{shown.left_out} of {orbits.points[..., 0].size} points lie outside the window.")
-            return draw_portrait(shown, style)
+            return plot_portrait(shown, style)
 
         where = " and ".join(axes)
         sentence = f"{eps_told(at, file.map)}, {_STEPS} steps in machine numbers".removeprefix(", ")
@@ -122,7 +122,7 @@ class Pictures:
             for k, pole in enumerate(curves.poles, 1):
                 if pole is not None:
                     remarks.append(f"Orbit {k} ends before step {pole}: a pole, or closer to one than 2^-96.")
-            return draw_invariant_curves(curves, style)
+            return plot_invariant_curves(curves, style)
 
         sentence = f"{eps_told(at)}, {_CURVE_STEPS} steps".removeprefix(", ")
         caption = f"{_CURVES} orbits in the planes of the normal form, and the invariant curves through them: "

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.printing import format_number, format_polynomial
+from kahanmaps.atomic_files import write_atomically
 from kahanmaps.checks.claims import Report, combined
 from kahanmaps.display import checks, markup
 from kahanmaps.display.laboratory import eps_sentence, result_html
@@ -20,12 +21,11 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.plots.growth import draw_degrees, draw_heights
+from kahanmaps.plots.growth import plot_degrees, plot_heights
 from kahanmaps.reports.explore import explore_sections
 from kahanmaps.reports.page import CHARACTERS, Html, Section, page, page_template, system_section, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.sources import source
-from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding
@@ -111,7 +111,7 @@ def report_html(
 
 def write_report(path: str | Path, found: Any, **options: Any) -> None:
     """Write the page of `report_html` to a file, whole or not at all; the options are those of `report_html`."""
-    write_whole(Path(path), report_html(found, **options).encode())
+    write_atomically(Path(path), report_html(found, **options).encode())
 
 
 def _title(file: SystemFile) -> str:
@@ -186,13 +186,13 @@ def _beside(found: Analysis, name: str, pictures: Pictures) -> tuple[list[Html],
         caption = "Degrees of the iterates"
         caption += " and the recurrence that they satisfy." if growth.recurrence is not None else "."
         label = found.file.label
-        drawn.append(pictures.draw("degrees", caption, alt, lambda style: draw_degrees({label: growth}, style)))
+        drawn.append(pictures.draw("degrees", caption, alt, lambda style: plot_degrees({label: growth}, style)))
         rows = [(str(n), str(d)) for n, d in enumerate(growth.degrees)]
         folded.append(("Degrees as a table", wide(markup.table(["n", "degree of the n-th iterate"], rows))))
     if name == "growth" and survey is not None and survey.orbits:
         alt = f"Heights of exact orbits in bits against the step: {survey.text}"
         caption = "Heights of exact orbits, and the growth that was fitted."
-        drawn.append(pictures.draw("heights", caption, alt, lambda style: draw_heights(survey, style)))
+        drawn.append(pictures.draw("heights", caption, alt, lambda style: plot_heights(survey, style)))
         folded.append(("Orbits whose heights were measured", wide(result_html(survey))))
     return [Html(figure) for figure in drawn if figure], folded
 

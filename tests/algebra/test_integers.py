@@ -7,7 +7,7 @@ from flint import fmpz
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.integers import common_part, divide_exactly, taken_apart, without
+from kahanmaps.algebra.integers import common_part, divide_exactly, split_by_primes, without
 
 long_integers = st.integers(-(10**40), 10**40)
 
@@ -44,7 +44,7 @@ def test_what_numbers_have_in_common_in_some_primes(numbers, shared, power):
 
 @given(st.integers(-(10**9), 10**9).filter(bool), st.integers(1, 10**6))
 def test_primes_are_taken_away_with_all_their_powers(value, primes):
-    left, taken = taken_apart(fmpz(value), fmpz(primes))
+    left, taken = split_by_primes(fmpz(value), fmpz(primes))
     assert left * taken == value
     assert without(fmpz(value), fmpz(primes)) == left
     assert taken > 0

@@ -2,10 +2,10 @@
 
 import pytest
 
-from kahanmaps.checks import judge
+from kahanmaps.checks import certify
 
 
 @pytest.fixture
 def at_points_only(monkeypatch):
     """Proof by expansion, which makes many a supported claim a proved one, has its own tests in test_expand.py."""
-    monkeypatch.setattr(judge, "expansion", lambda *_: None)
+    monkeypatch.setattr(certify, "expansion", lambda *_: None)

@@ -16,7 +16,7 @@ from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_eigenvalues
 from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.version import __version__
 
@@ -76,7 +76,7 @@ def test_the_json_of_a_refuted_control_shows_the_witness_and_what_was_expected()
 
 
 LOTKA_VOLTERRA = file_of(system_of("x y", "x*(2 - y)", "y*(3*x - 1)"), I="x*y/(1 - eps^2*x)", phi="x*y")
-MEMBER = SystemFile.from_member(draw_with_eigenvalues([1, -2], seed=3))
+MEMBER = SystemFile.from_member(random_member_with_eigenvalues([1, -2], seed=3))
 PLANE = SystemFile.from_hamiltonian(hamiltonian_of("q p", "q^3/3 + p^2/2"))
 REPORTS = {
     "commute, member": lambda settings: check_commute(MEMBER, None, settings),
@@ -126,7 +126,9 @@ def test_every_report_comes_out_the_same_from_the_same_seed_and_its_orbit_from_i
 @pytest.mark.parametrize(
     "check",
     [
-        lambda settings: check_commute(SystemFile.from_member(draw_with_eigenvalues([1, -2], seed=1)), None, settings),
+        lambda settings: check_commute(
+            SystemFile.from_member(random_member_with_eigenvalues([1, -2], seed=1)), None, settings
+        ),
         lambda settings: check_measure(LOTKA_VOLTERRA, settings),
         lambda settings: check_poisson(SystemFile.from_member(MEMBER.member), settings),
     ],

@@ -15,7 +15,7 @@ from flint import fmpq, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
 from hypothesis import assume, given
 
-from kahanmaps.checks import judge, theorems
+from kahanmaps.checks import certify, theorems
 from kahanmaps.checks.claims import Certainty, Report
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.settings import Settings
@@ -24,7 +24,7 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -39,13 +39,13 @@ def pair(f: QuadraticSystem, g: QuadraticSystem, how: Settings = QUICK, **more: 
 # Members of the family, by how chi factors
 
 MEMBERS = {
-    "m=1": draw_with_eigenvalues([2], seed=3),
-    "m=2, split": draw_with_eigenvalues([1, -2], seed=3),
-    "m=2, irreducible": draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
-    "m=2, eigenvalue twice": draw_with_eigenvalues([3, 3], seed=3),
-    "m=3, split": draw_with_eigenvalues([1, -2, 3], seed=3),
-    "m=3, (t-1)(t^2-2)": draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3),
-    "m=3, (t-1)^2 (t-2)": draw_with_chi(fmpq_poly([-2, 5, -4, 1]), seed=3),
+    "m=1": random_member_with_eigenvalues([2], seed=3),
+    "m=2, split": random_member_with_eigenvalues([1, -2], seed=3),
+    "m=2, irreducible": random_member_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
+    "m=2, eigenvalue twice": random_member_with_eigenvalues([3, 3], seed=3),
+    "m=3, split": random_member_with_eigenvalues([1, -2, 3], seed=3),
+    "m=3, (t-1)(t^2-2)": random_member_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3),
+    "m=3, (t-1)^2 (t-2)": random_member_with_chi(fmpq_poly([-2, 5, -4, 1]), seed=3),
 }
 SPLIT3 = MEMBERS["m=3, split"]
 over_members = pytest.mark.parametrize("name", MEMBERS)
@@ -55,7 +55,7 @@ over_members = pytest.mark.parametrize("name", MEMBERS)
 def report_of(name: str) -> Report:
     """What is said of one of MEMBERS, asked once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "expansion", lambda *_: None)
+        patch.setattr(certify, "expansion", lambda *_: None)
         return check_commute(SystemFile.from_member(MEMBERS[name]), settings=QUICK)
 
 
@@ -101,7 +101,7 @@ def test_without_the_theorem_the_pairs_of_a_class_are_supported(name, monkeypatc
 
 def test_a_control_that_commutes_is_noted():
     # A^2 = I makes f_1 = A^T f_0 an associated system: the control cannot fail, and the report says so.
-    report = check_commute(SystemFile.from_member(draw_with_eigenvalues([1, -1], seed=3)), settings=QUICK)
+    report = check_commute(SystemFile.from_member(random_member_with_eigenvalues([1, -1], seed=3)), settings=QUICK)
     assert report.findings[-1].control
     assert report.findings[-1].verdict is PROVED
     assert any("control was not refuted" in note for note in report.notes)

@@ -28,14 +28,14 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import Contradiction
 from kahanmaps.checks.claims import Certainty, Finding
 from kahanmaps.checks.conserve import check_integrals, known_integrals
-from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -143,11 +143,11 @@ def test_an_integral_that_exists_at_one_eps_is_refuted_elsewhere(eps):
 
 
 FAMILY = {
-    "m=1": (draw_with_eigenvalues([2], seed=3), 1),
-    "m=2": (draw_with_eigenvalues([1, -2], seed=3), 2),
-    "m=2, irreducible": (draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3), 1),
-    "m=3": (draw_with_eigenvalues([1, -2, 3], seed=3), 4),
-    "m=3, eigenvalue twice": (draw_with_eigenvalues([1, 1, 2], seed=3), 2),
+    "m=1": (random_member_with_eigenvalues([2], seed=3), 1),
+    "m=2": (random_member_with_eigenvalues([1, -2], seed=3), 2),
+    "m=2, irreducible": (random_member_with_chi(fmpq_poly([-2, 0, 1]), seed=3), 1),
+    "m=3": (random_member_with_eigenvalues([1, -2, 3], seed=3), 4),
+    "m=3, eigenvalue twice": (random_member_with_eigenvalues([1, 1, 2], seed=3), 2),
 }
 over_family = pytest.mark.parametrize(("member", "classes"), FAMILY.values(), ids=FAMILY)
 

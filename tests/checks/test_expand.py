@@ -6,11 +6,11 @@ import pytest
 from flint import fmpq
 
 from kahanmaps import QuadraticSystem, parse_rational_function
-from kahanmaps.checks import judge
+from kahanmaps.checks import certify
+from kahanmaps.checks.certify import NotEqual, expansion
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.decide import Decision, Identity
-from kahanmaps.checks.judge import NotEqual, expansion
 from kahanmaps.checks.settings import Settings
 from kahanmaps.invariants.phase_functions import ClaimedIntegral
 
@@ -76,9 +76,9 @@ def test_every_eps_is_not_an_eps_that_equals_a_coordinate(k):
 
 def test_an_expansion_refutes_what_random_points_let_pass(monkeypatch):
     held = Decision(Certainty.SUPPORTED, Evidence("random points over GF(p)", "held"))
-    monkeypatch.setattr(judge, "decide", lambda *arguments: held)
+    monkeypatch.setattr(certify, "decide", lambda *arguments: held)
     claim = ClaimedIntegral("I", parse_rational_function("x^2 + y^2 + z^2", ["x", "y", "z", "eps"]))
-    found = judge.judge("I is conserved", conservation(TOP, claim, None), Settings())
+    found = certify.certify("I is conserved", conservation(TOP, claim, None), Settings())
     assert found.verdict is Certainty.REFUTED
     assert found.evidence.method == "exact rational point"
     assert found.witness.left != found.witness.right

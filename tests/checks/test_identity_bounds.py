@@ -17,7 +17,7 @@ from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
 from kahanmaps.invariants.phase_functions import ClaimedDensity, ClaimedIntegral, DeterminantDensity
 from kahanmaps.invariants.poisson import HamiltonianTensor
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 some_eps = st.one_of(st.none(), rationals(6).filter(lambda eps: eps != 0))
@@ -102,7 +102,7 @@ def test_invariance_of_a_density_is_bounded(text, eps):
 
 @given(hamiltonians(dims=(1, 2)), some_eps)
 def test_the_transformation_law_is_bounded(hamiltonian, eps):
-    check(transformation_identity(Kahan(hamiltonian.system), HamiltonianTensor(hamiltonian), eps))
+    check(transformation_identity(KahanFamily(hamiltonian.system), HamiltonianTensor(hamiltonian), eps))
 
 
 @given(hamiltonians(dims=(3,)), some_eps)

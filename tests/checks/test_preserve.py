@@ -36,14 +36,14 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks import preserve, theorems
+from kahanmaps.checks.certify import Contradiction
 from kahanmaps.checks.claims import Certainty, Finding
-from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
+from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -54,9 +54,9 @@ pytestmark = pytest.mark.usefixtures("at_points_only")
 PLANE = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
 GENERIC = hamiltonian_of("x y z w", "x^3 + y^2*w - 2*x*z*w + z^3 + x*y*z + w^3/3")
 MEMBERS = {
-    "m=1": draw_with_eigenvalues([2], seed=3),
-    "m=2, irreducible": draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
-    "m=3": draw_with_eigenvalues([1, -2, 3], seed=3),
+    "m=1": random_member_with_eigenvalues([2], seed=3),
+    "m=2, irreducible": random_member_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
+    "m=3": random_member_with_eigenvalues([1, -2, 3], seed=3),
 }
 
 
@@ -206,7 +206,7 @@ def test_in_dimension_three_the_tensor_is_supported_without_a_theorem(hamiltonia
 
 
 def test_where_A_is_derogatory_the_tensor_is_not_proved_but_decided():
-    member = draw_with_eigenvalues([1, 1, 2], seed=3)
+    member = random_member_with_eigenvalues([1, 1, 2], seed=3)
     # These H are sums of planar ones: the tensor is Poisson although the theorem does not say so.
     assert not member.is_generic
     assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [SUPPORTED, SUPPORTED]
@@ -239,7 +239,7 @@ rhs = ["x*(y + z + w)", "y*(-x + z + w)", "z*(-x - y + w)", "w*(-x - y - z)"]
 def log_canonical(names, a):
     """The tensor {x_i, x_j} = a_ij x_i x_j."""
     rows = [[f"({a[i][j]})*{p}*{q}" for j, q in enumerate(names)] for i, p in enumerate(names)]
-    return GivenTensor.from_text(rows, names)
+    return MatrixPoissonTensor.from_text(rows, names)
 
 
 PLANAR = [[0, 1], [-1, 0]]
@@ -250,7 +250,7 @@ SIGNS = [[(j > i) - (j < i) for j in range(4)] for i in range(4)]
     ("text", "given", "law"),
     [
         (LYNESS, log_canonical("xy", PLANAR), SUPPORTED),
-        (LYNESS, GivenTensor.from_text([["0", "x"], ["-x", "0"]], "xy"), REFUTED),
+        (LYNESS, MatrixPoissonTensor.from_text([["0", "x"], ["-x", "0"]], "xy"), REFUTED),
         (NESTED, log_canonical("xyzw", SIGNS), SUPPORTED),
         (NESTED, log_canonical("xyzw", [[2 * e if {i, j} == {0, 1} else e for j, e in enumerate(row)]
                                         for i, row in enumerate(SIGNS)]), REFUTED),
@@ -264,9 +264,12 @@ def test_a_tensor_with_denominators_is_differentiated():
     # P = (x, y, z)/|x|^2 as {x,y} = z/r^2 and so on: rot P is orthogonal to P
     r = "x^2 + y^2 + z^2"
     rows = [["0", f"z/({r})", f"-y/({r})"], [f"-z/({r})", "0", f"x/({r})"], [f"y/({r})", f"-x/({r})", "0"]]
-    assert check_poisson(file_of(LORENZ), QUICK, GivenTensor.from_text(rows, "xyz")).findings[1].verdict is SUPPORTED
+    assert (
+        check_poisson(file_of(LORENZ), QUICK, MatrixPoissonTensor.from_text(rows, "xyz")).findings[1].verdict
+        is SUPPORTED
+    )
     rows = [["0", "1/y", "0"], ["-1/y", "0", "1/(x - z)"], ["0", "1/(z - x)", "0"]]
-    found = check_poisson(file_of(LORENZ), QUICK, GivenTensor.from_text(rows, "xyz")).findings[1]
+    found = check_poisson(file_of(LORENZ), QUICK, MatrixPoissonTensor.from_text(rows, "xyz")).findings[1]
     assert found.verdict is REFUTED
     # sum_l P_1l d_l P_23 + P_2l d_l P_31 + P_3l d_l P_12, of which only P_32 d_2 P_12 is not 0
     x, y, z = exact(*found.witness.point)
@@ -310,7 +313,7 @@ def test_a_tensor_that_is_0_at_the_eps_and_parameters_in_force_is_wrong_use(entr
     path = tmp_path / "p.toml"
     path.write_text(f'[poisson]\ntensor = [["0", "{entry}"], ["-({entry})", "0"]]\n')
     with pytest.raises(InputError, match=message):
-        check_poisson(file, how, GivenTensor.read(path, file.variables, file.parameters))
+        check_poisson(file, how, MatrixPoissonTensor.read(path, file.variables, file.parameters))
 
 
 @pytest.mark.parametrize(

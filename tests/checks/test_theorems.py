@@ -17,10 +17,10 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.checks import theorems
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
-MEMBER = draw_with_eigenvalues([1, -2, 3], seed=3)
+MEMBER = random_member_with_eigenvalues([1, -2, 3], seed=3)
 X = exact("1/2", "-1/3", 1, 2, "2/5", -1)
 EPS = Fraction(1, 7)
 
@@ -102,9 +102,9 @@ def test_two_members_with_another_h_are_not_covered_and_do_not_commute():
     "member",
     [
         MEMBER,
-        draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
-        draw_with_chi(fmpq_poly([1, -2, 1]), seed=3),  # (t - 1)^2, not diagonalisable
-        draw_with_eigenvalues([1, 1, 2], seed=3),
+        random_member_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
+        random_member_with_chi(fmpq_poly([1, -2, 1]), seed=3),  # (t - 1)^2, not diagonalisable
+        random_member_with_eigenvalues([1, 1, 2], seed=3),
     ],
     ids=["split", "irreducible", "repeated root", "repeated eigenvalue"],
 )
@@ -117,7 +117,7 @@ def test_over_the_splitting_field_every_chi_gives_its_associated_systems(member)
 
 def test_generic_members_have_an_invariant_poisson_tensor_and_those_with_a_repeated_root_none_by_the_theorem():
     assert theorems.poisson_tensor_invariant(MEMBER.chosen.hamiltonian, MEMBER) is not None
-    member = draw_with_eigenvalues([1, 1, 2], seed=3)
+    member = random_member_with_eigenvalues([1, 1, 2], seed=3)
     assert theorems.poisson_tensor_invariant(member.chosen.hamiltonian, member) is None
 
 

@@ -20,7 +20,7 @@ from kahanmaps import (
 )
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.theorems import commutant_integral
-from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_eigenvalues
 from kahanmaps.invariants.phase_functions import CommutantIntegral
 
 SADDLE = SystemFile.from_hamiltonian(
@@ -39,7 +39,7 @@ def test_nothing_is_proved_of_a_map_without_values(check):
 
 
 def test_the_commutant_lemma_asks_for_the_standard_structure():
-    member = draw_with_eigenvalues([1, 2], seed=1)
+    member = random_member_with_eigenvalues([1, 2], seed=1)
     standard = member.chosen.hamiltonian
     other = CubicHamiltonian(standard.H, standard.J * 2)
     assert commutant_integral(standard, CommutantIntegral(standard, member.A, 1), "A^T") is not None

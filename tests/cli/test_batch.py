@@ -160,7 +160,7 @@ def test_show_has_all_that_is_known_of_a_task(batch, space):
 
 def test_a_task_can_be_redone_from_what_show_prints(batch):
     from kahanmaps.experiments.registry import task_kind
-    from kahanmaps.experiments.results.recipes import system_from
+    from kahanmaps.experiments.results.system_spec import system_from
 
     batch("run", '[experiments.top]\ntask = "check-integrals"\nsystem = "euler_top"\noptions.eps = "1/7"\n', "-q")
     key = batch("export --db study.db --jsonl").records[1]["key"]

@@ -110,7 +110,7 @@ def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps
 
 
 def test_integrals_without_a_formula_give_3(kahanmaps, monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.LIFTS", ())
+    monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.TWO_POINT_BASES", ())
     outcome = kahanmaps("find-integrals clebsch_first_flow --max-degree 2 --json")
     assert (outcome.status, outcome.json["found"], outcome.json["codimension"]) == (3, 1, 4)
     assert "3 of the 4 independent integrals have no closed form P/Q" in outcome.json["reason"]

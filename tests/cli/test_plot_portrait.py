@@ -17,13 +17,13 @@ def drawn(monkeypatch):
     """What was drawn last, as the numbers that were handed to the drawing functions; figures are not rendered."""
     monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
     seen = []
-    draw = drawing.draw_portrait
+    draw = drawing.plot_portrait
 
     def spy(found, style, **how):
         seen.append((found, how))
         return draw(found, style, **how)
 
-    monkeypatch.setattr(drawing, "draw_portrait", spy)
+    monkeypatch.setattr(drawing, "plot_portrait", spy)
     return seen
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from kahanmaps.documents import catalog
 from kahanmaps.documents.files import parse_system
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.kahan import KahanFamily
 
 # The list
 
@@ -18,7 +18,7 @@ def test_every_system_has_a_line(kahanmaps):
 @pytest.mark.parametrize("name", ["lyness", "hky", "repaired_octahedral"])
 def test_a_map_is_shown_as_text_latex_and_data(kahanmaps, name):
     shown = kahanmaps(f"systems {name}").out
-    is_adjusted = isinstance(catalog.load(name).map, Kahan)  # these are written as x' = f, with eps in f
+    is_adjusted = isinstance(catalog.load(name).map, KahanFamily)  # these are written as x' = f, with eps in f
     assert "x' = " in shown if is_adjusted else "~ = " in shown or "_new" in shown
     assert r"\begin{aligned}" in kahanmaps(f"systems {name} --latex").out
     record = kahanmaps(f"systems {name} --json").json

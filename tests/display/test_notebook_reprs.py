@@ -14,7 +14,7 @@ from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witnes
 
 EVIL = '<script>alert("x")</script>\x1b[31m'
 LARGEST = 100_000  # characters of any representation
-TOP, MEMBER = km.load("euler_top"), km.draw_with_eigenvalues([1, -2], seed=7)
+TOP, MEMBER = km.load("euler_top"), km.random_member_with_eigenvalues([1, -2], seed=7)
 PLANE = km.QuadraticSystem.from_text(["x", "y"], ["x*y - 3*x", "x^2 + 1/2"])
 # Dense, of dimension 20, with numbers of 200 digits.
 NAMES = [f"x{k}" for k in range(20)]
@@ -70,7 +70,7 @@ LATEX = {  # a value, and what its formula contains
         r"\varepsilon &= \text{1/10},\quad \text{time step } 2 \varepsilon = \text{1/5} \end{aligned}$",
     ),
     "a huge map": (lambda: km.KahanMap(HUGE, "1/10"), "(20 equations)"),
-    "a Kahan map as data": (lambda: km.Kahan(TOP.system), TOP.system._repr_latex_()),
+    "a Kahan map as data": (lambda: km.KahanFamily(TOP.system), TOP.system._repr_latex_()),
     "an explicit map": (
         lambda: km.explicit_map(["x"], [km.parse_rational_function("1/(eps + x)", ["x", "eps"])]),
         r"\varepsilon",

@@ -86,7 +86,7 @@ def test_maps_with_the_root_commute_with_their_own_multiples_only_where_they_sho
 def test_the_points_of_an_orbit_agree_in_all_arithmetics():
     file = km.load("euler_top", {"a1": ROOT})
     exact = [point.x for point in km.orbit(file, [1, 2, 3], "1/10", steps=3)][-1]
-    near = float(parse_root(ROOT).rounded())
+    near = float(parse_root(ROOT).real_approximation())
     values = [sum(float(c) * near**k for k, c in enumerate(entry.coefficients)) for entry in exact]
     floats = [point.x for point in km.orbit(file, [1, 2, 3], "1/10", steps=3, arithmetic="float")][-1]
     assert list(floats) == pytest.approx(values, rel=1e-13)  # a few roundings of numbers of size 1

@@ -9,7 +9,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError, SystemFileError
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.kahan import KahanFamily
 
 FIELD = 'variables = ["x", "y"]\nparameters.a = 2\n[system]\nrhs = ["x*(a - y)", "y*(x - 1)"]\n'
 START, EPS = (fmpq(1, 2), fmpq(1, 3)), "1/10"
@@ -27,7 +27,7 @@ def test_a_word_in_files_catalogue_and_tables_is_what_its_letters_do(tmp_path):
     field = '{ file = "field.toml", inverse = true, parameters = { a = "b + 1" } }'
     of = f'{field}, {swap}, {{ system = "lotka_volterra", power = 2 }}'
     file = read_system(written(tmp_path, of, 'parameters.b = "1/2"'))
-    first = Kahan(parse_system(FIELD, parameters={"a": "3/2"}).system).at(EPS).inverse
+    first = KahanFamily(parse_system(FIELD, parameters={"a": "3/2"}).system).at(EPS).inverse
     last = load("lotka_volterra").map.at(EPS)
     x, y = first.step(START)
     expected = last.step(last.step((y / 2, 2 * x)))

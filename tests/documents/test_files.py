@@ -17,7 +17,7 @@ from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_eigenvalues
 
 SYSTEM = """
 name = "rotor"
@@ -140,7 +140,7 @@ def test_a_file_reads_back_equal(text):
 @pytest.mark.parametrize("m", [1, 2, 3])
 def test_every_member_of_the_family_reads_back_equal(m):
     rng = random.Random(m)
-    member = draw_with_eigenvalues([fmpq(rng.randint(-9, 9), rng.randint(1, 5)) + 20 * k for k in range(m)], m)
+    member = random_member_with_eigenvalues([fmpq(rng.randint(-9, 9), rng.randint(1, 5)) + 20 * k for k in range(m)], m)
     signs = tuple(rng.choice((1, -1)) for _ in member.factors)
     file = SystemFile.from_member(FamilyMember(member.A, member.H, signs), "a name")
     again = parse_system(file.to_toml())

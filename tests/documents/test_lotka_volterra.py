@@ -18,7 +18,7 @@ from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.families import degree
 from kahanmaps.documents.files import parse_system
-from kahanmaps.experiments.results.recipes import find_file
+from kahanmaps.experiments.results.system_spec import find_file
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
 

@@ -112,7 +112,7 @@ def test_what_is_known_is_found(name, system, asked, expected):
 
 def test_what_is_missing_has_a_reason(monkeypatch):
     # Four integrals by petrera-pfadler-suris-2009, not all of them quotients of small degree in x alone.
-    monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.LIFTS", ())
+    monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.TWO_POINT_BASES", ())
     found = perform("find-integrals", of_catalogue("clebsch_first_flow"), max_degree=2)
     assert (found["status"], found["codimension"] > found["integrals"] > 0) == ("formulas missing", True)
     assert "no closed form" in found["reason"]

@@ -11,7 +11,7 @@ import pytest
 from flint import fmpq
 from task_helpers import made, member, perform
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.commute import check_commute
@@ -46,7 +46,7 @@ MEMBER, LORENZ, TOP, RIVALS, WRONG = member(), *map(made, map(load, ["lorenz", "
 
 
 def start_of(system: SystemFile, seed: int = 0) -> Any:
-    return next(random_starts(system.system.dim, seed_for(seed, system.system.rhs)))
+    return next(random_starts(system.system.dim, derive_seed(seed, system.system.rhs)))
 
 
 def normal_form(system: SystemFile) -> Any:

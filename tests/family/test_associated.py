@@ -13,7 +13,7 @@ from flint import fmpq_mat, fmpq_poly
 
 import kahanmaps as km
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_chi, parse_chi
+from kahanmaps.family.random_members import parse_chi, random_member_with_chi
 from kahanmaps.family.skew_hamiltonian import Factor, evaluate_at_matrix
 
 # The matrices B_s.
@@ -46,7 +46,7 @@ COUNTS = [  # chi, number of irreducible factors r, of rational associated syste
 
 @pytest.mark.parametrize(("chi", "count"), COUNTS, ids=str)
 def test_there_is_one_rational_associated_system_for_every_choice_of_signs_up_to_all(chi, count):
-    systems = [g.system for g in draw_with_chi(chi, 1).associated()]
+    systems = [g.system for g in random_member_with_chi(chi, 1).associated()]
     assert len(set(systems)) == len(systems) == count
 
 
@@ -55,7 +55,7 @@ def test_there_is_one_rational_associated_system_for_every_choice_of_signs_up_to
     [("t^2 - 2", 1), ("t^2 + t + 1", 1), ("t^3 - t - 1", 1), ("(t - 1)*(t^2 - 2)", 2), ("(t - 1)^2", 0)],
 )
 def test_associated_systems_over_a_number_field_commute_with_the_member_and_others_do_not(chi, count):
-    member = draw_with_chi(parse_chi(chi), seed=3)
+    member = random_member_with_chi(parse_chi(chi), seed=3)
     found = list(member.conjugate_associates())
     assert len(found) == count
     for one in found:

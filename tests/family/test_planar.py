@@ -18,8 +18,8 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import NormalForm, normal_form
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 
 
@@ -116,8 +116,8 @@ def test_wrong_data_fail_the_verification(name, wrong, sentence):
 @pytest.mark.parametrize(
     ("member", "factors"),
     [
-        (draw_with_chi((t**2 + 1) ** 2, 1), r"\(t\^2 \+ 1\), expected"),
-        (draw_with_eigenvalues([1, 1, 2, 2, 3], 1), r"\(t - 1\), \(t - 2\), expected"),
+        (random_member_with_chi((t**2 + 1) ** 2, 1), r"\(t\^2 \+ 1\), expected"),
+        (random_member_with_eigenvalues([1, 1, 2, 2, 3], 1), r"\(t - 1\), \(t - 2\), expected"),
     ],
     ids=["a quadratic factor twice", "two roots twice"],
 )

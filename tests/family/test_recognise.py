@@ -22,16 +22,16 @@ from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables, third_derivatives
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.recognise import reason_against, recognised_member, structure_space
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
+from kahanmaps.family.recognition import find_family_structure, structure_space, why_not_member
 from kahanmaps.family.skew_hamiltonian import chi, evaluate_at_matrix, random_symplectic
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 MEMBERS = GENERIC | {
-    "m = 2, complex": draw_with_chi(t**2 + 1, 1),
-    "m = 4, twice the same field": draw_with_chi((t**2 - 2) * (t**2 - 2 * t - 1), 1),
-    "m = 5, partly split": draw_with_chi((t - 1) * (t + 3) * (t**3 - t - 1), 1),
-    "m = 6, split": draw_with_eigenvalues([1, -2, 3, 5, -7, 4], 1),
+    "m = 2, complex": random_member_with_chi(t**2 + 1, 1),
+    "m = 4, twice the same field": random_member_with_chi((t**2 - 2) * (t**2 - 2 * t - 1), 1),
+    "m = 5, partly split": random_member_with_chi((t - 1) * (t + 3) * (t**3 - t - 1), 1),
+    "m = 6, split": random_member_with_eigenvalues([1, -2, 3, 5, -7, 4], 1),
 }
 over_generic = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS.keys())
 
@@ -43,7 +43,7 @@ def forgotten(member: FamilyMember) -> CubicHamiltonian:
 
 def found_in(hamiltonian: CubicHamiltonian):
     """The member found, which has to be there."""
-    found = recognised_member(hamiltonian)
+    found = find_family_structure(hamiltonian)
     assert found is not None
     return found
 
@@ -64,7 +64,7 @@ def test_the_splitting_is_found_again(member):
 
 @given(st.sampled_from([(1, -2), (3, 5), (1, 2, 3), (0, 1, -4)]), st.integers(0, 10**6))
 def test_a_symplectic_disguise_hides_nothing(eigenvalues, seed):
-    member = draw_with_eigenvalues(eigenvalues, seed % 5)
+    member = random_member_with_eigenvalues(eigenvalues, seed % 5)
     S = random_symplectic(member.m, random.Random(seed))
     found = found_in(moved(forgotten(member), S))
     assert found.is_standard
@@ -81,8 +81,8 @@ def test_a_cubic_without_structure_is_no_member(n, seed):
     H = ring(default_variables(n)).from_dict({e: fmpq(rng.randint(-9, 9), 1 + seed % 3) for e in monomials(n, 3)})
     hamiltonian = CubicHamiltonian(H, standard_structure(n))
     assert structure_space(hamiltonian.H) == [QQ.identity(n)]
-    assert recognised_member(hamiltonian) is None
-    assert reason_against(hamiltonian).startswith("only the multiples of I")
+    assert find_family_structure(hamiltonian) is None
+    assert why_not_member(hamiltonian).startswith("only the multiples of I")
 
 
 @pytest.mark.parametrize(
@@ -95,8 +95,8 @@ def test_a_cubic_without_structure_is_no_member(n, seed):
 )
 def test_systems_of_another_kind_are_no_members(H, J, reason):
     hamiltonian = CubicHamiltonian(parse_polynomial(H, default_variables(len(J))), fmpq_mat(J))
-    assert recognised_member(hamiltonian) is None
-    assert reason_against(hamiltonian).startswith(reason)
+    assert find_family_structure(hamiltonian) is None
+    assert why_not_member(hamiltonian).startswith(reason)
     with pytest.raises(InputError, match=reason):
         structure_space(hamiltonian.H, hamiltonian.J)
 
@@ -127,7 +127,7 @@ def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
 
 @pytest.mark.parametrize("power", [2, 3])
 def test_nilpotent_structure_is_found_and_not_generic(power):
-    member = draw_with_chi((t - 5) ** power, 1)
+    member = random_member_with_chi((t - 5) ** power, 1)
     found = found_in(forgotten(member))
     assert (found.is_generic, found.dimension, chi(found.A)) == (False, power, (t - 1) ** power)
     nilpotent = found.A - QQ.identity(2 * power)

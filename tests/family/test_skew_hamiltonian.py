@@ -13,7 +13,7 @@ from helpers import random_skew_hamiltonian
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi, defects, diagnosis, factors_of_chi, random_symplectic
 from kahanmaps.systems.hamiltonian import standard_structure
 
@@ -52,16 +52,16 @@ ORDERS = [  # chi as a product in some order, the order of its factors
 
 @pytest.mark.parametrize(("polynomial", "expected"), ORDERS, ids=lambda value: str(value))
 def test_factors_come_in_the_order_of_the_signs(polynomial, expected):
-    assert [str(factor) for factor in factors_of_chi(draw_with_chi(polynomial, 1).A)] == expected
+    assert [str(factor) for factor in factors_of_chi(random_member_with_chi(polynomial, 1).A)] == expected
 
 
 DIAGNOSES = [
-    (draw_with_eigenvalues([1, "1/2"], 1).A, "A is generic: chi = (t - 1/2) (t - 1), .* all roots rational"),
-    (draw_with_chi(t**3 - 2, 1).A, "A is generic: chi = (t^3 - 2), .* irreducible over Q"),
-    (draw_with_chi((t - 1) * (t**2 - 2), 1).A, "A is generic: .* 2 irreducible factors over Q"),
-    (draw_with_eigenvalues([1, 1, 2], 1).A, "A is not generic: .*(t - 1) 2 times; A is still diagonalisable"),
+    (random_member_with_eigenvalues([1, "1/2"], 1).A, "A is generic: chi = (t - 1/2) (t - 1), .* all roots rational"),
+    (random_member_with_chi(t**3 - 2, 1).A, "A is generic: chi = (t^3 - 2), .* irreducible over Q"),
+    (random_member_with_chi((t - 1) * (t**2 - 2), 1).A, "A is generic: .* 2 irreducible factors over Q"),
+    (random_member_with_eigenvalues([1, 1, 2], 1).A, "A is not generic: .*(t - 1) 2 times; A is still diagonalisable"),
     (
-        draw_with_chi((t - 1) ** 2, 1).A,
+        random_member_with_chi((t - 1) ** 2, 1).A,
         "A is not generic: .*(t - 1) 2 times; A is not diagonalisable, but chi is its minimal polynomial.*dimension 4m",
     ),
 ]

@@ -12,7 +12,7 @@ from planar_helpers import invertible, moved, over_members, structure_and_system
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_eigenvalues
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.splitting import Splitting
@@ -37,7 +37,7 @@ def steps_like(normal_form: SystemNormalForm, system: QuadraticSystem) -> bool:
 
 
 def test_a_declared_member_keeps_its_a():
-    member = draw_with_eigenvalues(["1/2", -7], 3)
+    member = random_member_with_eigenvalues(["1/2", -7], 3)
     found = system_normal_form(member.chosen.system, member=member)
     assert (found.declared, found.T) == (True, None)
     assert found.form.A == member.A
@@ -53,7 +53,7 @@ def test_the_structure_steps_like_the_system(name):
 
 @pytest.mark.parametrize("n", [2, 4, 6])
 def test_with_another_J_there_is_a_change_of_coordinates(n):
-    member = draw_with_eigenvalues([1, -2, 3][: n // 2], 2)
+    member = random_member_with_eigenvalues([1, -2, 3][: n // 2], 2)
     other = moved(CubicHamiltonian(member.H, standard_structure(n)), invertible(n, 5))
     found = system_normal_form(other.system, other)
     assert found.T * standard_structure(n) * found.T.transpose() == other.J

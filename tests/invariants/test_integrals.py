@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import BadPrime, SingularStep
-from kahanmaps.family.draw import draw_with_chi
+from kahanmaps.family.random_members import random_member_with_chi
 from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.systems.hamiltonian import standard_structure
 
@@ -57,7 +57,7 @@ def test_modified_h_is_minus_one_sixth_of_the_papers_integral(drawn, eps):
 
 @pytest.mark.parametrize("power", [1, 2])
 def test_an_integral_of_the_commutant_is_what_its_formula_says(power):
-    member, eps = draw_with_chi(fmpq_poly([1, 1, 0, 1]), seed=3), fmpq(1, 7)
+    member, eps = random_member_with_chi(fmpq_poly([1, 1, 0, 1]), seed=3), fmpq(1, 7)
     x = tuple(fmpq(k, 3) for k in (1, -2, 4, 1, 5, -1))
     image = kahan_step(member.chosen.system, fraction(eps), exact(*x))
     assert image is not None

@@ -9,7 +9,7 @@ from flint import fmpq, fmpq_mat
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps import KahanMap, draw_with_eigenvalues
+from kahanmaps import KahanMap, random_member_with_eigenvalues
 from kahanmaps.algebra.bounds import log2
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
@@ -18,7 +18,7 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
-from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, judge_family, judge_field
+from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, certify_family, certify_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
     bracket_vanishes,
     combination,
@@ -60,7 +60,7 @@ def commute_exactly(f, g, tries=3, seed=0):
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
 @pytest.mark.parametrize("eigenvalues", [[1, -2], [2, 1, -1]])
 def test_the_associated_fields_of_the_paper_are_found_from_the_equations_alone(eigenvalues, shape):
-    member = draw_with_eigenvalues(eigenvalues, seed=7)
+    member = random_member_with_eigenvalues(eigenvalues, seed=7)
     found = commuting_systems(member.chosen.system, shape)
     m = len(eigenvalues)
     assert (found.dimension, len(found.solutions), found.complete, str(found.verdict)) == (m, 3**m, True, "proved")
@@ -97,12 +97,14 @@ def test_most_systems_commute_with_nothing(name, shape):
 
 def test_moebius_maps_commute_by_their_lemma_where_the_fields_are_proportional():
     f = system("x", "x^2 + 1")
-    assert judge_field(f, system("x", "3*x^2 + 3"), Settings()).evidence.data["theorem"] == "the lemma of Moebius maps"
+    assert (
+        certify_field(f, system("x", "3*x^2 + 3"), Settings()).evidence.data["theorem"] == "the lemma of Moebius maps"
+    )
     for other in ("x", "3*x^2 + 2"):
-        assert str(judge_field(f, system("x", other), Settings()).verdict) == "refuted"
+        assert str(certify_field(f, system("x", other), Settings()).verdict) == "refuted"
     # In dimension 2 proportional fields need not commute.
     f, g = system("x y", "x^2 + y", "x*y - 1"), system("x y", "3*x^2 + 3*y", "3*x*y - 3")
-    assert str(judge_field(f, g, Settings()).verdict) == "refuted"
+    assert str(certify_field(f, g, Settings()).verdict) == "refuted"
 
 
 @pytest.mark.parametrize(
@@ -131,7 +133,7 @@ def test_a_vanishing_bracket_is_not_enough():
     f, g = system("x y z", "x", "y", "2*z"), system("x y z", "0", "0", "x*y")
     assert bracket_vanishes(f, g)
     assert not commute_exactly(f, g)
-    assert str(judge_field(f, g, Settings()).verdict) == "refuted"
+    assert str(certify_field(f, g, Settings()).verdict) == "refuted"
     found = commuting_systems(f, "quadratic")
     assert all(d.system.is_homogeneous is False for family in found.families for d in family.directions)
     assert found.complete
@@ -142,7 +144,7 @@ def test_multiples_are_refuted_as_a_family():
     f = load("euler_top", {}).system
     space = commuting_space(f, "linear")
     t = ring(["t"]).gens()[0]
-    assert str(judge_family(f, space, SolutionComponent((t,)), Settings()).verdict) == "refuted"
+    assert str(certify_family(f, space, SolutionComponent((t,)), Settings()).verdict) == "refuted"
 
 
 @given(st.lists(st.integers(-2, 2), min_size=12, max_size=12))
@@ -168,7 +170,7 @@ def test_the_zero_system(names):
 
 
 def test_no_budget_is_undecided_and_never_complete():
-    member = draw_with_eigenvalues([1, -2, 3], seed=7)
+    member = random_member_with_eigenvalues([1, -2, 3], seed=7)
     found = commuting_systems(member.chosen.system, effort=Budget(0))
     assert not found.complete
     assert [g.trivial for g in found.solutions[:3]] == TRIVIAL
@@ -184,8 +186,8 @@ def test_curved_families_are_reported_as_equations():
     # The equation is right: a point of the cone in none of the families commutes, a point off it does not.
     on, off = ([fmpq(n) for n in weights] for weights in ((2, 3, 4, 6), (2, 3, 4, 7)))
     space = commuting_space(f, "quadratic")
-    assert str(judge_field(f, field_at(space, on), Settings()).verdict) == "proved"
-    assert str(judge_field(f, field_at(space, off), Settings()).verdict) == "refuted"
+    assert str(certify_field(f, field_at(space, on), Settings()).verdict) == "proved"
+    assert str(certify_field(f, field_at(space, off), Settings()).verdict) == "refuted"
 
 
 @pytest.mark.parametrize("below", [1, 2**20 + 7])

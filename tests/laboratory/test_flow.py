@@ -5,7 +5,7 @@ import pytest
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, exponents_up_to
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import Lift, Lifted
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import TwoPointBasis, TwoPointMap
 
 PRIME = 2**61 - 1
 
@@ -14,7 +14,7 @@ PRIME = 2**61 - 1
 def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
     system = load("lotka_volterra").system
     map_ = ModularFlow(system, PRIME) if kind == "flow" else ModularMap(system, PRIME, 7)
-    map_ = Lifted(map_, Lift(1, 1)) if kind == "lifted" else map_
+    map_ = TwoPointMap(map_, TwoPointBasis(1, 1)) if kind == "lifted" else map_
     ((x, image),) = map_.pairs(1)
     plain, weighed = map_.moved(x, image, 2), map_.moved(x, image, 2, (3, 5))
     for values, more, number in zip(plain, weighed, (3, 5), strict=True):

@@ -1,4 +1,4 @@
-"""Members of the commuting family in other coordinates: affine changes hide them from `recognised_member_of`.
+"""Members of the commuting family in other coordinates: affine changes hide them from `find_family_structure_of`.
 
 Specified here: `analyze` finds A, T and the centre, says what the theorems give, and what it says holds at exact points
 in the coordinates of the system; a Hamiltonian that is no member is not taken for one.
@@ -15,8 +15,8 @@ from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.cubics import belongs, default_variables
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.recognise import recognised_member_of
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
+from kahanmaps.family.recognition import find_family_structure_of
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions
 from kahanmaps.laboratory.growth.degrees import degree_growth
@@ -26,8 +26,8 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
 MEMBERS = {
-    "m = 2, split": draw_with_eigenvalues(["1/2", -7], 3),
-    "m = 3, partly split": draw_with_chi((t - 1) * (t**2 + 1), 1),
+    "m = 2, split": random_member_with_eigenvalues(["1/2", -7], 3),
+    "m = 3, partly split": random_member_with_chi((t - 1) * (t**2 + 1), 1),
 }
 over_members = pytest.mark.parametrize("name", MEMBERS)
 
@@ -59,7 +59,7 @@ def proved(found) -> list[str]:
 def test_a_member_in_other_coordinates_is_recognised_with_what_follows(name):
     member = MEMBERS[name]
     system, found = moved_member(name)
-    assert recognised_member_of(system) is None  # not as long as these coordinates are kept
+    assert find_family_structure_of(system) is None  # not as long as these coordinates are kept
     m = member.m
     lines = proved(found)
     (line,) = (line for line in lines if line.startswith("belongs to the commuting family: a recognised member"))

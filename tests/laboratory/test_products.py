@@ -89,16 +89,16 @@ def test_numbers_other_than_1_make_integrals_that_depend_on_time():
     file = system("x y z", "x", "-y", "-2*z")
     found = find_integrals(file)
     assert [one.text for one in found.integrals] == ["x*y"]
-    assert [one.text for one in found.in_time] == [
+    assert [one.text for one in found.time_dependent] == [
         "((-eps - 1)/(eps - 1))^-n*x",
         "((-2*eps + 1)/(2*eps + 1))^-n*z",
     ]
-    assert {one.integral.verdict for one in found.in_time} == {Certainty.PROVED}
+    assert {one.integral.verdict for one in found.time_dependent} == {Certainty.PROVED}
     kahan = file.map.at("1/5")
     x = kahan.point([3, 1, 7])
     assert kahan.step(x)[2] == fmpq(1 - fmpq(2, 5)) / (1 + fmpq(2, 5)) * x[2]
     wrong = parse_rational_function("2", ["x", "y", "z", "eps"])
-    I = found.in_time[0].integral.function
+    I = found.time_dependent[0].integral.function
     assert verdict_on(file.map, I, None, is_density=False, factor=wrong)[0] is Certainty.REFUTED
 
 
@@ -106,18 +106,18 @@ def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
     # x_{n+3} x_n = 3 + x_{n+1} + x_{n+2}: det dPhi = -(3 + y + z)/x^2, while xyz is multiplied by (3 + y + z)/x^2
     todd = a_map("x y z", ["y", "z", "(3 + y + z)/x"], ["(3 + x + y)/z", "x", "y"])
     found = find_densities(todd)
-    assert (found.turning.text, found.turning.verdict) == ("x*y*z", Certainty.PROVED)
+    assert (found.anti_invariant.text, found.anti_invariant.verdict) == ("x*y*z", Certainty.PROVED)
     assert found.note == "|dx/phi| is invariant for phi = x*y*z: phi(x~) = -det dPhi(x) phi(x) (proved)"
     kahan = todd.map.at(1)
     x = kahan.point([1, 2, 5])
     assert reduce(lambda a, b: a * b, kahan.step(x)) == -kahan.jacobian(x).det() * 10
-    assert find_densities(load("lotka_volterra")).turning is None
+    assert find_densities(load("lotka_volterra")).anti_invariant is None
 
 
 @pytest.mark.parametrize("file", [random_system(2, 0), load("henon_heiles")])
 def test_maps_without_structure_have_no_products(file):
     found = found_in(file)
-    assert (found.integrals, found.in_time) == ((), ())
+    assert (found.integrals, found.time_dependent) == ((), ())
     assert found.density is None or file.name == "henon_heiles"  # whose density is det(I - eps f')
 
 

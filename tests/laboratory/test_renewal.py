@@ -14,14 +14,14 @@ from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, needed
-from kahanmaps.laboratory.singular.following import Orders
+from kahanmaps.laboratory.singular.following import OrbitData
 from kahanmaps.laboratory.singular.singularities import default_eps, patterns
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def settled(*rows, returns=None):
-    return Orders(rows, (), 100, True, returns)
+    return OrbitData(rows, (), 100, True, returns)
 
 
 @cache
@@ -125,7 +125,7 @@ def test_a_hypersurface_that_returns_goes_on_as_the_other():
     rows = ((0, 1), (1, 0))
     laws = (fmpz_poly([-1, 0, 1]), fmpz_poly([-1, 0, 1]))
     returning = settled(*rows, returns=(2, 0))
-    recurring = Orders(rows, laws, 100, True)
+    recurring = OrbitData(rows, laws, 100, True)
     written = settled(*(rows * 10))
     one, two, three = (
         coefficients(degree_series([2], [(1, orders)]), 20) for orders in (returning, recurring, written)

@@ -138,10 +138,10 @@ def test_integrals(name, how, flow):
     same, image = image_of(name, "same"), image_of(name, how)
     found, moved = (find_integrals(one.file, flow=flow, max_degree=4) for one in (same, image))
     assert (len(found.integrals), found.reason) == (len(moved.integrals), moved.reason)
-    assert len(found.in_time) == len(moved.in_time)
+    assert len(found.time_dependent) == len(moved.time_dependent)
     laboratory = Laboratory(same.file, flow=flow)
     assert all(laboratory.verdict_on(image.back(one.function))[0].holds for one in moved.integrals)
-    for one in moved.in_time:
+    for one in moved.time_dependent:
         back, speed = image.back(one.integral.function), fmpq(image.speed.numerator, image.speed.denominator)
         factor = RationalFunction(one.factor.numerator / speed, one.factor.denominator)
         assert laboratory.verdict_on(back, factor=factor)[0].holds

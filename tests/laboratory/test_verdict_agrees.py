@@ -7,8 +7,8 @@ from search_helpers import analysis_of
 
 import kahanmaps as km
 from kahanmaps.documents.catalog import names
+from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
-from kahanmaps.laboratory.growth.enclosure import enclose
 
 SYSTEMS: list[tuple[str, dict[str, Any]]] = [
     ("lotka_volterra", {"effort": -5}),
@@ -78,7 +78,7 @@ def test_fields_that_disagree_would_be_noticed():
 def test_growth_is_exponential_where_positive_entropy_is_proved_and_no_recurrence_confirmed():
     # Degrees 2^n of lotka_volterra, whose singularities the budget left out.
     degrees = tuple(2**n for n in range(9))
-    bounds = enclose(km.load("lotka_volterra").map, None)
+    bounds = bound_dynamical_degree(km.load("lotka_volterra").map, None)
     found = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), (), enclosure=bounds)
     assert (str(found.growth), found.recurrence) == ("exponential", None)
     control = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), ())

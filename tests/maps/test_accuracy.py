@@ -8,7 +8,7 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.fields import RR
-from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_eigenvalues
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.iteration import Orbit
@@ -16,7 +16,7 @@ from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
-NEAR = draw_with_eigenvalues([1, fmpq(10001, 10000), fmpq(10002, 10000)], seed=23)
+NEAR = random_member_with_eigenvalues([1, fmpq(10001, 10000), fmpq(10002, 10000)], seed=23)
 START = [fmpq(0), fmpq(3, 29), fmpq(2, 27), fmpq(-3, 29), fmpq(3, 26), fmpq(-1, 23)]
 
 

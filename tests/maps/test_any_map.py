@@ -22,7 +22,7 @@ from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
-from kahanmaps.maps.kahan import Kahan, KahanMap
+from kahanmaps.maps.kahan import KahanFamily, KahanMap
 from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -37,7 +37,7 @@ def cubic(*rhs, degree=3):
 
 
 MAPS = {
-    "kahan": Kahan(LOTKA_VOLTERRA),
+    "kahan": KahanFamily(LOTKA_VOLTERRA),
     "adjusted": read_system(EXAMPLES / "rescaled-top.toml").map,
     # odd in eps, so that the inverse is not the map at -eps
     "odd": parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x*y + eps*x^2", "y^2 - eps"]').map,

@@ -5,8 +5,8 @@ import pytest
 from flint import acb, arb, fmpq_poly
 
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
+from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.floats.blocks import _sine, _Unclear, planar_blocks
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function
 from kahanmaps.maps.kernels import has_numba
@@ -14,13 +14,13 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 EPS = "1/10"
 MEMBERS = {
-    "one plane": draw_with_eigenvalues([1], seed=2),
-    "three real roots": draw_with_eigenvalues([1, -2, 3], seed=7),
-    "six real roots": draw_with_eigenvalues([1, -2, 3, 4, 5, -6], seed=9),
-    "a complex pair": draw_with_chi(fmpq_poly([1, 0, 1]), seed=1),
-    "real and complex": draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7),
-    "two complex pairs": draw_with_chi(fmpq_poly([1, 0, 0, 0, 1]), seed=4),
-    "irrational roots": draw_generic(4, seed=3),
+    "one plane": random_member_with_eigenvalues([1], seed=2),
+    "three real roots": random_member_with_eigenvalues([1, -2, 3], seed=7),
+    "six real roots": random_member_with_eigenvalues([1, -2, 3, 4, 5, -6], seed=9),
+    "a complex pair": random_member_with_chi(fmpq_poly([1, 0, 1]), seed=1),
+    "real and complex": random_member_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7),
+    "two complex pairs": random_member_with_chi(fmpq_poly([1, 0, 0, 0, 1]), seed=4),
+    "irrational roots": random_member(4, seed=3),
 }
 FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}
 

@@ -14,8 +14,8 @@ from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
+from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.floats import steps
 from kahanmaps.maps.floats.blocks import planar_blocks
 from kahanmaps.maps.floats.doubles import exact
@@ -46,12 +46,12 @@ REPEATED = FamilyMember(A, parse_polynomial("x1^2*x3 + x2^3", ["x1", "x2", "x3",
 A = fmpq_mat(4, 4, [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0])
 COMPLEX_REPEATED = FamilyMember(A, parse_polynomial("(x1^2 - x2^2)*x3 + 2*x1*x2*x4", ["x1", "x2", "x3", "x4"]))
 MEMBERS = {
-    "one plane": draw_with_eigenvalues([1], seed=2),
-    "three real roots": draw_with_eigenvalues([1, -2, 3], seed=7),
-    "a complex pair": draw_with_chi(fmpq_poly([1, 0, 1]), seed=1),
-    "real and complex": draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7),
-    "two complex pairs": draw_with_chi(fmpq_poly([1, 0, 0, 0, 1]), seed=4),
-    "irrational roots": draw_generic(4, seed=3),
+    "one plane": random_member_with_eigenvalues([1], seed=2),
+    "three real roots": random_member_with_eigenvalues([1, -2, 3], seed=7),
+    "a complex pair": random_member_with_chi(fmpq_poly([1, 0, 1]), seed=1),
+    "real and complex": random_member_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7),
+    "two complex pairs": random_member_with_chi(fmpq_poly([1, 0, 0, 0, 1]), seed=4),
+    "irrational roots": random_member(4, seed=3),
     "repeated factors": REPEATED,
     "a repeated factor at a complex root": COMPLEX_REPEATED,
 }

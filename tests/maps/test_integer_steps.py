@@ -16,7 +16,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import integer_steps
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -25,11 +25,11 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 t = fmpq_poly([0, 1])
 
 FAMILY = {
-    "m = 2": draw_with_eigenvalues([1, -2], 1).chosen.system,
-    "m = 2, irreducible": draw_with_chi(t**2 - 2, 1).chosen.system,
-    "m = 3": draw_with_eigenvalues([1, -2, 3], 2).chosen.system,
-    "m = 3, irreducible": draw_with_chi(t**3 - t - 1, 2).chosen.system,
-    "m = 4": draw_with_eigenvalues([1, -2, 3, "1/2"], 3).chosen.system,
+    "m = 2": random_member_with_eigenvalues([1, -2], 1).chosen.system,
+    "m = 2, irreducible": random_member_with_chi(t**2 - 2, 1).chosen.system,
+    "m = 3": random_member_with_eigenvalues([1, -2, 3], 2).chosen.system,
+    "m = 3, irreducible": random_member_with_chi(t**3 - t - 1, 2).chosen.system,
+    "m = 4": random_member_with_eigenvalues([1, -2, 3, "1/2"], 3).chosen.system,
 }
 STEPS = {"m = 2": 20, "m = 2, irreducible": 20, "m = 3": 16, "m = 3, irreducible": 16, "m = 4": 10}
 ORBITS = [

@@ -175,13 +175,13 @@ def test_the_map_has_no_value_exactly_where_its_determinant_vanishes(field, pair
 
 @together("field, eps", product(FIELDS, [0, "0", "0.0", fmpq(0), Fraction(0), fmpz(0)]))
 def test_eps_zero_is_refused(field, eps):
-    with pytest.raises(InputError, match="found eps = 0, expected another number") as refusal:
+    with pytest.raises(InputError, match="found eps = 0, expected another number") as error:
         KahanMap(RICCATI, eps, field)
-    assert not isinstance(refusal.value, BadPrime)
+    assert not isinstance(error.value, BadPrime)
 
 
 @pytest.mark.parametrize("eps", [7, "7", "14/3", Fraction(-7, 2), fmpq(7)], ids=repr)
 def test_a_prime_at_which_eps_vanishes_is_refused_as_the_prime(eps):
-    with pytest.raises(BadPrime, match="prime 7 divides the numerator of eps") as refusal:
+    with pytest.raises(BadPrime, match="prime 7 divides the numerator of eps") as error:
         KahanMap(RICCATI, eps, GF(7))
-    assert refusal.value.prime == 7
+    assert error.value.prime == 7

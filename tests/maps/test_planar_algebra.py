@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.family.draw import draw_with_chi, parse_chi
+from kahanmaps.family.random_members import parse_chi, random_member_with_chi
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import tau
@@ -56,7 +56,7 @@ def random_block(name: str, seed: int) -> AlgebraBlock:
 
 
 def member_of(text: str, seed: int = 5):
-    member = draw_with_chi(parse_chi(text), seed=seed)
+    member = random_member_with_chi(parse_chi(text), seed=seed)
     return system_normal_form(member.chosen.system, member=member), member.chosen.system
 
 

@@ -11,9 +11,9 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
-from kahanmaps.paper import objects_over
+from kahanmaps.paper import specialize
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Claim, claims
 from kahanmaps.paper.verify import Verifier, VerifyOptions
@@ -54,8 +54,8 @@ def fresh(name: str) -> FamilyMember:
     """The same member, made anew: nothing has been computed with it yet."""
     spectrum = {**SPECTRA, **LARGE_SPECTRA}[name]
     if isinstance(spectrum, list):
-        return draw_with_eigenvalues(spectrum, seed=3)
-    return draw_with_chi(spectrum, seed=3)
+        return random_member_with_eigenvalues(spectrum, seed=3)
+    return random_member_with_chi(spectrum, seed=3)
 
 
 def file(name: str) -> SystemFile:
@@ -67,17 +67,17 @@ def file(name: str) -> SystemFile:
 def point(name: str, number: int = 0) -> PaperObjects:
     """A random point of a member over a field GF(p) in which chi splits; the same one for all tests."""
     found, rng = member(name), random.Random(f"{name} {number}")
-    rational = objects_over.rational_roots(found)
+    rational = specialize.rational_roots(found)
     while True:
         try:
             if rational is None:
-                split = objects_over.split_prime_field(chi_of(found.A), rng, 100_000)
+                split = specialize.split_prime_field(chi_of(found.A), rng, 100_000)
                 assert split is not None
                 K, roots = split
             else:
                 K = random_prime_field(rng)
                 roots = tuple(K.convert(root) for root in rational)
-            return objects_over.point_over(found, K, roots, None, rng, 3)
+            return specialize.point_over(found, K, roots, None, rng, 3)
         except BadPrime:
             continue
 

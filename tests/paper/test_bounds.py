@@ -8,7 +8,7 @@ from bound_helpers import lowest, true_size
 from helpers import together
 from paper.members import member, verifier_of
 
-from kahanmaps.paper import objects_over
+from kahanmaps.paper import specialize
 from kahanmaps.paper.controls import broken
 from kahanmaps.paper.registry import ClaimKind, claims
 from kahanmaps.paper.verify import ClaimAtPoints
@@ -18,7 +18,7 @@ from kahanmaps.paper.verify import ClaimAtPoints
 
 def is_short(claim):
     """Whether it speaks of x and two more vectors at most: equations for systems of many letters are too long here."""
-    bounds = objects_over.bound_objects(member("m=1"), None, 3)
+    bounds = specialize.bound_objects(member("m=1"), None, 3)
     for _ in claim.function(bounds):
         pass
     return len(bounds.used - {"roots"}) <= 3
@@ -47,11 +47,11 @@ def difference_sizes(claim, o):
 def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, monkeypatch):
     found = member("m=1")
     examined = verifier_of(found)
-    bounds = broken(control, objects_over.bound_objects(found, None, 3))
+    bounds = broken(control, specialize.bound_objects(found, None, 3))
     monkeypatch.setattr(examined, "bounds", lambda: bounds)
     statement = ClaimAtPoints(examined, claim)
     needs, (equation, poles) = statement.needs, statement.bound
-    functions = objects_over.member_functions(found, sorted(needs - {"roots"}), None, 10**9, 3)
+    functions = specialize.member_functions(found, sorted(needs - {"roots"}), None, 10**9, 3)
     sizes = difference_sizes(claim, broken(control, functions))
     for above, below in sizes:
         assert true_size(above)[0] <= equation.degree

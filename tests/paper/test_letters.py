@@ -12,7 +12,7 @@ from flint import fmpq
 from paper.members import member, values
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.paper import objects_over
+from kahanmaps.paper import specialize
 
 # Letter -> what gives it, for every index i of a root.
 LETTERS = {
@@ -35,8 +35,8 @@ LETTERS = {
 @pytest.mark.parametrize("letter", LETTERS)
 def test_a_letter_of_the_library_is_that_of_the_formulas(name, letter):
     found = member(name)
-    roots = objects_over.rational_roots(found)
-    library = objects_over.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
+    roots = specialize.rational_roots(found)
+    library = specialize.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
     formulas = library.changed(base=None, known_chi=None, draw=library.vector)
     other = formulas.changed(third=library.third * fmpq(2), roots=roots[::-1], draw=library.vector)
     ours, theirs, wrong = ([values(LETTERS[letter](o, i)) for i in o.each] for o in (library, formulas, other))

@@ -11,8 +11,8 @@ import pytest
 from helpers import together
 from paper.members import member, named, point, verifier_of
 
+from kahanmaps.checks.certify import Contradiction
 from kahanmaps.checks.claims import Certainty
-from kahanmaps.checks.judge import Contradiction
 from kahanmaps.paper import verify
 from kahanmaps.paper.registry import Claim, ClaimKind, claims, evaluate
 from kahanmaps.paper.verify import normal_form_proof
@@ -175,14 +175,14 @@ def test_without_a_proof_a_true_claim_is_supported(monkeypatch, examine):
 
 
 def test_a_claim_that_holds_at_points_but_not_in_normal_form_is_a_contradiction(monkeypatch, examine):
-    original = verify.objects_over.normal_form_objects
+    original = verify.specialize.normal_form_objects
 
     def broken(*arguments):
         o = original(*arguments)
         o.J = o.J + o.I
         return o
 
-    monkeypatch.setattr(verify.objects_over, "normal_form_objects", broken)
+    monkeypatch.setattr(verify.specialize, "normal_form_objects", broken)
     finding = examine(fabricated(lambda o: [(o.dot(o.x, o.J * o.x), o.K.zero)]))
     assert (finding.verdict, finding.evidence.method) == (Certainty.REFUTED, "contradiction")
     assert finding.witness is not None

@@ -18,8 +18,8 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.paper import objects_over
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
+from kahanmaps.paper import specialize
 from kahanmaps.paper import verify as verify_module
 from kahanmaps.paper.controls import CONTROLS
 from kahanmaps.paper.registry import ClaimKind, claims
@@ -166,10 +166,10 @@ def test_a_claim_that_no_control_refutes_is_reported(monkeypatch):
 # Members with repeated roots
 
 REPEATED = {
-    "(t-1)^2 (t+2)": draw_with_chi(fmpq_poly([2, -3, 0, 1]), seed=3),
-    "(t-1)^2": draw_with_chi(fmpq_poly([1, -2, 1]), seed=3),
-    "1, 1, 2": draw_with_eigenvalues([1, 1, 2], seed=3),
-    "1, 1": draw_with_eigenvalues([1, 1], seed=3),
+    "(t-1)^2 (t+2)": random_member_with_chi(fmpq_poly([2, -3, 0, 1]), seed=3),
+    "(t-1)^2": random_member_with_chi(fmpq_poly([1, -2, 1]), seed=3),
+    "1, 1, 2": random_member_with_eigenvalues([1, 1, 2], seed=3),
+    "1, 1": random_member_with_eigenvalues([1, 1], seed=3),
 }
 over_repeated = pytest.mark.parametrize("name", quick(REPEATED, ["1, 1"]))
 
@@ -180,7 +180,7 @@ def test_claims_that_need_distinct_roots_are_undecided_and_nothing_is_refuted_bu
     assert keys(report, REFUTED) <= misprints(m)
     assert report.verdict is UNDECIDED
     for claim in (claim for claim in STATED if claim.makes_sense(m)):
-        bounds, uses_roots = objects_over.bound_objects(REPEATED[name], None, 3), False
+        bounds, uses_roots = specialize.bound_objects(REPEATED[name], None, 3), False
         if claim.kind is ClaimKind.EQUAL:
             uses_roots = bool(list(claim.function(bounds))) and "roots" in bounds.used
         if claim.distinct_roots or uses_roots:
@@ -213,7 +213,7 @@ def test_identities_are_proved_for_a_special_member_and_what_is_said_in_general_
 
 def test_statements_that_something_differs_are_proved_where_the_roots_are_irrational():
     """chi = t^2 - 2: what needs the roots is shown at a point over a prime field in which chi splits."""
-    verifier = verifier_of(draw_with_chi(fmpq_poly([-2, 0, 1]), 1))
+    verifier = verifier_of(random_member_with_chi(fmpq_poly([-2, 0, 1]), 1))
     found = [
         verifier.verify_claim(claim) for claim in STATED if claim.kind is not ClaimKind.EQUAL and claim.makes_sense(2)
     ]
@@ -233,7 +233,7 @@ def test_statements_that_something_differs_are_proved_where_the_roots_are_irrati
     ],
 )
 def test_the_degree_of_the_splitting_field_counts_where_roots_are_needed(chi, degrees):
-    member = draw_with_chi(fmpq_poly(chi), 1)
+    member = random_member_with_chi(fmpq_poly(chi), 1)
     verifier = verifier_of(member)
     assert (verifier.conjugates(False), verifier.conjugates(True)) == degrees
 
@@ -305,7 +305,7 @@ def test_controls_refute_the_claims_for_the_member_in_general():
 
 @pytest.mark.parametrize("m", [6, 7, 9])
 def test_of_many_sign_vectors_all_single_flips_are_tried_and_up_to_four_others(m):
-    samples = [objects_over.sign_sample(m, random.Random(seed)) for seed in range(20)]
+    samples = [specialize.sign_sample(m, random.Random(seed)) for seed in range(20)]
     if m == 6:
         assert samples == [None] * 20
         return

@@ -14,7 +14,7 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.fast import FloatOrbit
-from kahanmaps.plots.drifts.drift import _Bins, _edges, clipped_from, draw_drift, small_start, survey_drift
+from kahanmaps.plots.drifts.drift import _Bins, _edges, clipped_from, plot_drift, small_start, survey_drift
 from kahanmaps.plots.drifts.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -158,7 +158,7 @@ def test_a_random_start_is_the_same_for_the_same_seed_and_small_enough_for_rk4()
 
 
 def drawn(found, **how):
-    return draw_drift(found, Style(width=12), **how)
+    return plot_drift(found, Style(width=12), **how)
 
 
 def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():

@@ -17,10 +17,10 @@ from kahanmaps.plots.growth import (
     HeightCurve,
     curves_of_record,
     degrees_of_record,
-    draw_degrees,
-    draw_heights,
     fit_of,
     height_curves,
+    plot_degrees,
+    plot_heights,
 )
 
 TENTH = fmpq(1, 10)
@@ -48,7 +48,7 @@ def curves(axes):
 
 
 def test_marks_are_the_degrees_and_the_curve_is_the_closed_form():
-    [axes] = draw_degrees({"top": growth(SQUARES)}).axes
+    [axes] = plot_degrees({"top": growth(SQUARES)}).axes
     [points], [curve] = marks(axes), curves(axes)
     assert points.get_xdata().tolist() == list(range(12))
     assert points.get_ydata().tolist() == list(SQUARES)
@@ -69,21 +69,21 @@ def test_marks_are_the_degrees_and_the_curve_is_the_closed_form():
     ],
 )
 def test_the_legend_says_what_is_known_and_dots_what_is_estimated(degrees, label, line):
-    figure = draw_degrees({"x": degrees})
+    figure = plot_degrees({"x": degrees})
     assert labels(figure) == [label]
     assert [curve.get_linestyle() for curve in curves(figure.axes[0])] == [line]
     assert figure.legends[0].get_title().get_text().endswith("time step is $2\\varepsilon$") is (degrees.eps == TENTH)
 
 
 def test_exponential_growth_is_drawn_logarithmically_and_two_such_scales_begin_at_the_first_iterate():
-    scales = [draw_degrees({"x": growth(degrees)}).axes[0].get_yscale() for degrees in (SQUARES, POWERS, NEITHER)]
+    scales = [plot_degrees({"x": growth(degrees)}).axes[0].get_yscale() for degrees in (SQUARES, POWERS, NEITHER)]
     assert scales == ["linear", "log", "log"]
-    [axes] = draw_degrees({"top": growth(SQUARES)}, scale="loglog").axes
+    [axes] = plot_degrees({"top": growth(SQUARES)}, scale="loglog").axes
     assert marks(axes)[0].get_xdata()[0] == 1
 
 
 def test_a_degree_0_lies_in_the_band_marked_0_and_no_line_leads_there():
-    [axes] = draw_degrees({"x": growth((1, 2, 2, 0), "constant")}, scale="log").axes
+    [axes] = plot_degrees({"x": growth((1, 2, 2, 0), "constant")}, scale="log").axes
     [points], [curve] = marks(axes), curves(axes)
     low, high = axes.get_ylim()
     assert low < points.get_ydata()[3] < 1 < high
@@ -97,7 +97,7 @@ def survey():
 
 
 def test_marks_are_the_heights_and_the_legend_has_the_constants(survey):
-    figure = draw_heights(survey)
+    figure = plot_heights(survey)
     for line, orbit in zip(marks(figure.axes[0]), survey.orbits, strict=True):  # from step 1 on: loglog
         steps = line.get_xdata().tolist()
         assert line.get_ydata().tolist() == [orbit.growth.heights[step] for step in steps]
@@ -118,14 +118,14 @@ def curve(kind, bits, ratio=None):
 
 
 def test_exponential_heights_are_a_straight_line():
-    drawn = draw_heights([curve(Growth.EXPONENTIAL, [3 * 2**n for n in range(9)], ratio=2.0)]).axes[0]
+    drawn = plot_heights([curve(Growth.EXPONENTIAL, [3 * 2**n for n in range(9)], ratio=2.0)]).axes[0]
     assert (drawn.get_yscale(), drawn.get_xscale()) == ("log", "linear")
     [fit] = curves(drawn)
     assert np.allclose(fit.get_ydata(), 3 * 2.0 ** fit.get_xdata())
 
 
 def test_undecided_heights_have_no_fit_and_orbits_that_disagree_are_counted():
-    figure = draw_heights([curve(Growth.UNDECIDED, [1, 5, 2]), *[curve(Growth.BOUNDED, [1, 2])] * 2])
+    figure = plot_heights([curve(Growth.UNDECIDED, [1, 5, 2]), *[curve(Growth.BOUNDED, [1, 2])] * 2])
     assert curves(figure.axes[0]) == []
     assert labels(figure)[0].endswith(": 1 undecided, 2 bounded")
 

@@ -11,11 +11,11 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.plots.curves.draw_invariant_curves import Disc, draw_invariant_curves, panels_of, view_of
 from kahanmaps.plots.curves.invariant_curves import MAX_POINTS, find_invariant_curves
 from kahanmaps.plots.curves.plane_cubics import ONE_LINE, THREE_LINES, ZERO
+from kahanmaps.plots.curves.plot_invariant_curves import Disc, panels_of, plot_invariant_curves, view_of
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -45,12 +45,12 @@ def another_structure():
     return SystemFile.from_hamiltonian(CubicHamiltonian(hamiltonian.H, 3 * standard_structure(4)))
 
 
-PLUS = draw_with_eigenvalues([1, -2], seed=7)
+PLUS = random_member_with_eigenvalues([1, -2], seed=7)
 MEMBERS = {
     "m = 1": lambda: SystemFile.from_system(monkey_saddle()),
     "m = 2": lambda: load("paper_m2"),
     "m = 3": lambda: load("paper_m3"),
-    "real quadratic roots": lambda: SystemFile.from_member(draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3)),
+    "real quadratic roots": lambda: SystemFile.from_member(random_member_with_chi(fmpq_poly([-2, 0, 1]), seed=3)),
     "one real root of three": lambda: load("paper_m3_irreducible"),
     "a sign": lambda: SystemFile.from_member(replace(PLUS, signs=(1, -1))),
     "hidden": lambda: SystemFile.from_system(load("paper_m2").system),
@@ -161,7 +161,7 @@ def test_wrong_sizes_are_refused(starts, steps, message):
 
 
 def test_a_system_without_normal_form_is_refused_with_the_reason():
-    repeated = SystemFile.from_member(draw_with_eigenvalues([1, 1], seed=7))
+    repeated = SystemFile.from_member(random_member_with_eigenvalues([1, 1], seed=7))
     for file, reason in (
         (load("euler_top"), "x' is not J grad H"),
         (load("planar_cubic_hamiltonian"), "not a homogeneous cubic"),
@@ -176,7 +176,7 @@ def test_a_system_without_normal_form_is_refused_with_the_reason():
 
 def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_colour_in_all_panels(curves):
     found = curves("m = 3")
-    figure = draw_invariant_curves(found, STYLE, original=(0, 1))
+    figure = plot_invariant_curves(found, STYLE, original=(0, 1))
     clouds = [axes.collections[0] for axes in figure.axes[:4]]
     for cloud in clouds:
         assert np.array_equal(cloud.get_array(), np.arange(61))
@@ -187,7 +187,7 @@ def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_colour_in_a
 
 def test_the_lines_drawn_lie_on_the_curve(curves):
     found = curves("m = 2")
-    axes = draw_invariant_curves(found, STYLE).axes[0]
+    axes = plot_invariant_curves(found, STYLE).axes[0]
     lines = [line for line in axes.lines if line.get_marker() == "None"]
     u, v = (np.concatenate([line.get_data()[k] for line in lines]) for k in (0, 1))
     window = view_of(found.planes[0])
@@ -200,13 +200,13 @@ def test_a_circle_of_poles_is_met_at_the_first_step_and_said_in_the_picture():
     # 1 + eps^2 D = 1 - 36 eps^2 (x^2 + y^2) is 0 at (3/5, 4/5) for eps = 1/6
     found = find_invariant_curves(SystemFile.from_system(monkey_saddle()), [["3/5", "4/5"], [1, 3]], "1/6", 5)
     assert found.poles == (1, None)
-    figure = draw_invariant_curves(found, STYLE, labels=("one", "two"))
+    figure = plot_invariant_curves(found, STYLE, labels=("one", "two"))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["one (a pole at step 1)", "two"]
 
 
 def test_the_disc_shows_every_dot_on_its_curve(curves):
     found = curves("m = 2")
-    for axes in draw_invariant_curves(found, STYLE, projective=True).axes[:2]:
+    for axes in plot_invariant_curves(found, STYLE, projective=True).axes[:2]:
         assert np.linalg.norm(axes.collections[0].get_offsets(), axis=1).max() <= 1
     plane = found.planes[0]
     orbit, disc = plane.orbits[0], Disc.of(plane)

@@ -6,7 +6,7 @@ from matplotlib.collections import PathCollection
 from kahanmaps.documents.catalog import load
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portraits.portrait import draw_portrait, neighbours, portrait_of
+from kahanmaps.plots.portraits.portrait import neighbours, plot_portrait, portrait_of
 from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, euler_orbits, walked
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -59,7 +59,7 @@ def test_explicit_euler_is_what_its_formula_says_and_spirals_outward_where_kahan
 
 
 def test_more_orbits_are_one_cloud_with_a_colour_for_each_the_widest_first():
-    figure = draw_portrait(portrait_of(orbits(8), AXES), STYLE)
+    figure = plot_portrait(portrait_of(orbits(8), AXES), STYLE)
     (cloud,) = (c for c in figure.axes[0].collections if isinstance(c, PathCollection))
     # the starts are farther and farther from the equilibrium
     assert cloud.get_array().tolist() == [k for k in range(7, -1, -1) for _ in range(21)]
@@ -70,7 +70,7 @@ def test_points_outside_the_window_do_not_spoil_the_colours():
     values = np.append(np.linspace(0, 1, 50), [1e6] * 20)
     found = trajectories(np.stack([values, values], axis=1)[:, None])
     shown = portrait_of(found, AXES, colour=AXES[0], window=((0, 2), (0, 2)))
-    axes = draw_portrait(shown, STYLE).axes[0]
+    axes = plot_portrait(shown, STYLE).axes[0]
     assert axes.collections[0].norm.vmax == 1
     assert (axes.get_xlim(), axes.get_ylim(), shown.left_out) == ((0, 2), (0, 2), 20)
 
@@ -80,7 +80,7 @@ def test_points_outside_the_window_are_not_drawn_in_space():
     found = walked(ensemble_for(top, "1/10", np.array([[1.0, 0.5, 0.2]]), 100), 100)
     axes = [point_function(name, top.variables) for name in top.variables]
     shown = portrait_of(found, axes, window=((0, 2), (-2, 2), (-2, 2)))
-    (line, *_) = draw_portrait(shown, STYLE).axes[0].lines
+    (line, *_) = plot_portrait(shown, STYLE).axes[0].lines
     x = np.asarray(line.get_data_3d()[0], dtype=float)
     assert np.isnan(x).sum() == shown.left_out
     assert np.nanmin(x) >= 0
@@ -88,9 +88,9 @@ def test_points_outside_the_window_are_not_drawn_in_space():
 
 def test_no_line_goes_through_a_missing_point_and_no_points_at_all_are_an_empty_picture():
     shown = portrait_of(trajectories([[[0, 0]], [[1, 1]], [[np.nan, np.nan]], [[3, 0]]]), AXES, colour="step")
-    assert len(draw_portrait(shown, STYLE, lines=True).axes[0].collections[0].get_segments()) == 1
+    assert len(plot_portrait(shown, STYLE, lines=True).axes[0].collections[0].get_segments()) == 1
     found = trajectories(np.full((2, 1, 2), np.nan))
-    assert picture_bytes(draw_portrait(portrait_of(found, AXES, colour="step"), STYLE), "png", STYLE)
+    assert picture_bytes(plot_portrait(portrait_of(found, AXES, colour="step"), STYLE), "png", STYLE)
 
 
 # Neighbours on a curve

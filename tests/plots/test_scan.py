@@ -6,7 +6,7 @@ import pytest
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.scan.scan import scan
-from kahanmaps.plots.scan import draw_scan
+from kahanmaps.plots.scan import plot_scan
 
 PLANE = """variables = ["x", "y"]
 parameters = { a = 1, b = 1 }
@@ -30,7 +30,7 @@ def of_growth(found, kind):
 
 
 def test_marks_are_the_points_of_each_kind_of_growth(found):
-    figure = draw_scan(found)
+    figure = plot_scan(found)
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     kinds = [kind for kind in ("bounded", "linear", "quadratic", "exponential") if of_growth(found, kind)]
     assert len(kinds) > 2
@@ -41,7 +41,7 @@ def test_marks_are_the_points_of_each_kind_of_growth(found):
 
 
 def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_them(found):
-    figure = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0)))
+    figure = plot_scan(found, window=((-2.0, 2.0), (-2.0, 2.0)))
     [axes] = figure.axes
     a, b = np.concatenate(axes.collections[1].get_segments()).T  # those of linear growth
     assert len(a) > 50
@@ -63,17 +63,17 @@ def test_a_scan_without_conditions_is_an_empty_plane_and_one_of_another_dimensio
     none, line = (
         scan(parse_system(PLANE), over, terms=1, primes=[5, 7, 11], effort=-20) for over in (["a", "b"], ["a"])
     )
-    assert draw_scan(none).legends == []
+    assert plot_scan(none).legends == []
     with pytest.raises(InputError, match="expected two parameters"):
-        draw_scan(line)
+        plot_scan(line)
 
 
 def test_the_plane_modulo_a_prime_has_every_slow_member(found):
-    [axes] = draw_scan(found, modulo=13).axes
+    [axes] = plot_scan(found, modulo=13).axes
     sweep = next(one for one in found.sweeps if one.prime == 13)
     drawn = [tuple(point) for line in axes.lines for point in line.get_xydata().tolist()]
     assert sorted(drawn) == sorted(sweep.slow)
     a, b = {text.get_text(): text.xy for text in axes.texts}["2*a*b - a - b = 0"]
     assert (2 * a * b - a - b) % 13 == 0
     with pytest.raises(InputError, match="expected one modulo which all members were tried: 11, 13, 17"):
-        draw_scan(found, modulo=19)
+        plot_scan(found, modulo=19)

@@ -9,15 +9,15 @@ from flint import fmpq
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
+from kahanmaps.family.random_members import parse_chi, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots import squares as module
 from kahanmaps.plots.squares import (
     MapPair,
     _in_two_digits,
-    draw_squares,
     pair_of_systems,
     pairs_of_member,
+    plot_squares,
     squares,
     widest_axes,
 )
@@ -94,7 +94,7 @@ def test_numbers_that_grow_too_long_are_left_out_and_wrong_numbers_of_steps_refu
 
 
 def test_the_chosen_signs_are_drawn_and_their_neighbour():
-    member = replace(draw_with_eigenvalues([1, 2, 3], seed=1), signs=(1, -1, 1))
+    member = replace(random_member_with_eigenvalues([1, 2, 3], seed=1), signs=(1, -1, 1))
     pair, control = pairs_of_member(SystemFile.from_member(member))
     assert pair.names == ("f_+-+", "f_+--")
     assert pair.f == member.chosen.system
@@ -109,7 +109,7 @@ def test_members_are_recognised_in_the_plane_with_twice_the_system_as_the_contro
 
 
 def test_an_irreducible_chi_leaves_a_map_and_its_inverse():
-    pair, _ = pairs_of_member(SystemFile.from_member(draw_with_chi(parse_chi("t^2 - 2"), seed=3)))
+    pair, _ = pairs_of_member(SystemFile.from_member(random_member_with_chi(parse_chi("t^2 - 2"), seed=3)))
     found = squares(pair, START, "1/50")
     assert found.g_after_f[1][1] == found.g_after_f[0][0]
 
@@ -140,14 +140,14 @@ def test_axes_in_which_nothing_moves_are_not_chosen():
 
 
 def test_rings_hold_their_dots_exactly_where_the_maps_commute(both):
-    for panel, found in zip(draw_squares(both, STYLE).axes, both, strict=True):
+    for panel, found in zip(plot_squares(both, STYLE).axes, both, strict=True):
         rings, dots = (np.array(line.get_data()) for line in panel.lines if line.get_marker() == "o")
         assert np.array_equal(rings, dots) is (found.closes is True)
         assert rings.shape == (2, 9)
 
 
 def test_a_small_gap_is_shown_magnified_by_a_number_without_computer_notation(both):
-    closed, open_ = draw_squares(both, STYLE).axes
+    closed, open_ = plot_squares(both, STYLE).axes
     assert (len(closed.child_axes), len(open_.child_axes)) == (0, 1)
     assert open_.child_axes[0].texts[0].get_text().startswith(r"$\times")
     numbers = {6.08: "6.1", 183.0: "180", 0.52: "0.52", 1.26e6: r"1.3\cdot10^{6}"}

@@ -39,7 +39,7 @@ def drawn():
 
 @pytest.fixture(scope="module")
 def paper():
-    member = km.SystemFile.from_member(km.draw_with_eigenvalues([1, -2], seed=7), "pair")
+    member = km.SystemFile.from_member(km.random_member_with_eigenvalues([1, -2], seed=7), "pair")
     return member, km.verify(member, options=VerifyOptions(sections=(5, 8)))
 
 
@@ -181,7 +181,7 @@ def test_a_refuted_claim_stands_open_and_a_control_does_not():
     file = km.parse_system('variables = ["x"]\n[system]\nrhs = ["x^2"]\n[integrals]\nI = "x"', "wrong")
     html = report_html(km.check_integrals(file), file=file, pictures=False)
     assert html.count('open="open"') == 1
-    pair = km.SystemFile.from_member(km.draw_with_eigenvalues([1, -2], seed=7))
+    pair = km.SystemFile.from_member(km.random_member_with_eigenvalues([1, -2], seed=7))
     html = report_html(km.check_commute(pair), file=pair, pictures=False)
     assert "as expected" in Page(html).text
     assert 'open="open"' not in html

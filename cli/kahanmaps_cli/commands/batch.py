@@ -480,7 +480,7 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
             return
         stream: Any = sys.stdout
         if output not in (None, "-"):  # a file is complete or is not there
-            stream = codecs.getwriter("utf-8")(stack.enter_context(lib.whole_file(str(output))))
+            stream = codecs.getwriter("utf-8")(stack.enter_context(lib.atomic_write(str(output))))
         if form == "csv":
             lib.write_csv(rows, stream, stable=stable)
         else:

@@ -75,7 +75,7 @@ def _write(text: str, name: str, language: str, output: str | None, quiet: bool)
     if output is None or output == "-":
         click.echo(text, nl=False)
         return
-    lib.write_whole(output, text.encode())
+    lib.write_atomically(output, text.encode())
     if not quiet:
         say(f"{output}: {name} for {language}, {len(text.splitlines())} lines")
 

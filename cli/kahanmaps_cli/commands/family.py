@@ -99,17 +99,17 @@ def draw_member(
         values = lib.parse_point(eigenvalues)
         if m is not None and m != len(values):
             raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
-        return lib.draw_with_eigenvalues(values, seed, size or 2)
+        return lib.random_member_with_eigenvalues(values, seed, size or 2)
     if chi is not None:
         polynomial = lib.parse_chi(chi)
         if m is not None and m != polynomial.degree():
             raise click.UsageError(f"chi has degree {polynomial.degree()}, expected m = {m}")
-        return lib.draw_with_chi(polynomial, seed, size or 1)
+        return lib.random_member_with_chi(polynomial, seed, size or 1)
     if m is None:
         raise click.UsageError("missing --m M (half the dimension), or --eigenvalues L1,L2,..., or --chi EXPR")
     if generic:
-        return lib.draw_generic(m, seed, size or 1)
-    return lib.draw_with_eigenvalues(lib.random_eigenvalues(m, seed), seed, size or 2)
+        return lib.random_member(m, seed, size or 1)
+    return lib.random_member_with_eigenvalues(lib.random_eigenvalues(m, seed), seed, size or 2)
 
 
 @command.command("show")
@@ -131,12 +131,12 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     file = opt.load_system(system, options)
     recognised, member = None, file.member
     if member is None:
-        hamiltonian = file.hamiltonian or lib.recognised_hamiltonian(file.system)
-        recognised = None if hamiltonian is None else lib.recognised_member(hamiltonian)
+        hamiltonian = file.hamiltonian or lib.find_cubic_hamiltonian(file.system)
+        recognised = None if hamiltonian is None else lib.find_family_structure(hamiltonian)
         if recognised is None:
             raise lib.InputError(
                 f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all "
-                f"the same was looked for and not found: {lib.reason_against(hamiltonian)}"
+                f"the same was looked for and not found: {lib.why_not_member(hamiltonian)}"
             )
         member = recognised.member
     data: dict[str, Any] = {
@@ -369,7 +369,7 @@ def _write(file: lib.SystemFile, output: str | None) -> None:
     if output is None:
         click.echo(text, nl=False)
         return
-    lib.write_whole(output, text.encode())
+    lib.write_atomically(output, text.encode())
 
 
 def _print_matrix(matrix: Any) -> None:

@@ -106,7 +106,7 @@ def command(system: str | None, **options: Any) -> int:
     named = [(one.name, one, f"{one.origin}: ") for one in every]
     print_search("find-integrals", found, search, options, named, _count(found))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
-        for one in found.in_time:
+        for one in found.time_dependent:
             where = "" if found.flow else "of the n-th point: "
             tell(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\t{where}depends on time")
         for status, text in () if beside is None else beside.lines(others=False):

@@ -145,7 +145,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 def _numbers(start: lib.AlgebraicPoint, arithmetic: lib.Arithmetic) -> Any:
     """The coordinates in the numbers that the orbit is computed in."""
     if arithmetic.kind == "float":
-        return start.rounded()
+        return start.real_approximation()
     if arithmetic == ("ball", 0):
         raise click.UsageError(
             "found an algebraic start with --arithmetic ball:auto, expected exact, mod:P or ball:BITS"

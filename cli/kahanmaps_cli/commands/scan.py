@@ -88,6 +88,6 @@ def _write(found: lib.Scan, folder: str, quiet: bool) -> None:
     for path in earlier.difference(paths):
         path.unlink()
     for path, one in zip(paths, known, strict=True):
-        lib.write_whole(str(path), found.member(one).to_toml().encode())
+        lib.write_atomically(str(path), found.member(one).to_toml().encode())
     if not quiet:
         say(f"{folder}: {len(known)} system files")

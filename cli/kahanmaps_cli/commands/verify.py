@@ -121,7 +121,7 @@ def command(system: str | None, **options: Any) -> int:
             options["sections"] or None, options["order"], options["ball_bits"], options["controls"], options["beyond"]
         )
         if options["beyond"] and not options["controls"]:
-            report = lib.survivors(3 if drawn["m"] is None else drawn["m"], settings)
+            report = lib.beyond_table(3 if drawn["m"] is None else drawn["m"], settings)
         elif options["universal"] or options["beyond"]:
             report = lib.verify(None, settings, what, m=3 if drawn["m"] is None else drawn["m"])
         else:

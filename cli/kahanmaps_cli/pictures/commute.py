@@ -58,7 +58,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
         pairs = [lib.pair_of_systems(file, second, eps, options["eps2"])]
     found = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
-    figure = lib.draw_squares(found, options["style"], chosen, captions)
+    figure = lib.plot_squares(found, options["style"], chosen, captions)
     talk = []
     for square in found:
         names = captions[0] if captions else " and ".join(square.pair.names)

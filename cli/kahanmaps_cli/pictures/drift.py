@@ -60,21 +60,21 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     written).
     """
     file = load_system(options["system"], options)
-    rounded = file.rounded
-    system = rounded.system  # it is compared with methods for vector fields
+    real_approximation = file.real_approximation
+    system = real_approximation.system  # it is compared with methods for vector fields
     eps = the_eps(options["eps"], options["time_step"])
     if eps == 0:
         raise lib.InputError("found eps = 0, expected another number: nothing moves")
     talk: list[str] = []
     if options["integrals"]:
-        functions = lib.asked_functions(rounded, eps, options["integrals"])
+        functions = lib.asked_functions(real_approximation, eps, options["integrals"])
     else:
-        known = lib.known_functions(rounded, eps)
+        known = lib.known_functions(real_approximation, eps)
         own = [function for function in known if function.name != "H"]
         if len(own) > _MAX_INTEGRALS:
             talk.append(f"shown: {_MAX_INTEGRALS} of {len(own)} known integrals; --integral NAME shows others")
         functions = own[:_MAX_INTEGRALS] + [function for function in known if function.name == "H"]
-    form, reason = lib.float_normal_form(rounded)
+    form, reason = lib.float_normal_form(real_approximation)
     methods = options["methods"] or [name for name in lib.METHODS if name != "normal-form" or form is not None]
     if "normal-form" in methods and form is None:
         raise lib.InputError(f"the method normal-form needs a normal form, and there is none: {reason}")
@@ -91,7 +91,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         progress=progress,
     )
     early = not all(end.is_whole for end in survey.ends.values())
-    figure = lib.draw_drift(survey, options["style"], scale=options["scale"])
+    figure = lib.plot_drift(survey, options["style"], scale=options["scale"])
     return Drawn(figure, file, [*talk, *_told(survey)], 3 if early else 0)
 
 

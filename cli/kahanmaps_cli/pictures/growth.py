@@ -82,7 +82,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawn:
         add(file.label, found)
         if not is_done(found, None):
             early.append(f"{file.label}: stopped early: {found.message}")
-    figure = lib.draw_degrees(growths, options["style"], scale=options["scale"])
+    figure = lib.plot_degrees(growths, options["style"], scale=options["scale"])
     return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early or progress.is_over else 0)
 
 
@@ -128,7 +128,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawn:
         eps = opt.the_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
         curves, whole = lib.height_curves(survey), survey.is_whole
-    figure = lib.draw_heights(curves, options["style"], scale=options["scale"])
+    figure = lib.plot_heights(curves, options["style"], scale=options["scale"])
     talk = []
     if short := sum(curve.status == "budget" for curve in curves):
         talk.append(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {digits}")

@@ -60,7 +60,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     found = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
     texts = [lib.format_point(start) for start in options["starts"]]
     labels = [f"start {text if len(text) <= 30 else text[:30] + '...'}" for text in texts]
-    figure = lib.draw_invariant_curves(
+    figure = lib.plot_invariant_curves(
         found, options["style"], options["projective"], options["flow"], original, labels
     )
     is_whole = all(pole is None for pole in found.poles)

@@ -132,7 +132,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
             notes.append(f"{missing} of {len(values)} levels of {levels.name} have no curve in the window")
         shown = replace(shown, levels=curves)
     note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
-    figure = lib.draw_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
+    figure = lib.plot_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
 
     orbits = counted(found.orbits, "orbit")
     origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from chosen starts"

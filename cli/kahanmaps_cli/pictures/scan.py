@@ -53,4 +53,4 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         return Drawn(
             None, talk=["there is no picture: nothing to be drawn was found before the scan ended"], status=status
         )
-    return Drawn(lib.draw_scan(found, options["style"], window=window, modulo=modulo), found.file, status=status)
+    return Drawn(lib.plot_scan(found, options["style"], window=window, modulo=modulo), found.file, status=status)

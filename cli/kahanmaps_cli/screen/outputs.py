@@ -112,7 +112,7 @@ def deliver(path: str, content: bytes) -> bool:
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
         return False
-    lib.write_whole(path, content)
+    lib.write_atomically(path, content)
     return True
 
 

@@ -9,7 +9,7 @@ from kahanmaps.display.latex import latex_name, latex_number, latex_polynomial, 
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.structured_facts import relations
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps_docs.literature import KEY, link
 from kahanmaps_docs.markdown import code, plain, table
 
@@ -56,7 +56,7 @@ def section(file: SystemFile) -> str:
 
 def formulas(file: SystemFile) -> list[str]:
     """The equations, H, integrals and density in LaTeX."""
-    if isinstance(file.map, Kahan):  # with eps in its coefficients, if it was repaired
+    if isinstance(file.map, KahanFamily):  # with eps in its coefficients, if it was repaired
         sides = zip(file.variables, file.map.system.rhs, strict=True)
         rows = [rf"{latex_name(x)}^\prime &= {latex_polynomial(f)}" for x, f in sides]
     elif file.map.image is not None:

@@ -30,10 +30,10 @@ from math import inf
 from typing import IO, Any
 
 from kahanmaps.algebra.printing import NUMBER, csv_line, guarded
+from kahanmaps.atomic_files import atomic_write
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.records import Row, encodable
 from kahanmaps.version import __version__
-from kahanmaps.whole_files import whole_file
 
 BEFORE = ("experiment", "number", "key", "task")
 BETWEEN = ("outcome", "verdict")
@@ -175,7 +175,7 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
         [arrow.field(plain(name), types[kind]) for name, kind in fields.items()],
         metadata={"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__},
     )
-    with whole_file(path) as stream, parquet.ParquetWriter(stream, schema) as writer:
+    with atomic_write(path) as stream, parquet.ParquetWriter(stream, schema) as writer:
 
         def write(group: list[dict[str, Any]]) -> None:
             try:

@@ -69,8 +69,8 @@ class Task:
     @property
     def documents(self) -> list[str]:
         """The digests of the documents that it needs, those of its system and of a second one."""
-        recipes = (self.system, self.options.get("other"))
-        return [recipe["document"] for recipe in recipes if isinstance(recipe, Mapping) and "document" in recipe]
+        system_spec = (self.system, self.options.get("other"))
+        return [recipe["document"] for recipe in system_spec if isinstance(recipe, Mapping) and "document" in recipe]
 
     @classmethod
     def from_text(cls, text: str) -> Task:

@@ -62,7 +62,7 @@ def of_integrals(found: Findings) -> Iterator[Statement]:
     if (search := found.integrals) is not None:
         texts = [(one, one.short_text) for one in search.integrals] + [(one, one.text) for one in search.in_iterates]
         yield from (Statement(one.verdict, f"{one.name} = {text}  [{one.origin}]") for one, text in texts)
-        for timed in search.in_time:
+        for timed in search.time_dependent:
             text = f"{timed.name} = {timed.text} at the n-th point, an integral that depends on n"
             yield Statement(timed.integral.verdict, text)
         profile = search.profile
@@ -129,9 +129,9 @@ def of_densities(found: Findings) -> Iterator[Statement]:
             yield Statement(NOTE, f"so is dx/phi for this phi times {times}")
     else:
         yield Statement(MEASURED if search.none_there else UNDECIDED, search.reason)
-    if search.turning is not None:
-        text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.turning.text}"
-        yield Statement(search.turning.verdict, text)
+    if search.anti_invariant is not None:
+        text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.anti_invariant.text}"
+        yield Statement(search.anti_invariant.verdict, text)
 
 
 def of_flow(found: Findings) -> Iterator[Statement]:

@@ -29,7 +29,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import Budget, count
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel, row_units
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import Map, MapFamily
 
 _MINORS = 5  # the largest dimension in which minors are taken
 _MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^60
@@ -58,7 +58,7 @@ class Stopped(Exception):
         self.ended, self.message = ended, message
 
 
-def reduced(map_: BirationalMap, eps: fmpq | None, rng: random.Random) -> MapOver:
+def reduced(map_: MapFamily, eps: fmpq | None, rng: random.Random) -> Map:
     """The map modulo a random prime of 61 bits, at a random eps where none is given. Raises BadPrime."""
     field = GF(random_prime(rng))
     return map_.at(field.random(rng) if eps is None else field.convert(eps), field)
@@ -72,7 +72,7 @@ class Line:
 
     def __init__(
         self,
-        map_: MapOver,
+        map_: Map,
         rng: random.Random,
         budget: Budget,
         max_degree: int,

@@ -25,7 +25,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.printing import attributes, format_number
 from kahanmaps.algebra.work import Budget
@@ -36,7 +36,7 @@ from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import ITERATE_DEGREE, budget_for
 from kahanmaps.laboratory.growth.curves import Ended, Line, Stopped, reduced
-from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
+from kahanmaps.laboratory.growth.degree_bounds import DynamicalDegreeBounds, bound_dynamical_degree
 from kahanmaps.laboratory.growth.proofs import (
     GrowthProof,
     exponent_matrix,
@@ -51,7 +51,7 @@ from kahanmaps.laboratory.singular.singularities import MAX_STEPS, WRITTEN_DIMEN
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
 from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 
 _MOST_TERMS = 10_000
@@ -83,7 +83,7 @@ class DegreeGrowth(Printed):
     residues: tuple[int, ...]
     notes: tuple[str, ...] = ()
     patterns: Patterns | None = None
-    enclosure: Enclosure | None = None
+    enclosure: DynamicalDegreeBounds | None = None
     proof: GrowthProof | None = None
 
     @cached_property
@@ -323,7 +323,7 @@ def degree_growth(
 class _Search:
     """The lines, and the degrees found on them so far."""
 
-    map: BirationalMap
+    map: MapFamily
     eps: fmpq | None
     budget: Budget
     max_degree: int
@@ -358,7 +358,7 @@ class _Search:
             message = message or f"degrees of {iterates} by powers of the exponent matrix"
             return self.result(ended, message, proof=periodic or proof)
 
-        rng = random.Random(f"degrees {seed_for(self.seed, self.map.subject, self.eps)}")
+        rng = random.Random(f"degrees {derive_seed(self.seed, self.map.subject, self.eps)}")
 
         def line() -> Line:
             while True:
@@ -394,7 +394,7 @@ class _Search:
         if not enclosed or (found.growth is not Growth.EXPONENTIAL and not found.looks_exponential):
             return found
         self.measured = found
-        enclosure = enclose(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
+        enclosure = bound_dynamical_degree(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
         if enclosure is None and self.map.dim == 2 and self.budget.is_spent:
             unproved = "the budget was spent before bounds of the dynamical degree were proved (--effort)"
             return replace(found, notes=(*found.notes, unproved))

@@ -14,7 +14,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.printing import attributes, format_point
 from kahanmaps.algebra.work import Budget
@@ -155,7 +155,7 @@ def height_survey(
     field = "" if map_.root is None else map_.root.number_field.name
     for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
         over = map_.at(value)
-        rng = random.Random(f"heights {seed_for(seed, map_.subject, value)}")
+        rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")
         wanted = [None] * starts if isinstance(starts, int) else [tuple(map(rational, start)) for start in starts]
         for k, start in enumerate(wanted):
             if orbits and budget.is_spent:

@@ -22,7 +22,7 @@ from kahanmaps.algebra.printing import attributes
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth.recurrences import GrowthRate, growth_rate, polynomial_growth
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 
 _BUDGET = 1_000_000  # products of terms, to compose formulas
 _MAX_FACTORS = 24  # of a composition
@@ -53,7 +53,7 @@ class GrowthProof:
         return attributes(self, "reason", "period", "is_identity")
 
 
-def exponent_matrix(map_: BirationalMap, eps: fmpq | None) -> fmpz_mat | None:
+def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
     """The matrix A of a monomial map x~_i = c_i x^(a_i), at one eps or (None) over Q(eps); None for other maps.
 
     A composition of monomial maps is one: its matrix is the product of theirs.
@@ -120,7 +120,7 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
     return GrowthProof(polynomial_growth(power), power, rate, f"powers of the exponent matrix {rows} of a monomial map")
 
 
-def monomial_period(map_: BirationalMap, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
+def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
     """The proof that a monomial map with this exponent matrix is periodic; None where it is not, or is the identity.
 
     If A^n = 1, the iterate n multiplies each variable by a number or a function of eps. Its order is then 1 or 2.
@@ -167,7 +167,7 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
         bits *= 2
 
 
-def linear_iterate(map_: BirationalMap, eps: fmpq | None, period: int) -> GrowthProof | None:
+def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProof | None:
     """The proof that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
 
     Exact, by composing formulas. None where it is not, and where the formulas have too many terms. Of a linear iterate

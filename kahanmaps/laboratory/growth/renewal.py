@@ -19,11 +19,11 @@ from collections.abc import Sequence
 from flint import fmpz_poly
 
 from kahanmaps.laboratory.growth.recurrences import Recurrence, find_recurrence, needed_checks
-from kahanmaps.laboratory.singular.following import Fraction, Orders
+from kahanmaps.laboratory.singular.following import Fraction, OrbitData
 
 
 def degree_series(
-    degrees: Sequence[int], hypersurfaces: Sequence[tuple[int, Orders]], stages: Sequence[int] = ()
+    degrees: Sequence[int], hypersurfaces: Sequence[tuple[int, OrbitData]], stages: Sequence[int] = ()
 ) -> Fraction:
     """The generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms.
 
@@ -33,13 +33,13 @@ def degree_series(
     given. These are settled ones, and the columns nu follow the hypersurfaces; orders beyond what is known must not be
     `needed`. Exact. Source: docs/mathematics.md.
 
-    >>> free = Orders((), (), 0, True)
+    >>> free = OrbitData((), (), 0, True)
     >>> degree_series([2], [(1, free)])
     (1, (-2)*x + 1)
     >>> degree_series([2, 3], [])
     (1, (-6)*x^2 + 1)
-    >>> degree_series([3], [(2, Orders(((0, 0, 0), (0, 1, 2), (2, 0, 0)), (), 0, True)),
-    ...                   (2, Orders(((0, 0, 0), (0, 2, 1), (2, 0, 0)), (), 0, True))])
+    >>> degree_series([3], [(2, OrbitData(((0, 0, 0), (0, 1, 2), (2, 0, 0)), (), 0, True)),
+    ...                   (2, OrbitData(((0, 0, 0), (0, 2, 1), (2, 0, 0)), (), 0, True))])
     (3*x^2 + 1, (-1)*x^3 + 3*x^2 + (-3)*x + 1)
     """
     z, one, zero = fmpz_poly([0, 1]), fmpz_poly([1]), fmpz_poly([])
@@ -92,14 +92,14 @@ def degree_series(
     return above * sign, below * sign
 
 
-def needed(every: Sequence[Orders]) -> list[int] | None:
+def needed(every: Sequence[OrbitData]) -> list[int] | None:
     """The hypersurfaces of which the degrees of preimages are needed for those of the iterates; None if unknown ones.
 
     Those that lower degrees, and those that meet such ones or others that do. Orders `beyond` what is known are unknown
     ones where they are those of hypersurfaces needed.
 
-    >>> attracted = Orders(((0, 2),), (), 9, True, beyond=(0,))
-    >>> needed([attracted]), needed([Orders(((1, 0),), (), 9, True), Orders(((0, 1),), (), 9, True, beyond=(0,))])
+    >>> attracted = OrbitData(((0, 2),), (), 9, True, beyond=(0,))
+    >>> needed([attracted]), needed([OrbitData(((1, 0),), (), 9, True), OrbitData(((0, 1),), (), 9, True, beyond=(0,))])
     ([], None)
     """
     chains = [[k] for k in range(len(every))]  # each with those that it becomes, in this order
@@ -160,7 +160,7 @@ def coefficients(series: Fraction, count: int) -> list[int]:
     return found
 
 
-def _through_returns(every: Sequence[Orders], start: int, column: int) -> Fraction:
+def _through_returns(every: Sequence[OrbitData], start: int, column: int) -> Fraction:
     """The generating function of a column for one hypersurface, those that it becomes later included."""
     z = fmpz_poly([0, 1])
     k, shift, above = start, 0, fmpz_poly([])

@@ -85,7 +85,7 @@ class DensitySearch(Search):
     degree: int
     cut: str
     period: int | None = None
-    turning: FoundDensity | None = None
+    anti_invariant: FoundDensity | None = None
 
     @property
     def none_there(self) -> bool:
@@ -95,7 +95,7 @@ class DensitySearch(Search):
     @property
     def is_open(self) -> bool:
         """Whether nothing was found of a map, so that factors of integrals may be tried."""
-        return not (self.densities or self.turning or self.flow)
+        return not (self.densities or self.anti_invariant or self.flow)
 
     @property
     def reason(self) -> str:
@@ -123,10 +123,10 @@ class DensitySearch(Search):
     def note(self) -> str:
         """That orbits close, and for which eps; of which phi the sign changes; empty where there is nothing to say."""
         closes = closing_note(self.period, self.eps, self.file.map)
-        if self.turning is None:
+        if self.anti_invariant is None:
             return closes
-        turns = f"|dx/phi| is invariant for phi = {self.turning.text}: phi(x~) = -det dPhi(x) phi(x)"
-        return "; ".join(filter(None, (f"{turns} ({self.turning.verdict})", closes)))
+        turns = f"|dx/phi| is invariant for phi = {self.anti_invariant.text}: phi(x~) = -det dPhi(x) phi(x)"
+        return "; ".join(filter(None, (f"{turns} ({self.anti_invariant.verdict})", closes)))
 
     def rows(self) -> list[dict[str, str]]:
         """A row for each formula, for `pandas.DataFrame(found.rows())` and the like."""
@@ -207,14 +207,14 @@ def densities_of(
     if laboratory.defect:
         return DensitySearch(*laboratory.asked, (), -1, laboratory.defect, flow=flow)
     period = None if flow else closing_period(laboratory.maps)
-    product = turning = None
+    product = anti_invariant = None
     theorem, dim, cut = _theorem(laboratory), laboratory.map.dim, ""
     if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
         densities, tried = [theorem], theorem.degree(dim)
     else:
         progress("densities that are products")
         stages = budget.share([1, 2, 2])  # products; polynomials; integrals, for their factors
-        product, turning = _products(laboratory, max_degree, next(stages))
+        product, anti_invariant = _products(laboratory, max_degree, next(stages))
         # The first search for integrals is worth as much as high degrees; a caller who has done it needs none.
         second = budget if integrals is not None or product is not None else next(stages)
         densities, tried, cut = _search(laboratory, product, max_degree, second, progress)
@@ -225,7 +225,7 @@ def densities_of(
             phi = RationalFunction(prod(x[:dim], start=x[0] ** 0), x[0] ** 0)
             proof = product_density_invariant(laboratory.system, phi)
             densities = densities if proof is None else [FoundDensity(phi, Certainty.PROVED, proof), *densities]
-    found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, turning, flow=flow)
+    found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, anti_invariant, flow=flow)
     if found.is_open:
         if integrals is None:
             file, symbols, eps, seed, _ = laboratory.asked
@@ -245,10 +245,14 @@ def with_factors(
     laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed, algebraic=True)
     if laboratory.defect:
         return found
-    product, turning = _products(laboratory, max_degree, Budget(), integrals)  # of a map: nothing is sought of a flow
+    product, anti_invariant = _products(
+        laboratory, max_degree, Budget(), integrals
+    )  # of a map: nothing is sought of a flow
     if product is None:
-        return replace(found, turning=turning)
-    return replace(found, densities=(product,), degree=product.degree(laboratory.map.dim), turning=turning)
+        return replace(found, anti_invariant=anti_invariant)
+    return replace(
+        found, densities=(product,), degree=product.degree(laboratory.map.dim), anti_invariant=anti_invariant
+    )
 
 
 def _search(
@@ -291,7 +295,7 @@ def _search(
                     reason = f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
                 for P in [] if forms.bases is None else forms.bases[0]:
                     phi = RationalFunction(P, P.context().constant(1))
-                    verdict, evidence = _judged(laboratory, phi)
+                    verdict, evidence = _certified(laboratory, phi)
                     found += [FoundDensity(phi, verdict, evidence)] if verdict.holds else []
                     reason = f"a density of degree {degree} that was found modulo primes did not pass as an identity"
                 if found or product is None:
@@ -314,14 +318,14 @@ def _products(
         return None, None
     if found is None or (phi := found.function) is None:
         return None, None
-    verdict, evidence = _judged(laboratory, phi, found.constant)
+    verdict, evidence = _certified(laboratory, phi, found.constant)
     one = FoundDensity(phi, verdict, evidence, found.text)
     if not verdict.holds or (max_degree is not None and one.degree(laboratory.map.dim) > max_degree):
         return None, None
     return (one, None) if found.constant.numerator == found.constant.denominator else (None, one)
 
 
-def _judged(
+def _certified(
     laboratory: Laboratory, phi: RationalFunction, factor: RationalFunction | None = None
 ) -> tuple[Certainty, Evidence]:
     """The verdict on dx/phi: by the lemma on Lotka-Volterra systems, or as an identity."""

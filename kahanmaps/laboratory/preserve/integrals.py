@@ -93,7 +93,7 @@ class FoundIntegral:
 
 
 @dataclass(frozen=True)
-class TimedIntegral:
+class TimeDependentIntegral:
     """An integral c^-n I(x) that depends on time, x being the n-th point of an orbit: I(x~) = c I(x), c a number.
 
     Of a flow it is exp(-c t) I(x), with I' = c I.
@@ -129,7 +129,7 @@ class TimedIntegral:
 class IntegralSearch(Search):
     """What `find_integrals` found.
 
-    `integrals` are functionally independent, also together with those that depend on time, `in_time`, or those whose
+    `integrals` are functionally independent, also together with those that depend on time, `time_dependent`, or those whose
     formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits show (measured);
     `by_theorems` is how many independent integrals the Kahan map has by theorems (hamiltonian_structure.py), `theorems`
     says which (with symbols: at random values). `reason` says what is missing and why, empty where nothing is.
@@ -141,7 +141,7 @@ class IntegralSearch(Search):
     reason: str
     by_theorems: int = 0
     theorems: str = ""
-    in_time: tuple[TimedIntegral, ...] = ()
+    time_dependent: tuple[TimeDependentIntegral, ...] = ()
     in_iterates: tuple[IntegralInIterates, ...] = ()
     period_at_values: int | None = None
 
@@ -213,7 +213,7 @@ class IntegralSearch(Search):
         return {
             **self.of_flow,
             **attributes(self, "integrals"),
-            **attributes(self, "found", "in_time", "in_iterates"),
+            **attributes(self, "found", "time_dependent", "in_iterates"),
             **attributes(self, "codimension", codimension_is_exact="is_exact"),
             **attributes(self, "by_theorems", relations="profile"),
             **attributes(self, "note", "reason", "primes"),
@@ -308,7 +308,7 @@ def integrals_of(
 
     def result(profile: Profile, reason: str) -> IntegralSearch:
         integrals = tuple(collected.integrals), profile, reason, by_theorems, theorems
-        more = tuple(collected.in_time), tuple(collected.in_iterates)
+        more = tuple(collected.time_dependent), tuple(collected.in_iterates)
         return IntegralSearch(*laboratory.asked, *integrals, *more, period_at_values, flow=flow)
 
     def known(map_: ModularMap, x: Point) -> list[list[int]]:
@@ -429,7 +429,7 @@ class _Collected:
         self.cut: list[str] = []
         self._gradients = Independent(laboratory.maps[0])
         self.integrals: list[FoundIntegral] = []
-        self.in_time: list[TimedIntegral] = []
+        self.time_dependent: list[TimeDependentIntegral] = []
         self.in_iterates: list[IntegralInIterates] = []
 
     def offer(self, formulas: Sequence[Formula]) -> None:
@@ -515,9 +515,9 @@ class _Collected:
             return
         written = ((one, one.function) for one in products.integrals)
         self.offer([(function, origin, one.text) for one, function in written if function is not None])
-        for product in products.in_time:
+        for product in products.time_dependent:
             function = product.function
-            if function is None or len(self.integrals) + len(self.in_time) >= laboratory.map.dim:
+            if function is None or len(self.integrals) + len(self.time_dependent) >= laboratory.map.dim:
                 continue
             row = self._gradients.gradient(function)
             if not self._gradients.adds(row):
@@ -525,9 +525,9 @@ class _Collected:
             verdict, evidence = laboratory.verdict_on(function, factor=product.constant)
             if verdict.holds:
                 self._gradients.add(row)
-                name = f"T{len(self.in_time) + 1}"
+                name = f"T{len(self.time_dependent) + 1}"
                 one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
-                self.in_time.append(TimedIntegral(name, one, product.constant, laboratory.flow))
+                self.time_dependent.append(TimeDependentIntegral(name, one, product.constant, laboratory.flow))
 
     def add_in_iterates(self, wanted: int, budget: Budget) -> None:
         """Those in iterates of x, and more of them in x, until there are as many as wanted."""

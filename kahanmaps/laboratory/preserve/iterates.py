@@ -26,20 +26,26 @@ from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import SPENT, Budget
+from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.judge import MAX_DIMENSION
 from kahanmaps.displayed import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.invariants.phase_functions import normalized, orbit_about
-from kahanmaps.laboratory.laboratory import Laboratory, judged
+from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.darboux.cofactors import SearchStep, SpaceSearch
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import LIFTED_DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
+    TWO_POINT_BASES,
+    TWO_POINT_DEGREE,
+    TwoPointBasis,
+    bases_with_spaces,
+    pairs_of,
+)
 from kahanmaps.laboratory.preserve.search import bases_of
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,7 @@ class RatioOfIterates:
     `denominator` are the places of one function or of two: then F_a F_b~ - F_b F_a~ is meant.
     """
 
-    lift: Lift
+    lift: TwoPointBasis
     functions: tuple[fmpq_mpoly, ...]
     numerator: tuple[int, ...]
     denominator: tuple[int, ...]
@@ -169,7 +175,7 @@ def verdict_on_ratio(
         has_eps=map_.has_eps,
         subject=subject,
     )
-    return judged(
+    return certified(
         identity, laboratory.seed, expands=n <= MAX_DIMENSION and all(ratio.length < length for length in hopeless)
     )
 
@@ -203,13 +209,13 @@ def integrals_in_iterates(
     inside, back = (laboratory, None) if level is None else level
     base = inside.maps[0]
     cut = ""
-    for lift in LIFTS if level is not None else LIFTS[1:]:
+    for lift in TWO_POINT_BASES if level is not None else TWO_POINT_BASES[1:]:
         if len(known.rows) >= wanted:
             break
         if budget.is_spent:
             cut = f"{lift.text} were not tried: {SPENT}"
             break
-        for one, spaces in lifts_with_spaces(base, [lift]):
+        for one, spaces in bases_with_spaces(base, [lift]):
             progress(one.text)
             found = SpaceSearch()
             found.add(SearchStep("iterates", 2, None, one.text, one), sorted(spaces, key=lambda space: space.pattern))
@@ -235,18 +241,18 @@ def integrals_in_iterates(
     return plain, ratios, cut
 
 
-def _letters(map_: BirationalMap, shift: int) -> tuple[str, ...]:
+def _letters(map_: MapFamily, shift: int) -> tuple[str, ...]:
     """The names that formulas are in: variables, those of the iterate, symbols, eps."""
     names = map_.variables
     return (*names, *(name + "~" * max(shift, 1) for name in names), *map_.names[len(names) :])
 
 
-def _lettered(P: fmpq_mpoly, lift: Lift, map_: BirationalMap) -> fmpq_mpoly:
+def _lettered(P: fmpq_mpoly, lift: TwoPointBasis, map_: MapFamily) -> fmpq_mpoly:
     """The function of x and its iterate that a polynomial of degree 2 in (variables, symbols, eps) stands for."""
     n, context = map_.dim, ring(_letters(map_, lift.shift))
     one, gens = context.constant(1), context.gens()
     X, Y = (one, *gens[:n]), (one, *gens[n * min(lift.shift, 1) :][:n])
-    places = dict(zip(exponents_up_to(n, LIFTED_DEGREE), pairs_of(n), strict=True))
+    places = dict(zip(exponents_up_to(n, TWO_POINT_DEGREE), pairs_of(n), strict=True))
     total = context.constant(0)
     for monomial, coefficient in P.terms():
         exponents = tuple(map(int, monomial))
@@ -296,7 +302,7 @@ def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, in
     return inside, back
 
 
-def gradient_of(ratio: RatioOfIterates, exact: BirationalMap, map_: ModularMap, point: Point) -> list[int]:
+def gradient_of(ratio: RatioOfIterates, exact: MapFamily, map_: ModularMap, point: Point) -> list[int]:
     """A multiple of the gradient with respect to the first point, on a map modulo a prime."""
     field = DualField(GF(map_.prime))
     values = [field.convert(value) for value in map_.values]

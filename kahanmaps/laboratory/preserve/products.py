@@ -45,7 +45,7 @@ from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
-from kahanmaps.maps.implicit import BirationalMap, StepOver
+from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60
@@ -91,7 +91,7 @@ class Products:
 
     integrals: tuple[Product, ...]
     density: Product | None
-    in_time: tuple[Product, ...]
+    time_dependent: tuple[Product, ...]
 
 
 def candidates(
@@ -128,7 +128,7 @@ def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) ->
 
 
 @counted_cache(4)  # searches for integrals and densities ask for the same, which may take half a second
-def _jacobians(map_: BirationalMap, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
+def _jacobians(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
     """Factors of numerators and denominators of det dPhi^-1 and, with `both`, of det dPhi."""
     n, sides = map_.dim, list[Function]()
     for backward in (False, True) if both else (True,):
@@ -158,7 +158,7 @@ class _Line:
         for one in map_.map.factors:
             self._step(one)
 
-    def _step(self, one: StepOver) -> None:
+    def _step(self, one: ElementaryMap) -> None:
         """One factor further: det of it is its numerator times Z^n over its denominator times Z~^n."""
         p, n, curve = self.prime, one.dim, self.there
         top, size = max(1, one.equation.degree), max(int(entry.degree()) for entry in curve)
@@ -319,13 +319,13 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         ]
         numbers = [K.compose(*[context.constant(0)] * n, *gens[n:], ctx=context) for K in cofactors]
         moving = [K - c for K, c in zip(cofactors, numbers, strict=True)]
-        in_time = []
+        time_dependent = []
         for vector in _reduced(relations(coefficient_rows(moving)), weights):
             total = sum((k * c for k, c in zip(vector, numbers, strict=True)), context.constant(0))
             if vector[0] == 0 and not total.is_zero():
-                in_time.append((vector, RationalFunction(total, context.constant(1))))
+                time_dependent.append((vector, RationalFunction(total, context.constant(1))))
         exact = _reduced(relations(coefficient_rows(cofactors)), weights)
-        return _assembled(polynomials, n, exact, [(one, exact)], in_time)
+        return _assembled(polynomials, n, exact, [(one, exact)], time_dependent)
     line = _Line(laboratory.maps[0])
     here, there = ([line.along(g, place) for g in polynomials] for place in (line.here, line.there))
     # det dPhi and the C_i on a random line, as vectors over a coprime base.
@@ -365,8 +365,8 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         return _reduced(chosen, weights)
 
     exact = with_constant_1([])
-    in_time = [(v, c) for v, c in known if v[0] == 0 and c != one]
-    return _assembled(polynomials, n, exact, [(one, exact), (minus, with_constant_1([minus]))], in_time)
+    time_dependent = [(v, c) for v, c in known if v[0] == 0 and c != one]
+    return _assembled(polynomials, n, exact, [(one, exact), (minus, with_constant_1([minus]))], time_dependent)
 
 
 def _assembled(
@@ -374,7 +374,7 @@ def _assembled(
     n: int,
     exact: Sequence[list[int]],
     of_densities: Sequence[tuple[RationalFunction, Sequence[list[int]]]],
-    in_time: Sequence[tuple[list[int], RationalFunction]],
+    time_dependent: Sequence[tuple[list[int], RationalFunction]],
 ) -> Products:
     """The products: integrals and a density by their vectors, for each constant of one; what depends on time."""
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
@@ -404,7 +404,7 @@ def _assembled(
                 density = product(vector, constant)
             vector = best
     one = of_densities[0][0]
-    return Products(tuple(product(v, one) for v in integrals), density, tuple(product(v, c) for v, c in in_time))
+    return Products(tuple(product(v, one) for v in integrals), density, tuple(product(v, c) for v, c in time_dependent))
 
 
 def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:

@@ -12,7 +12,7 @@ from kahanmaps.displayed import Printed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_told
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 
 _CLOSES_WITHIN = 64  # points of an orbit: as many as relations of some degree take
 
@@ -54,7 +54,7 @@ def closing_period(maps: Sequence[ModularMap]) -> int | None:
     return None if others or period == _CLOSES_WITHIN else period
 
 
-def closing_note(period: int | None, eps: fmpq | None, map_: BirationalMap) -> str:
+def closing_note(period: int | None, eps: fmpq | None, map_: MapFamily) -> str:
     """What orbits that close after `period` steps mean at this eps (None: at every one); empty where they do not.
 
     >>> from kahanmaps.documents.catalog import load

@@ -51,10 +51,10 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     Pattern,
     darboux_spaces,
     gradient_rank,
-    lifted_spaces,
+    two_point_spaces,
 )
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
-from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.maps.kahan import KahanMap
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
@@ -114,7 +114,7 @@ def search(
     Nothing but affine integrals is begun when the `budget` is spent. Raises NoPoint.
     """
     found, wanted = SpaceSearch(), profile.codimension
-    is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMapOver)
+    is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
     affine = affine_space(map_)
     if affine is not None:
         found.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
@@ -192,7 +192,7 @@ def repeat(
             else:
                 group = [cofactor_space(sample, step.product, step.degree, *model)]
         elif step.lift is not None:
-            group = lifted_spaces(map_, step.lift)
+            group = two_point_spaces(map_, step.lift)
         else:
             group = darboux_spaces(map_, step.degree, again.all_spaces) or []
         # In the order of the model, by the places of their zeros and, where these agree, by branches. There may be more

@@ -18,7 +18,7 @@ from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.growth.curves import Line, Stopped
 from kahanmaps.laboratory.scan.sweep import Degrees
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 
 _TRIES = 200
 _PRIMES = 40
@@ -87,7 +87,7 @@ class Scanned:
 
     file: SystemFile
     names: tuple[str, ...]
-    map: BirationalMap
+    map: MapFamily
     eps: fmpq | None
     seed: int
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.work import Budget, units_at
 from kahanmaps.documents.inline import as_file
@@ -34,7 +34,7 @@ from kahanmaps.laboratory.scan.result import STEPS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Choice, Degrees, Sweep, TimeOver, sweep
 from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import processors
 
@@ -147,7 +147,7 @@ def scan(
     if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
         given = ", ".join(map(str, primes))
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
-    rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
+    rng = random.Random(start := f"scan {derive_seed(seed, names, map_.subject, exact)}")
     terms, room, cost = _terms(map_, len(names), exact, terms, rng)
     jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
     most = _PART * budget.units / cost
@@ -398,7 +398,7 @@ def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]
 
 
 def _terms(
-    map_: BirationalMap, count: int, eps: fmpq | None, terms: int | None, rng: random.Random
+    map_: MapFamily, count: int, eps: fmpq | None, terms: int | None, rng: random.Random
 ) -> tuple[int, int, float]:
     """How many iterates are measured, the room that they need, and the units for a member.
 

@@ -17,7 +17,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.errors import InputError
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
@@ -74,7 +74,7 @@ def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.R
 
 
 def sweep(
-    map_: BirationalMap,
+    map_: MapFamily,
     count: int,
     prime: int,
     eps: fmpq | None,

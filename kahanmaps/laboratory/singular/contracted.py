@@ -32,11 +32,11 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.following import AlongCurves, Course, Range, divided
+from kahanmaps.laboratory.singular.following import AlongCurves, Range, TestCurve, divided
 from kahanmaps.laboratory.singular.jets import Function, JetStep, form_order, image_of, modulo, roots_modulo
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import BirationalMap, StepOver
+from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
 Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
 
@@ -113,7 +113,7 @@ _BITS = 31  # of primes: with larger ones python-flint does not order the factor
 Key = tuple[Any, ...]
 
 
-class OrdersUnknown(ArithmeticError):
+class OrbitDataUnknown(ArithmeticError):
     """Why the orders along the hypersurfaces are not known."""
 
 
@@ -150,9 +150,9 @@ class _Curve:
     forms: _Forms
     limits: Range
 
-    def course(self, tracked: AlongCurves) -> Course:
+    def course(self, tracked: AlongCurves) -> TestCurve:
         """The curve as it is followed."""
-        return Course([self.equation], self.point, self.direction, self.limits, tracked)
+        return TestCurve([self.equation], self.point, self.direction, self.limits, tracked)
 
     @property
     def prime(self) -> int:
@@ -177,14 +177,14 @@ class _Curve:
         """
         run = self.course(self).steps(_FIRST)[0]
         if not run:
-            raise OrdersUnknown(
+            raise OrbitDataUnknown(
                 "the budget was spent (--effort), or a curve touches a hypersurface in too high an order"
             )
         is_contracted = image_of([self.inverse], run[0].limit) is None
         return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """The rows of `Orders` for steps along the curve but the last, with forms in place of hypersurfaces."""
+        """The rows of `OrbitData` for steps along the curve but the last, with forms in place of hypersurfaces."""
         return tuple(
             (mu, *level) for mu, level in zip(divided(run, self.own, self.excess), self.levels(run)[1:], strict=False)
         )
@@ -208,20 +208,20 @@ class _Curve:
             for u in one.roots(t):
                 point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
                 return replace(self, point=point)
-        raise OrdersUnknown("a hypersurface without points modulo a prime")
+        raise OrbitDataUnknown("a hypersurface without points modulo a prime")
 
     @cached_property
     def census(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
         """All components on a plane, each with a curve through a point of it; empty where one has no point."""
         try:
             return [(one, self.through(one, self.line)) for one in self.components(self.line)]
-        except OrdersUnknown:
+        except OrbitDataUnknown:
             return []
 
 
 @dataclass(frozen=True)
 class _Resolved:
-    """The orders of hypersurfaces along a curve, from those of forms: the rows of `Orders`.
+    """The orders of hypersurfaces along a curve, from those of forms: the rows of `OrbitData`.
 
     `exponents` are those of the hypersurfaces in the forms; `solved` turns orders back, exactly or not. Without it
     forms are factored on surfaces: `places` has the keys of the hypersurfaces with components of a kind, `keys` those
@@ -249,7 +249,7 @@ class _Resolved:
                 self.told[t] = self._on_surface(column, run[t].curve) if self.solved is None else self.solved * column
             nu = self.told[t]
             if self.exponents * nu != column or any(entry.q != 1 or entry < 0 for entry in nu.entries()):
-                raise OrdersUnknown("the orders of hypersurfaces do not follow from those of forms")
+                raise OrbitDataUnknown("the orders of hypersurfaces do not follow from those of forms")
             found.append((mu, *(int(entry) for entry in nu.entries())))
         return tuple(found)
 
@@ -269,19 +269,19 @@ class _Resolved:
             if all(one.order is not None and one.order < terms for one in found):
                 break
             if terms > largest:
-                raise OrdersUnknown("the image of a curve lies on a critical hypersurface")
+                raise OrbitDataUnknown("the image of a curve lies on a critical hypersurface")
             terms *= 2
         for one in found:
             if one.order:
                 places = self.places.get(one.kind, set())
                 key = next(iter(places)) if len(places) == 1 else self.curve.through(one, cut).key
                 if key not in self.keys:
-                    raise OrdersUnknown("a hypersurface that was not met before")
+                    raise OrbitDataUnknown("a hypersurface that was not met before")
                 nu[self.keys.index(key), 0] += one.order
         return nu
 
 
-def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> tuple[int, list[Hypersurface]]:
+def contracted(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> tuple[int, list[Hypersurface]]:
     """The degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
     Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
@@ -315,10 +315,10 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
                 return degree, _resolved(kinds, forms, degree, zeros)
-            except OrdersUnknown:
+            except OrbitDataUnknown:
                 continue  # a hypersurface without points modulo the primes so far
     if limits.budget.is_spent or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
-        raise OrdersUnknown("the contracted hypersurfaces could not be told apart at random points")
+        raise OrbitDataUnknown("the contracted hypersurfaces could not be told apart at random points")
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
         key: [(curve, curve) for curve in curves] for key, curves in kinds.items()
     }
@@ -344,12 +344,12 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
             sizes = fmpq_mat(len(keys), 1)
             for one, curve in census:
                 if curve.key not in kinds:
-                    raise OrdersUnknown("a hypersurface that was not met before")
+                    raise OrbitDataUnknown("a hypersurface that was not met before")
                 places.setdefault(one.kind, set()).add(curve.key)
                 sizes[keys.index(curve.key), 0] += one.degree
                 followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, places)))
     if exponents * sizes != column or sum(sizes.entries(), fmpq(0)) != zeros:
-        raise OrdersUnknown("not all hypersurfaces were met")
+        raise OrbitDataUnknown("not all hypersurfaces were met")
     # Orders on hypersurfaces that are not contracted have no part in what follows.
     chosen = [k for k, key in enumerate(keys) if key[0]]
     return _followed(followed, [int(size) for size in sizes.entries()], chosen)
@@ -365,9 +365,9 @@ def _followed(
             by_prime = {curve.prime: (curve, tracked) for curve, tracked in pairs}
             orders = [curve.course(tracked).orders(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
             if len(orders) < 2:
-                raise OrdersUnknown("a hypersurface with points modulo one prime only")
+                raise OrbitDataUnknown("a hypersurface with points modulo one prime only")
             if orders[0].known != orders[1].known:
-                raise OrdersUnknown(POINTS_DIFFER)
+                raise OrbitDataUnknown(POINTS_DIFFER)
             along = orders[0].of(columns)
             status = CONFINED if any(row[0] for row in along.rows) else NOT_CONFINED
             known = Hypersurface("Z" if key[2] else "?", size, any(key[1]), 1, status, 1, orders=along)
@@ -377,7 +377,7 @@ def _followed(
 
 
 def _on_line(
-    map_: StepOver, forms: _Forms, functions: tuple[Function, ...], limits: Range, rng: random.Random
+    map_: ElementaryMap, forms: _Forms, functions: tuple[Function, ...], limits: Range, rng: random.Random
 ) -> tuple[int, int, list[_Curve]]:
     """The degree of the map on a random line, the number of points over the closure where forms vanish, and those in
     GF(p), each with the line as a curve through it."""
@@ -398,10 +398,10 @@ def _on_line(
             rest, exponent = rest // value, exponent + 1
         excess.append(exponent)
     if sum(k * int(value.degree()) for k, value in zip(excess, at_points, strict=True)) != common.degree():
-        raise OrdersUnknown("the minors of the equation have a common factor of another kind")
+        raise OrbitDataUnknown("the minors of the equation have a common factor of another kind")
     product = reduce(nmod_poly.__mul__, [*at_points, *at_images])
     if product.is_zero():
-        raise OrdersUnknown("the map or its inverse has no value anywhere")
+        raise OrbitDataUnknown("the map or its inverse has no value anywhere")
     radical = product // product.gcd(product.derivative())
     every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
     points = [tuple((x + s * v) % p for x, v in zip(a, b, strict=True)) for s in roots_modulo(radical)]

@@ -42,7 +42,7 @@ Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 
 
 @dataclass(frozen=True)
-class Orders:
+class OrbitData:
     """The rows (mu, nu_1, nu_2, ...) of the steps 1, 2, ..., and how they go on.
 
     `is_settled`: they are known for all steps. By the recurrences whose characteristic polynomials are given for the
@@ -100,7 +100,7 @@ class Orders:
             "returns": None if self.returns is None else {"after": self.returns[0], "as": f"C{self.returns[1] + 1}"},
         }
 
-    def of(self, hypersurfaces: Sequence[int]) -> Orders:
+    def of(self, hypersurfaces: Sequence[int]) -> OrbitData:
         """The same with the columns of these hypersurfaces only."""
         columns = [0, *(1 + k for k in hypersurfaces)]  # of orders without a return
         rows = tuple(tuple(row[k] for k in columns) for row in self.rows)
@@ -109,7 +109,7 @@ class Orders:
     def generating_function(self, column: int) -> Fraction:
         """The sum of a column's entries times z, z^2, ..., as a fraction of polynomials in z; up to the return.
 
-        >>> Orders(((1,), (2,), (4,)), (fmpz_poly([-2, 1]),)).generating_function(0)
+        >>> OrbitData(((1,), (2,), (4,)), (fmpz_poly([-2, 1]),)).generating_function(0)
         (x, (-2)*x + 1)
         """
         entries = [row[column] for row in self.rows]
@@ -122,11 +122,11 @@ class Orders:
         return fmpz_poly([0, 1]) * above, below
 
 
-NO_ORDERS = Orders(())
+NO_ORBIT_DATA = OrbitData(())
 
 
 class AlongCurves(Protocol):
-    """Functions whose orders are looked at along a curve, and what these make of its steps: the rows of `Orders`."""
+    """Functions whose orders are looked at along a curve, and what these make of its steps: the rows of `OrbitData`."""
 
     @property
     def functions(self) -> tuple[Function, ...]:
@@ -151,7 +151,7 @@ class Tracked:
     critical: int = 0
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """The rows of `Orders` for steps along a curve. Where nothing is tracked det M(x) stands for it."""
+        """The rows of `OrbitData` for steps along a curve. Where nothing is tracked det M(x) stands for it."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
         pairs = zip(divided(run, self.first, self.excess), run, strict=True)
@@ -191,7 +191,7 @@ class Range:
 
 
 @dataclass(frozen=True)
-class Course:
+class TestCurve:
     """The curve point + t direction over GF(p), what moves it and how far, and what is looked at along it."""
 
     equations: Sequence[Equation]
@@ -235,7 +235,7 @@ class Course:
             raise PrecisionTooLow
         return tuple(run)
 
-    def orders_until_return(self, up: int) -> Orders:
+    def orbit_data_until_return(self, up: int) -> OrbitData:
         """The orders along a curve whose hypersurface is one again after the step `up`, until it is a critical one.
 
         From then on they are those of the other.
@@ -249,13 +249,13 @@ class Course:
                 if t >= up and any(nu) and self.tracked.functions:
                     if sorted(nu)[-2:] not in ([1], [0, 1]):
                         raise NotGeneric("a point where several critical hypersurfaces meet")
-                    return Orders(rows[:t], (), t, True, (t, nu.index(1)))
+                    return OrbitData(rows[:t], (), t, True, (t, nu.index(1)))
             hit, reached = self._next_hit(run[-1].limit, len(run), reach)
             if hit is None or not self.tracked.functions:  # nothing is asked beyond the next point without a value
-                return Orders(rows[:up], (), reached, True)
+                return OrbitData(rows[:up], (), reached, True)
             steps = hit
 
-    def orders(self, first: int) -> Orders:
+    def orders(self, first: int) -> OrbitData:
         """The orders along the curve, for as many steps as it takes until they are known for all, or the limits end it.
 
         `first` is the number of steps to begin with. The image may move on a critical hypersurface until something
@@ -270,7 +270,7 @@ class Course:
             if is_whole and len(rows) - last >= _CONSTANT:
                 hit, reached = self._next_hit(run[-1].limit, len(run), limits.reach)
                 if hit is None:
-                    return Orders(rows[:last], (), reached, True)
+                    return OrbitData(rows[:last], (), reached, True)
             found = [find_recurrence(column) for column in zip(*rows, strict=True)]
             repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
             is_cut = not is_whole and not limits.budget.is_spent  # by the precision
@@ -278,7 +278,7 @@ class Course:
             if rows and repeats and (is_far or (is_cut and (most == _MOST_ALONG or len(rows) >= limits.enough))):
                 laws = tuple(one.characteristic for one in found if one is not None)
                 kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
-                return Orders(rows[:kept], laws, len(run), True)
+                return OrbitData(rows[:kept], laws, len(run), True)
             if is_cut and most < _MOST_ALONG:
                 most *= 2
                 continue
@@ -289,9 +289,9 @@ class Course:
                     for t, (mu, *nu) in enumerate(rows, 1)
                     if mu or any(order for k, order in enumerate(nu) if k not in beyond)
                 )
-                return Orders(rows[: max(others, default=1)], (), limits.reach, True, None, beyond)
+                return OrbitData(rows[: max(others, default=1)], (), limits.reach, True, None, beyond)
             if not is_whole or steps >= longest:
-                return Orders(rows, (), len(rows), False)
+                return OrbitData(rows, (), len(rows), False)
             steps = longest
 
     def _met_for_ever(self, point: Sequence[int]) -> tuple[int, ...] | None:

@@ -27,7 +27,15 @@ from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, counted
-from kahanmaps.laboratory.singular.following import NO_ORDERS, NOTHING, AlongCurves, Course, Orders, Range, Tracked
+from kahanmaps.laboratory.singular.following import (
+    NO_ORBIT_DATA,
+    NOTHING,
+    AlongCurves,
+    OrbitData,
+    Range,
+    TestCurve,
+    Tracked,
+)
 from kahanmaps.laboratory.singular.jets import (
     JetStep,
     Letters,
@@ -37,7 +45,7 @@ from kahanmaps.laboratory.singular.jets import (
     roots_modulo,
 )
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 
 _MOST_WITH_TANGENTS = 1024
 _FEW_TERMS = 64  # of series that tell points apart
@@ -177,7 +185,7 @@ class Hypersurface:
     note: str = ""
     followed: int = 0
     settled_at: int | None = None
-    orders: Orders = field(default=NO_ORDERS, repr=False)
+    orders: OrbitData = field(default=NO_ORBIT_DATA, repr=False)
     stage: int | None = None
     generic: str = ""
 
@@ -234,7 +242,7 @@ class Tracking:
     stage: int | None = None
     period: int = 1
 
-    def equations(self, map_: BirationalMap, eps: fmpq, field: PrimeField) -> Sequence[Equation]:
+    def equations(self, map_: MapFamily, eps: fmpq, field: PrimeField) -> Sequence[Equation]:
         """Those of the map modulo a prime, from the stage on."""
         equations: Sequence[Equation] = map_.at(eps, field).equations
         if self.stage is None:
@@ -258,7 +266,7 @@ _UNKNOWN, NONE_TRACKED = Hypersurface(), Tracking()
 
 
 def outcome_of(
-    map_: BirationalMap,
+    map_: MapFamily,
     eps: fmpq,
     one: Written,
     text: str,
@@ -313,7 +321,7 @@ def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hype
     return Hypersurface(steps=one.steps), BUDGET_SPENT if is_over else POINTS_DIFFER
 
 
-def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
+def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
     """As `unwritten`, with the poles and infinity: without any polynomial."""
     found = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
@@ -331,9 +339,7 @@ def outcomes_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limit
     return found
 
 
-def unwritten(
-    map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False
-) -> list[Hypersurface]:
+def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
     """The contracted hypersurfaces without their polynomials, told apart by multiplicity and outcome of random points.
 
     At one exact `eps` (half the time step), on lines modulo random primes; the poles, or the others but for infinity.
@@ -358,7 +364,7 @@ def unwritten(
             if tangents is None or limits.budget.is_spent:
                 continue
             direction = [rng.randrange(field.prime) for _ in critical.point]
-            run, _ = Course(equations, critical.point, direction, limits).steps(limits.shown, most=_FEW_TERMS)
+            run, _ = TestCurve(equations, critical.point, direction, limits).steps(limits.shown, most=_FEW_TERMS)
             orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             known = alike.setdefault(orders, [])
             if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
@@ -410,14 +416,14 @@ def _outcome_at(
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
-    course = Course(equations, point, direction, limits, tracked)
+    course = TestCurve(equations, point, direction, limits, tracked)
     run, is_whole = course.steps(limits.shown, tangents, _MOST_WITH_TANGENTS)
     status, down, up = _by_ranks([step.rank for step in run], full)
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
         return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
-    orders = NO_ORDERS
+    orders = NO_ORBIT_DATA
     if up is None:
         orders = course.orders(limits.shown)
         # Beyond the steps that are shown it may be a hypersurface again, whose orders go on as those of another one do.
@@ -429,13 +435,13 @@ def _outcome_at(
         if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
             raise PrecisionTooLow
     else:
-        orders = course.orders_until_return(up)
+        orders = course.orbit_data_until_return(up)
     if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
         run = list(course.all_steps(orders.settled_at + 2, tangents))
         status, down, up = _by_ranks([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
-        orders = replace(NO_ORDERS, followed=orders.followed)
+        orders = replace(NO_ORBIT_DATA, followed=orders.followed)
     return Hypersurface(
         status=status,
         contracted_at=down,

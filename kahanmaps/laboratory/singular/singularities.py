@@ -17,7 +17,7 @@ from typing import Any
 
 from flint import fmpq, fmpz_poly
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
@@ -31,7 +31,7 @@ from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
-from kahanmaps.laboratory.singular.contracted import OrdersUnknown, contracted
+from kahanmaps.laboratory.singular.contracted import OrbitDataUnknown, contracted
 from kahanmaps.laboratory.singular.following import Fraction, Range
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
@@ -57,7 +57,7 @@ from kahanmaps.laboratory.singular.written import (
     written,
 )
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
@@ -190,8 +190,8 @@ def singularities(
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
     map_, exact_eps = as_map(system), rational(resolve_eps(eps, time_step))
-    if map_.refusal:
-        raise InputError(map_.refusal)
+    if map_.unsupported_reason:
+        raise InputError(map_.unsupported_reason)
     if map_.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
     budget = budget_for("singularities", effort)
@@ -204,7 +204,7 @@ def singularities(
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _range(map_.dim, steps, budget)
-    over, rng = map_.at(exact_eps), random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
+    over, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
     try:
         if is_long(over):
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
@@ -266,10 +266,10 @@ def singularities(
 
 
 def _map_by_map(
-    map_: BirationalMap, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
+    map_: MapFamily, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
 ) -> SingularityRun | None:
     """The same for a composition whose maps are followed one by one; None where one of them is too large."""
-    rng = random.Random(f"map by map {seed_for(seed, map_.subject, run.eps)}")
+    rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
     found = followed_map_by_map(map_, run.eps, rng, limits, progress)
     return found and replace(run, word=found[0], hypersurfaces=tuple(found[1]), stopped=limits.budget.is_spent)
 
@@ -384,7 +384,7 @@ def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
 
 
 def patterns(
-    system: QuadraticSystem | BirationalMap,
+    system: QuadraticSystem | MapFamily,
     eps: fmpq | None,
     *,
     steps: int | None = None,
@@ -417,7 +417,7 @@ def patterns(
             several = set()
             for value, stage in zip(values, stages, strict=True):
                 limits, equations = _range(map_.dim, steps, stage), map_.at(value).equations
-                rng = random.Random(f"patterns {seed_for(seed, map_.subject, value)}")
+                rng = random.Random(f"patterns {derive_seed(seed, map_.subject, value)}")
                 if not _is_dominant(map_, value):
                     known = _not_dominant(value)
                 elif period_of(equations) > 1:
@@ -427,14 +427,14 @@ def patterns(
                     try:
                         degree, hypersurfaces = contracted(map_, value, rng, limits)
                         known = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
-                    except OrdersUnknown as error:
+                    except OrbitDataUnknown as error:
                         known = _unknown(_STOPPED if limits.budget.is_spent else str(error))
                 several.add(known)
             found = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
     return found
 
 
-def _digits(map_: BirationalMap, eps: fmpq) -> int:
+def _digits(map_: MapFamily, eps: fmpq) -> int:
     return int(max(eps.p.bit_length(), eps.q.bit_length()) * 0.30103) + 1 + map_.digits
 
 
@@ -443,7 +443,7 @@ def _most_digits(dim: int, budget: Budget) -> int:
     return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
-def can_be_written(system: QuadraticSystem | BirationalMap, eps: fmpq, budget: Budget) -> bool:
+def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:
     """Whether `singularities` takes a map and eps."""
     map_ = as_map(system)
     return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, budget)
@@ -508,7 +508,7 @@ def _range(dim: int, steps: int | None, budget: Budget) -> Range:
     return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, along, budget, enough)
 
 
-def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:
+def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
     """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
 
     Exact. None above dimension 4, where it may be long, for compositions too large to be multiplied out, and where a
@@ -527,20 +527,20 @@ def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[
     return [(format_polynomial(factor), power) for factor, power in factored(kernel_minors(rows, counted_product)[-1])]
 
 
-def default_eps(system: QuadraticSystem | BirationalMap, seed: int) -> tuple[fmpq, ...]:
+def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, ...]:
     """Two rational numbers of small height, the same ones for the same map and seed; one for a map without eps."""
-    if refusal := as_map(system).refusal:
-        raise InputError(refusal)
+    if unsupported_reason := as_map(system).unsupported_reason:
+        raise InputError(unsupported_reason)
     if not as_map(system).has_eps:
         return (fmpq(1),)
-    rng = random.Random(f"singularities eps {seed_for(seed, as_map(system).subject)}")
+    rng = random.Random(f"singularities eps {derive_seed(seed, as_map(system).subject)}")
     first = fmpq(rng.randint(2, 9), 11)
     return first, fmpq(rng.randint(2, 11), 13)
 
 
-def _is_dominant(map_: BirationalMap, eps: fmpq) -> bool:
+def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
     """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
-    rng = random.Random(f"dominant {seed_for(0, map_.subject, eps)}")
+    rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
     for _ in range(_POINTS):
         field = GF(random_prime(rng))  # what is not 0 there is not 0 over Q
         try:

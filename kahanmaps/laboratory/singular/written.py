@@ -30,7 +30,7 @@ from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import Hypersurface, Tracking, Written, outcome_of
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 
@@ -87,7 +87,7 @@ def followed_forms(map_: HomogeneousMap, among: list[Written], stage: int = 0) -
 
 
 def followed_map_by_map(
-    map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, progress: Callable[[str], None]
+    map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, progress: Callable[[str], None]
 ) -> tuple[Word, list[Hypersurface]] | None:
     """The hypersurfaces that the maps of a composition contract, at one exact eps, with the word of these maps.
 
@@ -117,7 +117,7 @@ def followed_map_by_map(
     return Word(tuple(letter.degree for letter in letters), len(equations) // period), found
 
 
-def is_long(map_: MapOver) -> bool:
+def is_long(map_: Map) -> bool:
     """Whether a composition is too long for the Jacobian determinant of its forms, unless degrees drop."""
     degree = prod(equation.image_degree for equation in map_.equations)
     size = map_.dim + 1
@@ -211,18 +211,18 @@ def is_infinity(factor: Any) -> bool:
     return len(factor) == 1 and all(exponent == 0 for exponent in factor.monoms()[0][:-1])
 
 
-def affine(form: Any, map_: BirationalMap) -> str:
+def affine(form: Any, map_: MapFamily) -> str:
     """The form at Z = 1 in the variables of the system, as text."""
     context = ring(map_.variables)
     return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))
 
 
-def name_of(form: Any, map_: BirationalMap) -> str:
+def name_of(form: Any, map_: MapFamily) -> str:
     """The same; Z for infinity."""
     return "Z" if is_infinity(form) else affine(form, map_)
 
 
-def with_eps(map_: BirationalMap, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) -> tuple[Hypersurface, ...]:
+def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) -> tuple[Hypersurface, ...]:
     """The hypersurfaces that a map contracts at one eps, each with its polynomial over Q[eps] where that is found.
 
     Exact: at this eps the polynomial is that of the hypersurface, up to a factor. None is found for compositions that
@@ -237,7 +237,7 @@ def with_eps(map_: BirationalMap, eps: fmpq, hypersurfaces: Sequence[Hypersurfac
     return tuple(found)
 
 
-def _named(map_: BirationalMap, eps: fmpq, stage: int | None) -> dict[str, str]:
+def _named(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
     """The polynomials over Q[eps] of what a map, or that of this number in a word, contracts, by those at one eps."""
     variables = map_.variables
     if map_.symbols or "eps" in variables or "Z" in variables:

@@ -19,7 +19,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.polynomials import ring
@@ -39,7 +39,7 @@ from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.family.tensor import GENERATOR, over_algebra
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.symmetry.commuting_proofs import affine, judge_family, judge_field
+from kahanmaps.laboratory.symmetry.commuting_proofs import affine, certify_family, certify_field
 from kahanmaps.laboratory.symmetry.commuting_space import (
     MAX_UNKNOWNS,
     SHAPES,
@@ -50,7 +50,7 @@ from kahanmaps.laboratory.symmetry.commuting_space import (
     unknowns,
 )
 from kahanmaps.maps.algebraic import AlgebraicMap
-from kahanmaps.maps.kahan import Kahan, SystemLike, as_map
+from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, as_system
 
 ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
@@ -204,7 +204,7 @@ def commuting_systems(
         return replace(found, note=note)
     if shape not in SHAPES:
         raise InputError(f"found the shape {shape!r}, expected {' or '.join(SHAPES)}")
-    settings = Settings(seed=seed_for(seed, system.rhs), error_bits=error_bits, progress=progress)
+    settings = Settings(seed=derive_seed(seed, system.rhs), error_bits=error_bits, progress=progress)
     search = _Search(system, settings, budget, C, CommutingSystems(system, shape))
     search.run()
     return search.found
@@ -227,7 +227,7 @@ class _Search:
         if all(p.is_zero() for p in f.rhs):
             found.dimension = count
             matrix = fmpq_mat(f.dim, f.dim) if found.shape == "linear" else None
-            found.solutions.append(CommutingField(f, matrix, "0", judge_field(f, f, self.settings)))
+            found.solutions.append(CommutingField(f, matrix, "0", certify_field(f, f, self.settings)))
             found.every_g_commutes = found.shape == "quadratic"
             return
         if count > MAX_UNKNOWNS:
@@ -245,7 +245,7 @@ class _Search:
             whole = SolutionComponent(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
             # Where f is affine the space may be large, and often all of it commutes: a proof without equations.
             if found.dimension is not None and f.degree <= 1 and affine(f, self.space.fields) is not None:
-                self._add_family(whole, judge_family(f, self.space, whole, self.settings))
+                self._add_family(whole, certify_family(f, self.space, whole, self.settings))
             elif size > MAX_SPACE:
                 found.undecided.append(
                     f"the fields g with [f, g] = 0 have dimension {'up to ' * (found.dimension is None)}{size}, "
@@ -264,7 +264,7 @@ class _Search:
                 found.undecided.append(f"{SPENT}: {len(others) + 3 - k} solutions were not judged")
                 return
             self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
-            finding = judge_field(f, field_at(self.space, weights), self.settings)
+            finding = certify_field(f, field_at(self.space, weights), self.settings)
             if finding.verdict is Certainty.REFUTED:
                 found.discarded += 1
             elif finding.verdict is Certainty.UNDECIDED:
@@ -297,7 +297,7 @@ class _Search:
                 self._leave(family, SPENT)
                 continue
             self.settings.progress(f"a family with {len(family.free)} parameters")
-            finding = judge_family(self.f, self.space, family, self.settings)
+            finding = certify_family(self.f, self.space, family, self.settings)
             if finding.verdict is not Certainty.REFUTED:
                 self._add_family(family, finding)
             elif level + 1 < len(ORDERS) and not self.budget.is_spent:
@@ -377,7 +377,7 @@ def find_commuting(
     options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "effort": effort, "progress": progress}
     given = as_map(system)
     kahan = given.given if isinstance(given, AlgebraicMap) else given
-    if not isinstance(kahan, Kahan) or "eps" in kahan.system.symbols:
+    if not isinstance(kahan, KahanFamily) or "eps" in kahan.system.symbols:
         raise InputError(f"found {kahan.kind}, expected a quadratic vector field without eps: g is sought for fields")
     if not isinstance(given, AlgebraicMap):
         return commuting_systems(kahan.system, shape, **options)

@@ -22,26 +22,26 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
 from kahanmaps.algebra.work import count
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import certify
 from kahanmaps.checks.claims import Evidence, Finding
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings
 from kahanmaps.laboratory.symmetry.commuting_space import CommutingSpace, coefficients_of, combination, field_at
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _FORMULA = "Phi_f o Phi_g = Phi_g o Phi_f"
 
 
-def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> Finding:
+def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> Finding:
     """The finding that the Kahan maps of f and g commute at equal eps, for every eps.
 
     `settings.seed` and `settings.error_bits` are used. Proved, refuted with a witness, or supported with the bound on
     the probability of error. Source: schwartz-1980.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2 + x"])
-    >>> str(judge_field(f, f.scaled(-1), Settings()).verdict), str(judge_field(f, f.scaled(2), Settings()).verdict)
+    >>> str(certify_field(f, f.scaled(-1), Settings()).verdict), str(certify_field(f, f.scaled(2), Settings()).verdict)
     ('proved', 'refuted')
     """
     claim = "the Kahan maps of f and g commute"
@@ -51,16 +51,16 @@ def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> F
     count(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))
     proof = theorems.commuting_by_splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
-    return judge(claim, identity, settings, proof, formula=_FORMULA)
+    return certify(claim, identity, settings, proof, formula=_FORMULA)
 
 
-def judge_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
+def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
     """The finding that the Kahan maps of f and of every member of a linear family commute, for every eps."""
     count(2_000 + 350 * f.dim**2 * len(family.free))
     members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
     proof = affine(f, members) or _in_dimension_one(f, f)
     claim = "the Kahan maps of f and of every member g of the family commute"
-    return judge(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
+    return certify(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
 
 
 def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
@@ -108,7 +108,7 @@ def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Solution
     rhs = [0 * joint.gen(0)] * n
     for weight, g in zip(weights, space.fields, strict=True):
         rhs = [total + weight * p.compose(*joint.gens()[:n], ctx=joint) for total, p in zip(rhs, g.rhs, strict=True)]
-    first, second = Kahan(f), Kahan(QuadraticSystem(tuple(rhs), tuple(symbols)))
+    first, second = KahanFamily(f), KahanFamily(QuadraticSystem(tuple(rhs), tuple(symbols)))
 
     def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides:
         phi_f, phi_g, x = first.at(eps, field), second.at(eps, field, point[n:]), point[:n]

@@ -36,8 +36,8 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 LINES, CUBES, GENERAL = "lines", "cubes", "general"
@@ -60,9 +60,9 @@ class PlanarBlocks:
     to the rows, `out` the one that takes them back.
 
     >>> from flint import fmpq_poly
-    >>> from kahanmaps.family.draw import draw_with_chi
+    >>> from kahanmaps.family.random_members import random_member_with_chi
     >>> from kahanmaps.family.planar import normal_form
-    >>> blocks = planar_blocks(normal_form(draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7)), "1/10")
+    >>> blocks = planar_blocks(normal_form(random_member_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7)), "1/10")
     >>> blocks.reals, blocks.coefficients.real.tolist(), blocks.labels
     (1, [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0]], ('1.25992', '-0.629961+-1.09112i'))
     """
@@ -122,14 +122,14 @@ def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
         raise InputError("found eps = 0, for which the Kahan map is the identity")
     for bits in _BITS:
         with ctx.workprec(bits), suppress(_Unclear):
-            return _Blocks(form, epsilon).rounded()
+            return _Blocks(form, epsilon).to_floats()
     raise InputError(f"the normal form needs more than {_BITS[-1]} bits: its coefficients are too long for doubles")
 
 
-def require_same_system(form: NormalForm, map_: BirationalMap) -> None:
+def require_same_system(form: NormalForm, map_: MapFamily) -> None:
     """Raises InputError where the normal form is that of another map."""
     theirs = CubicHamiltonian(form.H, standard_structure(form.dim)).system
-    if not isinstance(map_, Kahan) or theirs.dim != map_.dim or theirs.renamed(map_.variables) != map_.system:
+    if not isinstance(map_, KahanFamily) or theirs.dim != map_.dim or theirs.renamed(map_.variables) != map_.system:
         raise InputError(
             "the normal form belongs to another system: take normal_form(member) of the member that gave it"
         )
@@ -159,7 +159,7 @@ class _Blocks:
         upper = [r for r in roots if not r.imag.is_zero() and r.imag > 0]
         self.roots = real + sorted(upper, key=lambda r: (float(r.real.mid()), float(r.imag.mid())))
 
-    def rounded(self) -> PlanarBlocks:
+    def to_floats(self) -> PlanarBlocks:
         """Each number as a double. Raises _Unclear where the precision is too low for that."""
         coefficients, kappas = [], []
         into: list[list[float]] = []

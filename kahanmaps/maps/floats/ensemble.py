@@ -26,13 +26,13 @@ from kahanmaps.maps.floats.steps import (
     RUNNING,
     SINGULAR,
     STATUS,
-    Lanes,
+    BatchState,
     RecordTable,
     advance_by_numpy,
     map_step,
     planar_step,
 )
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.kernels import choose_kernel, has_llvm
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
@@ -96,7 +96,7 @@ class FloatEnsemble:
 
     def __init__(
         self,
-        system: QuadraticSystem | BirationalMap,
+        system: QuadraticSystem | MapFamily,
         eps: Any,
         starts: Any,
         *,
@@ -128,7 +128,7 @@ class FloatEnsemble:
         compiled = choose_kernel(kernel, long=True) == "numba" and has_llvm()
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
-        map_ = self.system.rounded
+        map_ = self.system.real_approximation
         map_over = map_.at(epsilon)
         self._matrix = map_over.denominator_name(backward)
         self._blocks: PlanarBlocks | None = None
@@ -141,7 +141,7 @@ class FloatEnsemble:
             self._largest = np.zeros(self._base.shape)
         self._factors = (map_over.inverse if backward else map_over).factors
         self._write_step()
-        self._lanes = Lanes.of(state)
+        self._lanes = BatchState.of(state)
         compiled = compiled and self._step.careful_code is not None
         self._threads = (threads or processors()) if compiled else 1
         method = "generic" if form is None else "normal form"

@@ -26,7 +26,7 @@ from kahanmaps.maps.floats.ensemble import (
     require_every,
 )
 from kahanmaps.maps.floats.stream import NpyFile
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -63,7 +63,7 @@ class FloatOrbit:
 
     def __init__(
         self,
-        system: QuadraticSystem | BirationalMap,
+        system: QuadraticSystem | MapFamily,
         eps: Any,
         start: Sequence[Any],
         steps: int | None,

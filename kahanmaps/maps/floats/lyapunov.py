@@ -142,7 +142,7 @@ def lyapunov_exponents(
     if steps < 2 or transient < 0:
         raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
     x = start_rows(starts)
-    map_ = as_map(system).rounded
+    map_ = as_map(system).real_approximation
     n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():
         raise InputError(f"found starts of the shape {x.shape}, expected rows of {n} finite numbers, at least one")

@@ -35,7 +35,7 @@ from kahanmaps.maps.floats.straight_line import (
     solve,
     solve_two,
 )
-from kahanmaps.maps.implicit import StepOver
+from kahanmaps.maps.implicit import ElementaryMap
 from kahanmaps.maps.kahan import KahanMap
 
 IntArray = NDArray[np.int64]
@@ -116,7 +116,7 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
     return FloatStep(blocks.rows, write)
 
 
-def map_step(factors: Sequence[StepOver]) -> FloatStep:
+def map_step(factors: Sequence[ElementaryMap]) -> FloatStep:
     """A step of each of the maps, one after the other. Raises InputError where a number is out of range."""
     equations = [float_equation(one) for one in factors]
 
@@ -165,7 +165,7 @@ class FloatEquation(NamedTuple):
         return solve(rows, bound, asked)
 
 
-def float_equation(map_over: StepOver) -> FloatEquation:
+def float_equation(map_over: ElementaryMap) -> FloatEquation:
     """The equation of a step of a map over QQ, each number rounded once. Raises InputError where one is out of range.
 
     A row of a Kahan map is of the size of 1 where eps is small, that of another map is divided by its largest
@@ -253,7 +253,7 @@ def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
     return pivots
 
 
-class Lanes(NamedTuple):
+class BatchState(NamedTuple):
     """The states of n orbits side by side, one a column, and what happened to each.
 
     `z` has the shape (rows, n). `failed_at` is the index of the first iterate that does not exist, `near` the number of
@@ -268,7 +268,7 @@ class Lanes(NamedTuple):
     near_at: IntArray
 
     @classmethod
-    def of(cls, z: FloatArray) -> Lanes:
+    def of(cls, z: FloatArray) -> BatchState:
         """Lanes that are about to start."""
         n = z.shape[1]
         counts = [np.full(n, start, dtype=np.int64) for start in (RUNNING, -1, 0, -1)]
@@ -297,7 +297,7 @@ _FEW = 16  # orbits, up to which Python's own floats are faster than arrays
 _GROUP = 4096  # orbits that are taken together, so that arrays stay in the processor's cache
 
 
-def advance_by_numpy(step: FloatStep, lanes: Lanes, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
+def advance_by_numpy(step: FloatStep, lanes: BatchState, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
     """Take all orbits `steps` steps from the index `first`: in arrays, or a few one by one in Python's own floats."""
     n = lanes.z.shape[1]
     single = n <= _FEW and step.fast_code is not None

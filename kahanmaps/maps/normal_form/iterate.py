@@ -28,9 +28,9 @@ class NthIterate:
     Raises BadPrime where the normal form has no reduction modulo p.
 
     >>> from kahanmaps.algebra.fields import GF
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
-    >>> normal_form = system_normal_form(draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system)
+    >>> normal_form = system_normal_form(random_member_with_eigenvalues([1, -2, 3], seed=7).chosen.system)
     >>> NthIterate(normal_form, "1/10", GF(10**9 + 7)).value([1, 2, 3, 4, 5, 6], 10**30)[0]
     946728668
     """

@@ -123,9 +123,9 @@ def orbit_period(
     The period of a plane over a field of more than `largest` elements is "undecided". Raises BadPrime
     where the member has no normal form modulo p, InputError for a wrong start.
 
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
-    >>> form = normal_form(draw_with_eigenvalues([1, -2], seed=7))
+    >>> form = normal_form(random_member_with_eigenvalues([1, -2], seed=7))
     >>> found = orbit_period(form, "1/10", ["1/2", "-1/3", 0, 1], 2**31 - 1)
     >>> found.period, found.meets_pole
     (85400488827489215, True)
@@ -277,9 +277,9 @@ def period_of(
     `normal_form` is that of the system (family.system_normal_form) or, where the coordinates are its own, of a member;
     otherwise like `orbit_period` and `period_over_rationals`.
 
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
-    >>> normal_form = system_normal_form(draw_with_eigenvalues([1, -2], seed=7).chosen.system)
+    >>> normal_form = system_normal_form(random_member_with_eigenvalues([1, -2], seed=7).chosen.system)
     >>> period_of(normal_form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """
@@ -328,9 +328,9 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     Reduction modulo an unramified odd prime of good reduction is injective on torsion. So T has infinite order if it
     has different orders modulo two such primes; where they agree, n T = 0 is put to the test over the field itself.
 
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
-    >>> form = normal_form(draw_with_eigenvalues([1, -2], seed=7))
+    >>> form = normal_form(random_member_with_eigenvalues([1, -2], seed=7))
     >>> period_over_rationals(form, "1/10", ["1/2", "-1/3", 0, 1]).status
     'aperiodic'
     """

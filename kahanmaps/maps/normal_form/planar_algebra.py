@@ -19,7 +19,7 @@ from typing import Any
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
-from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, content, over_one, radical, taken_apart, without
+from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, content, over_one, radical, split_by_primes, without
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
@@ -89,7 +89,7 @@ class AlgebraBlock(LevelBlock):
             return above, below, below
         cofactor, norm = _adjugate(W)
         above = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
-        rest, part = taken_apart(content(entry.p for entry in cofactor.coefficients), self.bad**3)
+        rest, part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
         common = common_part([norm.p, *above], self.bad**4 * part)  # taken out once rather than from every coordinate
         return [entry // common for entry in above], norm.p // common, rest
 
@@ -219,7 +219,7 @@ class ShortElements:
         big += [[part * int(i == j) for j in range(degree)] + [0] * degree for i in range(degree)]
         lattice = fmpz_mat([row[degree:] for row in fmpz_mat(big).hnf().tolist()[degree:]])
         scale = [2.0**60 * max((length / max(lengths)).mid(), _LEAST) for length in lengths]
-        rounded: list[Any] = [
+        real_approximation: list[Any] = [
             [
                 (s * x).mid().floor().unique_fmpz()
                 for p, s in zip(self._powers, scale, strict=True)
@@ -227,7 +227,7 @@ class ShortElements:
             ]
             for k in range(degree)
         ]
-        _, change = (lattice * fmpz_mat(rounded)).lll(True)
+        _, change = (lattice * fmpz_mat(real_approximation)).lll(True)
         rows = (change * lattice).tolist()
         for signs in _signs(degree):
             row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]

@@ -221,10 +221,10 @@ class NormalSteps:
     """Steps of Phi(., eps) over Q in a normal form; the time step is 2 eps.
 
     >>> from itertools import islice
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
     >>> from kahanmaps.maps.kahan import KahanMap
-    >>> system = draw_with_eigenvalues([1, -2], seed=7).chosen.system
+    >>> system = random_member_with_eigenvalues([1, -2], seed=7).chosen.system
     >>> first, second = islice(NormalSteps(system_normal_form(system), fmpq(1, 10)).points([1, 0, "1/2", 0]), 2)
     >>> second.rationals() == KahanMap(system, "1/10").step(first.rationals())
     True

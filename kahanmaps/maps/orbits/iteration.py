@@ -20,7 +20,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field, integer
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
-from kahanmaps.maps.implicit import MapOver, det_of
+from kahanmaps.maps.implicit import Map, det_of
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.rational_orbit import RationalOrbit
 
@@ -125,9 +125,9 @@ class Orbit(Displayed):
     >>> orbit.end.status
     'completed'
     >>> from kahanmaps.algebra.fields import GF
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
-    >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
+    >>> system = random_member_with_eigenvalues([1, -2, 3], seed=7).chosen.system
     >>> phi, normal_form = KahanMap(system, "1/10", GF(10007)), system_normal_form(system)
     >>> [point.text for point in Orbit(phi, [1, 2, 3, 4, 5, 6], at=[10**30], normal_form=normal_form)]
     [['5212', '9799', '6471', '5788', '2175', '9896']]
@@ -135,7 +135,7 @@ class Orbit(Displayed):
 
     def __init__(
         self,
-        kahan_map: MapOver,
+        kahan_map: Map,
         start: Sequence[Any],
         steps: int | None = None,
         *,

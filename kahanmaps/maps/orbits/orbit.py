@@ -16,12 +16,13 @@ from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
 from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.printing import json_float
+from kahanmaps.atomic_files import open_append
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import BadPrime, InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.convention import eps_record, resolve_eps
-from kahanmaps.maps.implicit import MapOver
-from kahanmaps.maps.kahan import Kahan, SystemLike, as_map
+from kahanmaps.maps.implicit import Map
+from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
 from kahanmaps.maps.orbits.iteration import (
     DEFAULT_MAX_DIGITS,
@@ -35,7 +36,6 @@ from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.version import __version__
-from kahanmaps.whole_files import growing_file
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
@@ -49,7 +49,7 @@ _BITS_PER_DIGIT = 3.3219281
 
 
 def orbit(
-    system: SystemLike | MapOver,
+    system: SystemLike | Map,
     start: Any,
     eps: Any = None,
     steps: int | None = None,
@@ -125,7 +125,7 @@ def orbit(
     far = max(wanted, default=0) if wanted is not None else (steps or 0)
     require_steps(far)
     request = OrbitRequest(system, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
-    if isinstance(system, MapOver):
+    if isinstance(system, Map):
         return _orbit_at_one_eps(request, field)
     map_ = as_map(system)
     if eps is None and map_.has_eps:
@@ -182,7 +182,7 @@ class OrbitRequest(NamedTuple):
 
             every = self.every if self.at is None else max(1, math.gcd(*self.at))
             form = None if normal_form is None else normal_form.form
-            given = (self.map.rounded, self.eps, self.start, self.steps)
+            given = (self.map.real_approximation, self.eps, self.start, self.steps)
             return FloatOrbit(*given, backward=self.backward, form=form, kernel=self.kernel, every=every)
         over = self.map.at(self.eps, numbers.field)
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
@@ -283,7 +283,7 @@ class Trajectory:
 
     def to_csv(self, path: str | Path) -> None:
         """Write the points alone, as `kahanmaps orbit -o` does: step and coordinates, exact."""
-        with growing_file(path) as stream:
+        with open_append(path) as stream:
             self.write(stream, "csv")
 
     def write(
@@ -344,7 +344,7 @@ class Trajectory:
             "system": name,
             "variables": list(self.variables),
             **request.map.written(),
-            **({} if isinstance(request.map, MapOver) else eps_record(request.eps, request.map)),
+            **({} if isinstance(request.map, Map) else eps_record(request.eps, request.map)),
             "arithmetic": str(self.arithmetic),
             "method": self.method,
             "start": [str(entry) for entry in request.start],
@@ -497,7 +497,7 @@ def _normal_form(
     map_, eps = request.map, request.eps
     if method == "generic":
         return NoNormalForm("not looked for")
-    if not isinstance(map_, Kahan) or map_.system.symbols:
+    if not isinstance(map_, KahanFamily) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
     if method is None:  # where looking for a normal form would cost more than it can save
         few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import IO, Any
 
 from kahanmaps.algebra.printing import csv_line, guarded
+from kahanmaps.atomic_files import atomic_write, open_append, write_atomically
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import eps_words
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.version import __version__
-from kahanmaps.whole_files import growing_file, whole_file, write_whole
 
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000
@@ -138,7 +138,7 @@ class Csv(Writer):
     def _tell(self, end: dict[str, Any] | None) -> None:
         if self.beside is not None:
             told = {**_ENVELOPE, "header": self._header, "end": end}
-            write_whole(self.beside, (json.dumps(told, indent=1) + "\n").encode())
+            write_atomically(self.beside, (json.dumps(told, indent=1) + "\n").encode())
 
 
 class Npz(Writer):
@@ -211,7 +211,7 @@ def writer_to(
         return
     if form == "csv" and os.path.isdir(meta_of(to)):  # said before an older table is lost
         raise InputError(f"found a folder {meta_of(to)}, where what the table is of is written")
-    with whole_file(to) if form == "npz" else growing_file(to) as stream:
+    with atomic_write(to) if form == "npz" else open_append(to) as stream:
         writer = WRITERS[form](stream, variables, integrals)
         if isinstance(writer, Csv):
             writer.beside = meta_of(to)

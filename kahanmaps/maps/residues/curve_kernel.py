@@ -23,7 +23,7 @@ _LOCK = Lock()
 def _compiled() -> Any:
     import numba
 
-    from kahanmaps.maps.kept_code import compiled
+    from kahanmaps.maps.numba_cache import compiled
 
     module, inner = globals(), numba.njit(nogil=True)
     names = "reduce add_product clear copy stripped subtract inverse_of_last gcd divide entries minors "

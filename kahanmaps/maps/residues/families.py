@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.errors import InputError
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel
 
 MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
@@ -39,7 +39,7 @@ class Family:
     Raises InputError for what is out of range, BadPrime where the prime divides a denominator.
     """
 
-    def __init__(self, map_: BirationalMap, prime: int) -> None:
+    def __init__(self, map_: MapFamily, prime: int) -> None:
         if not 2 < prime < MAX_PRIME or not fmpz(prime).is_prime():
             raise InputError(f"found the prime {prime}, expected an odd prime below {MAX_PRIME}")
         if map_.dim > MAX_DIMENSION:

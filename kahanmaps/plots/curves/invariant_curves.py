@@ -1,6 +1,6 @@
 """A Kahan map of the family as a product: in each plane of its normal form the orbit, and the cubic that carries it.
 
-What is drawn is computed here, `draw_invariant_curves.py` draws it. At a real root of chi the plane is real, and its
+What is drawn is computed here, `plot_invariant_curves.py` draws it. At a real root of chi the plane is real, and its
 coordinates (u, v) are symplectic: those in which h = kappa (u^3 - 3 u v^2), if h has three real lines, or h =
 kappa (u^3 + 3 u v^2), if it has one; if h has a repeated factor they are those of `family show --normal-form`. A pair
 of complex roots has one plane with complex coordinates, those of the normal form at the root with positive imaginary

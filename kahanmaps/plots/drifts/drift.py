@@ -220,7 +220,7 @@ _LOST = 1e3
 _NO_VALUES = (1e-17, 1e-15)  # the axis where everything is 0
 
 
-def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = "loglog") -> Figure:
+def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = "loglog") -> Figure:
     """The errors of a survey against the step, logarithmic: a panel for each function, a line for each method.
 
     `scale` is "loglog", or "semilog" with a linear axis of steps. An error of exactly 0 lies in a band marked 0 at the

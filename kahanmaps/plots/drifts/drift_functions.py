@@ -139,15 +139,15 @@ def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, s
 
 def asked_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
     """One of `functions_of` by its name, or an expression; without `eps` none that contains it."""
-    known = functions_of(file.rounded, fmpq(0) if eps is None else eps).get(text.strip())
+    known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
     return asked_axis(file, eps, text) if known is None else known
 
 
 def asked_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
     """The same, but for integrals in which the image of the point occurs: they are no rational functions in doubles."""
-    known = functions_of(file.rounded, fmpq(0) if eps is None else eps)
+    known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
     named = {name: one.function for name, one in known.items() if isinstance(one, PointFunction)}
-    return point_function(text.strip(), file.variables, eps, file.rounded.parameters, named)
+    return point_function(text.strip(), file.variables, eps, file.real_approximation.parameters, named)
 
 
 def _as_function(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> RationalFunction:

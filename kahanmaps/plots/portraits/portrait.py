@@ -189,7 +189,7 @@ _EQUILIBRIA: dict[str, dict[str, Any]] = {
 }
 
 
-def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = "") -> Figure:
+def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = "") -> Figure:
     """Draw a portrait: dots, or with `lines` orbits joined; `equal` gives both axes the same unit.
 
     `note` stands above the right corner, small. Raises InputError for more than a million points to be joined.

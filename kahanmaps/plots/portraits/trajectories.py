@@ -18,8 +18,8 @@ from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.floats.classical import VectorField
 from kahanmaps.maps.floats.doubles import FloatArray, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
-from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -48,7 +48,7 @@ class Trajectories:
 
 
 def ensemble_for(
-    given: QuadraticSystem | BirationalMap,
+    given: QuadraticSystem | MapFamily,
     eps: Any,
     starts: FloatArray,
     steps: int,
@@ -64,8 +64,8 @@ def ensemble_for(
 
 def field_of(file: SystemFile) -> QuadraticSystem | None:
     """The vector field whose Kahan map a file has, real approximations for algebraic parameters; None without one."""
-    map_ = file.map.rounded
-    return map_.system if isinstance(map_, Kahan) and not map_.system.symbols else None
+    map_ = file.map.real_approximation
+    return map_.system if isinstance(map_, KahanFamily) and not map_.system.symbols else None
 
 
 def float_normal_form(file: SystemFile) -> tuple[NormalForm | None, str]:

@@ -23,13 +23,13 @@ from itertools import pairwise
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, evaluate, linear_combinations, primitive_part
 from kahanmaps.algebra.work import count
-from kahanmaps.maps.kahan import Kahan, SystemLike
+from kahanmaps.maps.kahan import KahanFamily, SystemLike
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver, as_system
 
@@ -156,7 +156,7 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         return only_factors(f"coefficients of more than {LONG_COEFFICIENTS} digits")
     local = system.over(QQ)
     # A hyperplane parallel to the line is not met by it, so the line must not be known to who writes the system.
-    rng = random.Random(f"affine {seed_for(seed, system.rhs)}")
+    rng = random.Random(f"affine {derive_seed(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
     along = _determinant_along(local, start, direction, quotient.free)
     if along.degree() < 0:
@@ -275,7 +275,7 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
     point = [evaluate(x, QQ, free) for x in place]
     for outcome, step in (("undefined", eps), ("contracted", -eps)):
-        if Kahan(system).at(step).determinant(point) != 0:  # at most points: then nothing is expanded
+        if KahanFamily(system).at(step).determinant(point) != 0:  # at most points: then nothing is expanded
             continue
         field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
         entries = [

@@ -32,10 +32,15 @@ from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, Lift, gradient_rank, gradients_of_ratios
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
+    DarbouxSpace,
+    TwoPointBasis,
+    gradient_rank,
+    gradients_of_ratios,
+)
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 from kahanmaps.laboratory.singular.jets import modulo
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
@@ -60,7 +65,7 @@ class Cofactor:
     polynomial: fmpq_mpoly | None
     kind: str = "reversed"
 
-    def over(self, map_: MapOver, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
+    def over(self, map_: Map, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
         """Numerator and denominator of the value at a point, the symbols having these values."""
         if self.polynomial is None:
             return jacobian_determinant_sides(map_, x, image)
@@ -91,7 +96,7 @@ class Cofactor:
 DETERMINANT = Cofactor("det dPhi", 1, None)
 
 
-def determinant_polynomial(map_: BirationalMap) -> fmpq_mpoly | None:
+def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
     """det M in (variables, symbols, eps), for Kahan maps det(I - eps f'(x)); None where it is too large to expand."""
     if map_.dim > _MAX_DIMENSION or map_.digits > LONG_COEFFICIENTS:
         return None
@@ -105,7 +110,7 @@ def determinant_polynomial(map_: BirationalMap) -> fmpq_mpoly | None:
     return D
 
 
-def jacobian_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
+def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     """The irreducible factors over Q of det dPhi(x) and those of 1/det M(x); det dPhi alone where it is too large."""
     n, D = map_.dim, determinant_polynomial(map_)
     field = FunctionField(map_.names, _DETERMINANT_BUDGET, reduces=True)
@@ -129,7 +134,7 @@ def jacobian_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
     return tuple(sorted(found, key=lambda one: (one.weight, one.kind, one.name)))
 
 
-def determinant_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
+def determinant_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     """The cofactors of the irreducible factors over Q of det(I - eps f'(x)); det dPhi alone where it is too large."""
     n = map_.dim
     D = determinant_polynomial(map_)
@@ -328,7 +333,7 @@ class SearchStep:
     degree: int
     product: CofactorProduct | None
     text: str
-    lift: Lift | None = None  # of "iterates"
+    lift: TwoPointBasis | None = None  # of "iterates"
     up_to_numbers: bool = False  # whether the cofactors of spaces are the product times numbers
 
 

@@ -23,7 +23,7 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.laboratory import Laboratory, judged
+from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, product_of
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -255,7 +255,7 @@ def _written(
         powers = [(one.polynomial, k) for one, k in zip(cofactors, product.powers, strict=True)]
         subject = (map_.symbols, map_.subject, P, factor, powers)
         identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=subject)
-        return judged(identity, laboratory.seed)[0]
+        return certified(identity, laboratory.seed)[0]
 
     outcomes = [keeps(P) for P in polynomials]
     if not all(outcome.holds for outcome in outcomes):

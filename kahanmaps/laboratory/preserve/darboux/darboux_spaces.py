@@ -15,7 +15,7 @@ of the complement are to be corrected to become Darboux polynomials.
 
 Sources: petrera-pfadler-suris-2009 for the relations, celledoni-2019 for discrete Darboux polynomials.
 
-Functions of a point and its k-th iterate can stand in the place of polynomials of degree 2 (`Lift`).
+Functions of a point and its k-th iterate can stand in the place of polynomials of degree 2 (`TwoPointBasis`).
 With X = (1, x) and Y = (1, y), y the k-th iterate of x, the monomial X_i X_j stands for X_i Y_j + X_j Y_i, or for
 X_i Y_j - X_j Y_i. The first are polarised quadratic polynomials, the second Wronskians. Along an orbit they satisfy
 linear relations as monomials do, and the same null spaces tell which combinations have a common cofactor.
@@ -53,7 +53,7 @@ _SPARE = 8
 _ENOUGH = 12
 # Of W, whose dimension s gives s (s - 1)/2 unknown entries of A: 0.2 s and 10 s.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
-LIFTED_DEGREE = 2  # of monomials that stand for functions of a point and an iterate
+TWO_POINT_DEGREE = 2  # of monomials that stand for functions of a point and an iterate
 
 Vectors = list[list[int]]
 Pattern = tuple[tuple[bool, ...], ...]
@@ -342,7 +342,7 @@ def gradients_of_ratios(x: Point, spaces: Sequence[DarbouxSpace], prime: int) ->
     return rows
 
 
-class Lift(NamedTuple):
+class TwoPointBasis(NamedTuple):
     """Which functions: k, the sign, and the dimension of what they span along an orbit, 1 or 2."""
 
     shift: int
@@ -359,24 +359,31 @@ class Lift(NamedTuple):
         return f"{kind} between x and x{'~' * self.shift}{minors}"
 
 
-LIFTS = (Lift(0, 1), Lift(1, 1), Lift(1, -1), Lift(2, -1), Lift(3, -1), Lift(4, -1))
+TWO_POINT_BASES = (
+    TwoPointBasis(0, 1),
+    TwoPointBasis(1, 1),
+    TwoPointBasis(1, -1),
+    TwoPointBasis(2, -1),
+    TwoPointBasis(3, -1),
+    TwoPointBasis(4, -1),
+)
 
 
 @cache
 def pairs_of(dim: int) -> tuple[tuple[int, int], ...]:
     """The places i <= j in (1, x) of the factors of each monomial of degree at most 2."""
     found = []
-    for exponent in exponents_up_to(dim, LIFTED_DEGREE):
+    for exponent in exponents_up_to(dim, TWO_POINT_DEGREE):
         places = [k for k, e in enumerate(exponent, 1) for _ in range(e)]
-        i, j = [0] * (LIFTED_DEGREE - len(places)) + places
+        i, j = [0] * (TWO_POINT_DEGREE - len(places)) + places
         found.append((i, j))
     return tuple(found)
 
 
-class Lifted(ModularMap):
-    """A map modulo a prime on whose points monomials of degree at most 2 have the values of a `Lift`."""
+class TwoPointMap(ModularMap):
+    """A map modulo a prime on whose points monomials of degree at most 2 have the values of a `TwoPointBasis`."""
 
-    def __init__(self, base: ModularMap, lift: Lift) -> None:
+    def __init__(self, base: ModularMap, lift: TwoPointBasis) -> None:
         # The same map; only what a monomial is differs.
         self.prime, self.eps, self.dim, self.values = base.prime, base.eps, base.dim, base.values
         self.rng, self.map, self.lift = base.rng, base.map, lift
@@ -413,23 +420,25 @@ class Lifted(ModularMap):
         return [by[0] * value for value in here], [by[1] * value for value in there]
 
 
-def lifted_spaces(map_: ModularMap, lift: Lift) -> list[DarbouxSpace]:
+def two_point_spaces(map_: ModularMap, lift: TwoPointBasis) -> list[DarbouxSpace]:
     """The spaces of functions with a common cofactor; of rank 2 the space of all functions that are in relations."""
-    lifted = Lifted(map_, lift)
+    lifted = TwoPointMap(map_, lift)
     if lift.rank == 1:
-        return darboux_spaces(lifted, LIFTED_DEGREE) or []
-    span = span_of_relations(lifted, LIFTED_DEGREE)
-    if len(span) - relations_on_orbit(lifted, LIFTED_DEGREE).dimension != lift.rank:
+        return darboux_spaces(lifted, TWO_POINT_DEGREE) or []
+    span = span_of_relations(lifted, TWO_POINT_DEGREE)
+    if len(span) - relations_on_orbit(lifted, TWO_POINT_DEGREE).dimension != lift.rank:
         return []
-    return [DarbouxSpace.spanned_by(map_.dim, LIFTED_DEGREE, span, map_.prime)]
+    return [DarbouxSpace.spanned_by(map_.dim, TWO_POINT_DEGREE, span, map_.prime)]
 
 
-def lifts_with_spaces(map_: ModularMap, lifts: Sequence[Lift] = LIFTS) -> list[tuple[Lift, list[DarbouxSpace]]]:
+def bases_with_spaces(
+    map_: ModularMap, lifts: Sequence[TwoPointBasis] = TWO_POINT_BASES
+) -> list[tuple[TwoPointBasis, list[DarbouxSpace]]]:
     """The lifts that have spaces, with these: of rank 1 or, where there are none, of rank 2."""
     found = []
     for lift in lifts:
         for one in (lift, lift._replace(rank=2)):
-            spaces = lifted_spaces(map_, one)
+            spaces = two_point_spaces(map_, one)
             if spaces:
                 found.append((one, spaces))
                 break

@@ -30,7 +30,7 @@ from operator import mul
 
 from flint import fmpq_mat, fmpq_mpoly, fmpz_mat, fmpz_poly, nmod_mat, nmod_poly
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.modular_matrices import combine, determinant, echelon, matrix, multiply, null_space, pivots, rank
@@ -102,7 +102,7 @@ def flow_polynomials(
             break
         top += 1
     budget = budget or Budget()
-    rng = random.Random(f"flow polynomials {seed_for(seed, field.rhs)}")
+    rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
     found: dict[str, fmpq_mpoly] = {}
     # Where all right-hand sides have a factor nothing moves; and of infinitely many, as with x' = x, y' = y, these are
     # the ones that formulas need.

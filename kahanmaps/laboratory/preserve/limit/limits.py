@@ -41,7 +41,7 @@ from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofac
 from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, densities_of
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, integrals_of
 from kahanmaps.maps.implicit import ImplicitMap
-from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.kahan import KahanFamily
 
 _BUDGET = 2_000_000  # products of terms, for all that is done to integrals
 _ROUNDS = 5  # how often an integral is combined with others
@@ -135,7 +135,7 @@ class FlowAndMap:
             )
         names = ", ".join(one.name for one in self.others)
         shown = counted(self.count, "integral") if self.count else "no integral"
-        shown += " free of n" if self.map_search.in_time else ""  # others depend on the number of the point
+        shown += " free of n" if self.map_search.time_dependent else ""  # others depend on the number of the point
         if self.lost:
             which = names if self.lost == len(self.others) else f"at least {self.lost} of {names}"
             limits = f", with limits independent of {names}" if self.count else ""
@@ -164,7 +164,7 @@ class FlowAndMap:
         if self.polynomials:
             told = ", ".join(map(format_polynomial, self.polynomials))
             found.append(("proved", f"Darboux polynomials of the flow, apart from affine ones: {told}"))
-        for timed in self.search.in_time if others and self.search is not None else ():
+        for timed in self.search.time_dependent if others and self.search is not None else ():
             text = f"{timed.name} = {timed.text} is an integral of the flow that depends on time"
             found.append((str(timed.integral.verdict), text))
         if self.polynomials_degree > 1:
@@ -221,7 +221,7 @@ def flow_and_map(
     if not isinstance(search, IntegralSearch):
         raise wrong_kind(search, "what km.find_integrals found", "km.flow_and_map(km.find_integrals(...))")
     given = search.file.map
-    is_kahan = isinstance(given, Kahan)
+    is_kahan = isinstance(given, KahanFamily)
     if search.eps is not None or not (is_kahan or (isinstance(given, ImplicitMap) and given.of_field is not None)):
         return None
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
@@ -249,7 +249,7 @@ def flow_and_map(
 def with_limit(found: FlowAndMap, densities: DensitySearch | None) -> FlowAndMap:
     """What was found, the limit of a density of the map in the place of the density if the flow keeps that limit."""
     search = found.map_search
-    if densities is None or not isinstance(search.file.map, Kahan):
+    if densities is None or not isinstance(search.file.map, KahanFamily):
         return found
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
     for one in densities.densities:

@@ -20,7 +20,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate,
 from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.algebra.residues import rational_vector
 from kahanmaps.algebra.work import Budget
-from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, slopes
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
@@ -34,7 +34,7 @@ _SPARE = 4
 
 
 def casimir_candidates(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], budget: Budget
+    laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[tuple[str, RationalFunction]]:
     """Functions of the integrals that may be Casimirs, as text in their names and written out.
 
@@ -72,7 +72,7 @@ def casimir_candidates(
 
 
 def _products(
-    map_: ModularMap, tensor: GivenTensor, integrals: Sequence[FoundIntegral], context: fmpq_mpoly_ctx
+    map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], context: fmpq_mpoly_ctx
 ) -> Iterator[RationalFunction]:
     """The products of powers of at least two integrals, short ones, whose gradients the tensor kills."""
     p, rows = map_.prime, list[list[int]]()
@@ -98,7 +98,7 @@ def _products(
 
 
 def _polynomials(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], budget: Budget
+    laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
     """A basis of the polynomials of degree at most 2 in the integrals whose gradients the tensor kills."""
     degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MOST_TERMS else 1
@@ -122,7 +122,7 @@ def _polynomials(
 
 
 def _fractions(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], budget: Budget
+    laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
     """Quotients of affine functions of the integrals whose gradients the tensor kills.
 
@@ -155,7 +155,7 @@ def _fractions(
 
 def _forms(
     laboratory: Laboratory,
-    tensor: GivenTensor,
+    tensor: MatrixPoissonTensor,
     integrals: Sequence[FoundIntegral],
     powers: Sequence[tuple[int, ...]],
     columns: Callable[[list[int], list[list[int]], int], list[list[int]]],
@@ -186,7 +186,7 @@ def _forms(
 
 
 def _moved(
-    map_: ModularMap, tensor: GivenTensor, integrals: Sequence[FoundIntegral]
+    map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral]
 ) -> tuple[list[int], list[list[int]]]:
     """The values of the integrals at a random point, and P times their gradients. Raises NoPoint at a pole or zero."""
     field = GF(map_.prime)

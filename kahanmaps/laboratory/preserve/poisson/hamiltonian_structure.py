@@ -27,7 +27,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.modular_matrices import rank
@@ -40,7 +40,7 @@ from kahanmaps.errors import InputError, counted
 from kahanmaps.invariants.phase_functions import modified
 from kahanmaps.laboratory.modular_points import ModularMap, Point
 from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by
-from kahanmaps.maps.kahan import Kahan, KahanMapOver, SystemLike
+from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
@@ -103,7 +103,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
         raise InputError(
             f"found a system of dimension {n}, expected at most {MAX_DIMENSION}: the structure has n (n - 1)/2 unknowns"
         )
-    rng = random.Random(f"structure {seed_for(seed, system.rhs)}")
+    rng = random.Random(f"structure {derive_seed(seed, system.rhs)}")
     everything = quotient_by((), n)
     forms = closed_forms(system, everything, rng)
     functions = tuple(hamiltonian_function(system, everything, K) for K in forms)
@@ -243,7 +243,7 @@ class InheritedIntegrals:
 
         `map_` is that of the system modulo a prime that divides none of its denominators.
         """
-        assert isinstance(map_.map, KahanMapOver)
+        assert isinstance(map_.map, KahanMap)
         field, n, free = GF(map_.prime), map_.dim, self.quotient.free
         rows = [[int(entry) % map_.prime for entry in vector] for vector in self.quotient.integrals]
         image = map_.step(x)
@@ -282,7 +282,7 @@ class InheritedIntegrals:
         """The integral that belongs to the k-th form, at a point over a field."""
         H = self.hamiltonian(k)
         slopes = [H.derivative(i) for i in range(self.system.dim)]
-        return modified(H, slopes, Kahan(self.system).at(eps, field), x)
+        return modified(H, slopes, KahanFamily(self.system).at(eps, field), x)
 
 
 def inherited_integrals(system: QuadraticSystem, *, seed: int = 0) -> InheritedIntegrals:

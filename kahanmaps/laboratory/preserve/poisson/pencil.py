@@ -24,7 +24,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fq_default_ctx, fq_default_poly_ctx, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.printing import attributes
@@ -133,7 +133,7 @@ def pencil_of(
     """
     if max(degree_in(part, 2) for part in (integral.numerator, integral.denominator)) > MAX_DEGREE:
         return None
-    rng = random.Random(f"pencil {seed_for(seed, integral, eps)}")
+    rng = random.Random(f"pencil {derive_seed(seed, integral, eps)}")
     budget = budget_for("invariant curves", effort)
     found: list[Pencil] = []
     for _ in range(_TRIES):

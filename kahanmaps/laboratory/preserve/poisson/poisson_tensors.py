@@ -26,17 +26,17 @@ from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
 from kahanmaps.algebra.work import SPENT, Budget, count
+from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.judge import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
 from kahanmaps.invariants.phase_functions import at_eps
-from kahanmaps.invariants.poisson import GivenTensor
+from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.defaults import budget_for, tensor_degree
-from kahanmaps.laboratory.laboratory import Laboratory, judged
+from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import (
     Independent,
     ModularMap,
@@ -77,7 +77,7 @@ class FoundTensor:
     """
 
     name: str
-    tensor: GivenTensor
+    tensor: MatrixPoissonTensor
     verdict: Certainty
     evidence: Evidence
     jacobi: Certainty
@@ -327,7 +327,7 @@ def _tensors(
     denominator: RationalFunction | None,
     budget: Budget,
     monomials: frozenset[Exponents] | None = None,
-) -> tuple[list[GivenTensor], str]:
+) -> tuple[list[MatrixPoissonTensor], str]:
     """A basis of the tensors over the denominator in closed form, of these monomials, or a reason why there is none."""
     try:
         model, other = (tensor_space(map_, degree, denominator, monomials) for map_ in laboratory.maps)
@@ -357,7 +357,7 @@ def _tensors(
                 wide[places[(*exponent, *[0] * n)]] = c
             products = (product_of(wide, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
             rows += [P for P in products if P is not None]
-    context, spanned, found = ring(laboratory.map.names), rank(rows, map_.prime), list[GivenTensor]()
+    context, spanned, found = ring(laboratory.map.names), rank(rows, map_.prime), list[MatrixPoissonTensor]()
     over, times = context.constant(1), context.constant(1)
     if denominator is not None:
         over, times = denominator.numerator, denominator.denominator
@@ -373,7 +373,7 @@ def _tensors(
         upper = {pair: context.from_dict(terms) * times for pair, terms in entries.items()}
         zero = context.constant(0)
         matrix = [[upper.get((i, j), zero) - upper.get((j, i), zero) for j in range(n)] for i in range(n)]
-        found.append(GivenTensor([[RationalFunction.reduced(P, over) for P in row] for row in matrix]))
+        found.append(MatrixPoissonTensor([[RationalFunction.reduced(P, over) for P in row] for row in matrix]))
     return found, ""
 
 
@@ -426,7 +426,7 @@ def tensor_space(
     return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime, [place for place, _, _ in unknowns])
 
 
-def _at(tensor: GivenTensor, map_: ModularMap, x: Sequence[int]) -> Any:
+def _at(tensor: MatrixPoissonTensor, map_: ModularMap, x: Sequence[int]) -> Any:
     """The matrix of a tensor at a point modulo a prime."""
     field = GF(map_.prime)
     return tensor.value(field, field.convert(map_.eps), tuple(field.convert(c) for c in (*x, *map_.values)))
@@ -473,11 +473,11 @@ def _with_brackets(
 
 def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Certainty, Evidence]:
     """The verdict on an identity, which is not multiplied out when the budget is spent."""
-    return judged(identity, laboratory.seed, expands=not budget.is_spent)
+    return certified(identity, laboratory.seed, expands=not budget.is_spent)
 
 
 def _brackets(
-    laboratory: Laboratory, tensor: GivenTensor, functions: Sequence[RationalFunction], of_variables: bool
+    laboratory: Laboratory, tensor: MatrixPoissonTensor, functions: Sequence[RationalFunction], of_variables: bool
 ) -> Identity:
     """That all brackets of two functions vanish or, `of_variables`, those of a function and a variable."""
     n = tensor.dim
@@ -502,7 +502,7 @@ def _brackets(
     return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=subject)
 
 
-def _pencil(tensors: Sequence[GivenTensor]) -> GivenTensor:
+def _pencil(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
     """The sum of the tensors, each times a symbol of its own."""
     names = tensors[0].rows[0][0].names
     letter = "c"
@@ -520,4 +520,4 @@ def _pencil(tensors: Sequence[GivenTensor]) -> GivenTensor:
         return RationalFunction.reduced(numerator, denominator)
 
     n = tensors[0].dim
-    return GivenTensor([[total(one.rows[i][j] for one in tensors) for j in range(n)] for i in range(n)])
+    return MatrixPoissonTensor([[total(one.rows[i][j] for one in tensors) for j in range(n)] for i in range(n)])

@@ -25,7 +25,7 @@ from flint import fmpq, fmpz, fmpz_mat
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, pivots
 from kahanmaps.algebra.residues import from_residues
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps, lowest
 
@@ -70,7 +70,7 @@ class BilinearForms:
         return image
 
 
-def bilinear_forms(map_over: MapOver, point: IntegerPoint) -> BilinearForms | None:
+def bilinear_forms(map_over: Map, point: IntegerPoint) -> BilinearForms | None:
     """The forms along the orbit of a point, with lag 1 if there are such; None where none are found."""
     if len(map_over.factors) > 1 or map_over.dim > _MOST_DIMENSION:
         return None

@@ -24,7 +24,7 @@ from flint import fmpq, fmpz, fmpz_mat
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.residues import from_residues
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapOver, StepOver
+from kahanmaps.maps.implicit import ElementaryMap, Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
 from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, EllipticSteps
@@ -44,7 +44,7 @@ class TooLongRelation(Exception):
     """The orbit lies on elliptic curves, but numbers of its forms are too long to be found yet."""
 
 
-def elliptic_steps(map_over: MapOver, start: IntegerPoint, bits: int) -> EllipticSteps | None:
+def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSteps | None:
     """The steps of the orbit from a start; None where it is not known to lie on elliptic curves.
 
     No numbers are looked for that are not much shorter than points with so many bits. Raises TooLong where there are
@@ -78,7 +78,7 @@ def elliptic_steps(map_over: MapOver, start: IntegerPoint, bits: int) -> Ellipti
     return None
 
 
-def _unit(factors: Sequence[StepOver]) -> Sequence[StepOver]:
+def _unit(factors: Sequence[ElementaryMap]) -> Sequence[ElementaryMap]:
     """The first ones, of which the others are repetitions."""
     count = len(factors)
     return next(
@@ -103,7 +103,7 @@ class _Search:
     `earlier` has, for the curves in turn, what each group was one step before, None where it is new.
     """
 
-    def __init__(self, factors: Sequence[StepOver], start: IntegerPoint, stride: int) -> None:
+    def __init__(self, factors: Sequence[ElementaryMap], start: IntegerPoint, stride: int) -> None:
         self.factors, self._start, self.stride = factors, start, stride
         n = factors[0].dim
         self.groups: Groups = [tuple(range(n))]
@@ -230,7 +230,7 @@ class _Exact:
             bound = common_primes(search.sections[place].degree, self._tables[place], self._W, U)
             self._all_primes[place] = self._primes.lcm(bound.p).lcm(bound.q)
 
-    def steps(self, map_over: MapOver, left_out: int = 0) -> EllipticSteps:
+    def steps(self, map_over: Map, left_out: int = 0) -> EllipticSteps:
         """The steps; the numbers are those of the orbit without its first points, so many."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)

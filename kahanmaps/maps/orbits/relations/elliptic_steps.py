@@ -13,7 +13,7 @@ from flint import fmpz, fmpz_mat
 
 from kahanmaps.algebra.integers import common_part
 from kahanmaps.algebra.matrices import primitive_integers
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
 from kahanmaps.maps.orbits.relations.forms import exponents
 from kahanmaps.maps.somos import Terms
@@ -31,7 +31,7 @@ class EllipticSteps:
     name = "Somos sequences along the orbit"
 
     def __init__(
-        self, map_over: MapOver, places: Sequence[Sequence[Coordinates | int]], first: int, left_out: int = 0
+        self, map_over: Map, places: Sequence[Sequence[Coordinates | int]], first: int, left_out: int = 0
     ) -> None:
         self._map, self._places, self._first, self._left_out = map_over, places, first, left_out
         self._residue: list[int] | None = None

@@ -8,7 +8,7 @@ from itertools import count
 from math import inf
 from typing import Protocol
 
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
@@ -48,7 +48,7 @@ class RationalOrbit:
 
     def __init__(
         self,
-        map_over: MapOver,
+        map_over: Map,
         start: IntegerPoint,
         max_bits: int | None = None,
         wanted: Callable[[int], bool] | None = None,
@@ -102,6 +102,6 @@ class RationalOrbit:
                 self.since = None if self.relations is None else number + 1
 
 
-def relations(map_over: MapOver, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
+def relations(map_over: Map, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
     """The relations that make steps shortest along the orbit of a start on which the point lies. Raises TooLong."""
     return elliptic_steps(map_over, start, point.bits) or bilinear_forms(map_over, point)

@@ -31,7 +31,7 @@ from typing import Any
 import flint
 from flint import arb, fmpq, fmpq_mpoly, nmod_mat, nmod_poly
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.work import Budget, count
@@ -40,7 +40,7 @@ from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of
 from kahanmaps.laboratory.singular.written import forms_over_eps
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import homogeneous_map
 
@@ -55,7 +55,7 @@ _MOST_NEXT_TERMS = 4000  # of the last one, which has about degree^2 times as ma
 
 
 @dataclass(frozen=True)
-class Enclosure:
+class DynamicalDegreeBounds:
     """Bounds of the dynamical degree of a planar map that are proved, for generic eps or for the eps given.
 
     `lower` and `upper` are decimal numbers, rounded down and up; the dynamical degree is more than `lower`, for generic
@@ -85,14 +85,14 @@ class Enclosure:
         return {**found, "prime": str(self.prime), "eps_residue": str(self.eps), "text": self.text}
 
 
-def enclose(
-    map_: BirationalMap,
+def bound_dynamical_degree(
+    map_: MapFamily,
     eps: fmpq | None,
     *,
     seed: int = 0,
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
-) -> Enclosure | None:
+) -> DynamicalDegreeBounds | None:
     """Bounds of the dynamical degree of a planar map, the lower one above 1: positive entropy, proved.
 
     `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), and for all but finitely many eps.
@@ -102,15 +102,15 @@ def enclose(
     Source: docs/mathematics.md.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = enclose(load("lotka_volterra").map, None)
+    >>> found = bound_dynamical_degree(load("lotka_volterra").map, None)
     >>> found.lower, found.upper
     ('1.973638', '2')
-    >>> enclose(load("nahm_tetrahedral").map, None, effort=-6) is None
+    >>> bound_dynamical_degree(load("nahm_tetrahedral").map, None, effort=-6) is None
     True
     """
     if map_.dim != 2 or map_.symbols or map_.root is not None:
         return None
-    rng = random.Random(f"enclosure {seed_for(seed, map_.subject, eps)}")
+    rng = random.Random(f"enclosure {derive_seed(seed, map_.subject, eps)}")
     budget = budget_for("dynamical degree", effort)
     for _ in range(_TRIES):
         try:
@@ -128,7 +128,7 @@ def enclose(
     return None
 
 
-def is_birational(map_: MapOver, rng: random.Random) -> bool:
+def is_birational(map_: Map, rng: random.Random) -> bool:
     """Whether a map over GF(p) is birational, proved where the answer is yes.
 
     It is not where the inverse is not known. Of every factor: the equation of its inverse, at the image of a generic
@@ -175,7 +175,9 @@ def lower_bound(below: int, above: int, steps: int) -> arb | None:
         return (arb(fmpq(below - 1, 2 * (above - 1)) - 1).acosh() / steps).exp()
 
 
-def _lower(map_: MapOver, rng: random.Random, budget: Budget, progress: Callable[[str], None]) -> Enclosure | None:
+def _lower(
+    map_: Map, rng: random.Random, budget: Budget, progress: Callable[[str], None]
+) -> DynamicalDegreeBounds | None:
     """The best lower bound above 1, rounded down; there is no upper one yet."""
     line = Line(map_, rng, budget.part(0.5), _LARGEST)
     degrees = [1]
@@ -207,7 +209,7 @@ def _lower(map_: MapOver, rng: random.Random, budget: Budget, progress: Callable
     if bound is None:
         return None
     prime, eps = map_.field.characteristic, int(map_.eps)
-    return Enclosure(decimal(bound.lower(), -1), "", steps, degrees[2 * steps], above, prime, eps)
+    return DynamicalDegreeBounds(decimal(bound.lower(), -1), "", steps, degrees[2 * steps], above, prime, eps)
 
 
 def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
@@ -225,7 +227,7 @@ def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
     return lines
 
 
-def _written_degrees(map_: BirationalMap, eps: fmpq | None, budget: Budget) -> Iterator[int]:
+def _written_degrees(map_: MapFamily, eps: fmpq | None, budget: Budget) -> Iterator[int]:
     """The degrees of f, f^2, ... from forms without common factor over Q, or Q[eps], while they are short enough."""
     try:
         forms = forms_over_eps(map_.rows, eps)

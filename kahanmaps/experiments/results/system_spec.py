@@ -25,12 +25,12 @@ from kahanmaps.errors import InputError, show
 from kahanmaps.experiments.options import FAMILY
 from kahanmaps.experiments.results.records import canonical, digest
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.draw import (
-    draw_generic,
-    draw_with_chi,
-    draw_with_eigenvalues,
+from kahanmaps.family.random_members import (
     parse_chi,
     random_eigenvalues,
+    random_member,
+    random_member_with_chi,
+    random_member_with_eigenvalues,
 )
 
 _KEPT = 16  # systems that a child keeps: tasks that differ in eps only come one after the other
@@ -54,7 +54,7 @@ def find_file(reference: str, folder: Path) -> SystemFile:
     return load(reference)
 
 
-def recipe_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
+def spec_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
     """The recipe of a system file, with its own parameters; its document joins `documents`."""
     text = document_text(file)
     key = digest(text)
@@ -63,10 +63,10 @@ def recipe_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
     return {"document": key, "name": file.name, "parameters": parameters}
 
 
-def family_recipe(values: Mapping[str, Any]) -> dict[str, Any]:
+def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
     """The recipe of a random member drawn with these values of `FAMILY` and this seed.
 
-    >>> family_recipe({"m": 3, "seed": 7, "eps": "1/10"})
+    >>> family_spec({"m": 3, "seed": 7, "eps": "1/10"})
     {'family': {'draw': 'eigenvalues', 'size': 2, 'm': 3, 'seed': 7}}
     """
     given = {name: values[name] for name in FAMILY if values.get(name) is not None}
@@ -96,15 +96,15 @@ def _drawn(text: str) -> SystemFile:
     recipe = json.loads(text)
     seed, m, size = recipe["seed"], recipe.get("m"), recipe.get("size")
     if recipe.get("chi"):
-        member = draw_with_chi(parse_chi(recipe["chi"]), seed, size or 1)
+        member = random_member_with_chi(parse_chi(recipe["chi"]), seed, size or 1)
     elif recipe.get("eigenvalues"):
-        member = draw_with_eigenvalues(FAMILY["eigenvalues"].make(recipe["eigenvalues"]), seed, size or 2)
+        member = random_member_with_eigenvalues(FAMILY["eigenvalues"].make(recipe["eigenvalues"]), seed, size or 2)
     elif m is None:
         raise InputError("a random member of the family needs m, eigenvalues or chi")
     elif recipe["draw"] == "generic":
-        member = draw_generic(m, seed, size or 1)
+        member = random_member(m, seed, size or 1)
     else:
-        member = draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
+        member = random_member_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
     if recipe.get("signs"):
         member = FamilyMember(member.A, member.H, FAMILY["signs"].make(recipe["signs"]))
     how = f", {recipe['draw']}" if recipe["draw"] != "eigenvalues" else ""

@@ -29,13 +29,13 @@ _KEY = "not "
 Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coordinates, "x" with one
 
 
-def survivors(m: int = 3, settings: Settings | None = None) -> Report:
+def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
     """Every statement for every variation, in half the dimension m: what holds is proved, what fails is refuted.
 
     Refuted cells are expected to be, and count as controls. Returns a Report with one Finding a cell; raises InputError
     as `verify` does.
 
-    >>> cells = {found.claim: found for found in survivors(1).findings}
+    >>> cells = {found.claim: found for found in beyond_table(1).findings}
     >>> cells["eps^{-1} x^T J^{-1} x~ is conserved by f: H inhomogeneous"].evidence.summary
     'fails for m = 1, H = u1^3 + v1'
     """

@@ -26,13 +26,13 @@ from kahanmaps.family.tensor import GENERATOR, components, split_names
 MAX_M = 16  # beyond, H may be longer than the texts that system files allow
 
 
-def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) -> FamilyMember:
+def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) -> FamilyMember:
     """A member whose A has these rational eigenvalues (each twice), hidden by a random symplectic matrix.
 
     `size` bounds the integer coefficients of the planar cubics. Repeated eigenvalues are allowed and give a
     diagonalisable, non-generic A.
 
-    >>> member = draw_with_eigenvalues([1, -2], seed=7)
+    >>> member = random_member_with_eigenvalues([1, -2], seed=7)
     >>> [str(factor) for factor in member.factors]
     ['t + 2', 't - 1']
     """
@@ -55,13 +55,13 @@ def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) 
     return FamilyMember(_hidden(normal, S), H)
 
 
-def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
+def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
     """A member whose A has characteristic polynomial chi(t)^2, chi of degree m, hidden by a random symplectic matrix.
 
     `size` bounds the integer coefficients of the cubic form over Q[t]/chi. Where chi has repeated roots A is not
     diagonalisable.
 
-    >>> draw_with_chi(fmpq_poly([-2, 0, 1]), seed=7).factors[0].degree
+    >>> random_member_with_chi(fmpq_poly([-2, 0, 1]), seed=7).factors[0].degree
     2
     """
     m = _require_m(chi.degree())
@@ -95,10 +95,10 @@ def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
     return FamilyMember(_hidden(normal, S), H)
 
 
-def draw_generic(m: int, seed: int, size: int = 1) -> FamilyMember:
+def random_member(m: int, seed: int, size: int = 1) -> FamilyMember:
     """A member with a random integer chi without repeated roots, typically irreducible.
 
-    >>> draw_generic(3, seed=7).is_generic
+    >>> random_member(3, seed=7).is_generic
     True
     """
     m = _require_m(m)
@@ -106,11 +106,11 @@ def draw_generic(m: int, seed: int, size: int = 1) -> FamilyMember:
     while True:
         chi = fmpq_poly([rng.choice((-3, -2, -1, 1, 2, 3)), *(rng.randint(-2, 2) for _ in range(m - 1)), 1])
         if all(multiplicity == 1 for _, multiplicity in chi.factor()[1]):
-            return draw_with_chi(chi, seed, size)
+            return random_member_with_chi(chi, seed, size)
 
 
 def parse_chi(text: str) -> fmpq_poly:
-    """A polynomial in t of degree at least 1, for `draw_with_chi`.
+    """A polynomial in t of degree at least 1, for `random_member_with_chi`.
 
     >>> parse_chi("(t - 1)*(t^2 - 2)")
     x^3 + (-1)*x^2 + (-2)*x + 2

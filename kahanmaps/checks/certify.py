@@ -26,7 +26,7 @@ class Contradiction(AssertionError):
         self.witness = witness
 
 
-def judge(
+def certify(
     claim: str,
     identity: Identity,
     settings: Settings,
@@ -51,7 +51,7 @@ def judge(
         if decision.verdict is Certainty.SUPPORTED:
             also.append(_without_bound(decision.evidence))
     elif not control:
-        settled = settle(identity, decision, settings.seed)
+        settled = try_expand(identity, decision, settings.seed)
         verdict, evidence, witness = settled.verdict, settled.evidence, settled.witness
         if verdict is Certainty.PROVED:
             also.append(_without_bound(decision.evidence))
@@ -112,7 +112,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     )
 
 
-def settle(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
+def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
     """The decision at random points or, where these support a claim and both sides can be multiplied out, that."""
     if decision.verdict is not Certainty.SUPPORTED:
         return decision

@@ -8,9 +8,14 @@ from flint import fmpq, fmpq_poly
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.experiments.options import FAMILY
-from kahanmaps.experiments.results.recipes import document_text, family_recipe, find_file, recipe_of, system_from
 from kahanmaps.experiments.results.records import canonical
-from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
+from kahanmaps.experiments.results.system_spec import document_text, family_spec, find_file, spec_of, system_from
+from kahanmaps.family.random_members import (
+    random_eigenvalues,
+    random_member,
+    random_member_with_chi,
+    random_member_with_eigenvalues,
+)
 
 ROTOR = 'name = "rotor"\nvariables = ["x", "y"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*y", "-x*y"]\n'
 CATALOG = '[catalog]\ntitle = "Rotor"\nfacts = ["Measured: it turns."]\n'
@@ -19,14 +24,14 @@ CATALOG = '[catalog]\ntitle = "Rotor"\nfacts = ["Measured: it turns."]\n'
 def drawn(**values: object) -> SystemFile:
     """The random member of a recipe, with values as a spec has them."""
     return system_from(
-        family_recipe({k: FAMILY[k].read(v) if k in FAMILY else v for k, v in values.items()}), {}.__getitem__
+        family_spec({k: FAMILY[k].read(v) if k in FAMILY else v for k, v in values.items()}), {}.__getitem__
     )
 
 
 def again(file: SystemFile, **parameters: str) -> SystemFile:
     """The system that comes back from the recipe of a file."""
     documents: dict[str, str] = {}
-    recipe = recipe_of(file, documents)
+    recipe = spec_of(file, documents)
     recipe = json.loads(canonical({**recipe, "parameters": {**recipe["parameters"], **parameters}}))
     return system_from(recipe, documents.__getitem__)
 
@@ -37,11 +42,11 @@ def again(file: SystemFile, **parameters: str) -> SystemFile:
 @pytest.mark.parametrize(
     ("values", "member"),
     [
-        ({"m": 2}, lambda: draw_with_eigenvalues(random_eigenvalues(2, 0), 0)),
-        ({"m": 3, "seed": 7, "size": 5}, lambda: draw_with_eigenvalues(random_eigenvalues(3, 7), 7, 5)),
-        ({"m": 3, "seed": 7, "draw": "generic", "size": 4}, lambda: draw_generic(3, 7, 4)),
-        ({"eigenvalues": "1/2,-3", "seed": 7}, lambda: draw_with_eigenvalues([fmpq(1, 2), -3], 7)),
-        ({"chi": "2*t^2 - 4", "seed": 7, "size": 3}, lambda: draw_with_chi(fmpq_poly([-2, 0, 1]), 7, 3)),
+        ({"m": 2}, lambda: random_member_with_eigenvalues(random_eigenvalues(2, 0), 0)),
+        ({"m": 3, "seed": 7, "size": 5}, lambda: random_member_with_eigenvalues(random_eigenvalues(3, 7), 7, 5)),
+        ({"m": 3, "seed": 7, "draw": "generic", "size": 4}, lambda: random_member(3, 7, 4)),
+        ({"eigenvalues": "1/2,-3", "seed": 7}, lambda: random_member_with_eigenvalues([fmpq(1, 2), -3], 7)),
+        ({"chi": "2*t^2 - 4", "seed": 7, "size": 3}, lambda: random_member_with_chi(fmpq_poly([-2, 0, 1]), 7, 3)),
     ],
 )
 def test_a_random_member_is_the_one_that_the_library_draws(values, member):
@@ -75,9 +80,9 @@ def test_every_system_of_the_catalogue_reads_back_equal():
 )
 def test_a_recipe_is_another_one_when_the_file_says_something_else(text, is_same):
     documents: dict[str, str] = {}
-    recipe = recipe_of(parse_system(ROTOR), documents)
+    recipe = spec_of(parse_system(ROTOR), documents)
     assert documents == {recipe["document"]: document_text(parse_system(ROTOR))}
-    assert (recipe_of(parse_system(text), {}) == recipe) is is_same
+    assert (spec_of(parse_system(text), {}) == recipe) is is_same
 
 
 @pytest.mark.parametrize(("reference", "name"), [("lorenz", "lorenz"), ("./rotor.toml", "rotor")])

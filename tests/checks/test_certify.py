@@ -7,11 +7,11 @@ the library, and is raised as one. Without proof random points decide, and an or
 import pytest
 from flint import fmpq
 
-from kahanmaps.checks import judge as judge_module
+from kahanmaps.checks import certify as certify_module
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import Contradiction, certify
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision, Identity
-from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import OrbitRun, Settings
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.orbits.iteration import OrbitEnd
@@ -50,42 +50,42 @@ NOWHERE = Identity(1, undefined, None, subject=())
 def blind(monkeypatch):
     """Random points that let everything pass."""
     held = Decision(SUPPORTED, Evidence("random points over GF(p)", "held"))
-    monkeypatch.setattr(judge_module, "decide", lambda *arguments: held)
-    monkeypatch.setattr(judge_module, "expansion", lambda *_: None)
+    monkeypatch.setattr(certify_module, "decide", lambda *arguments: held)
+    monkeypatch.setattr(certify_module, "expansion", lambda *_: None)
 
 
 def test_a_proof_decides_and_the_points_stand_beside_it():
-    found = judge("c", TRUE, Settings(), PROOF, orbit(1, 2))
+    found = certify("c", TRUE, Settings(), PROOF, orbit(1, 2))
     assert (found.verdict, found.evidence) == (PROVED, PROOF)
     assert [evidence.method for evidence in found.also] == ["random points over GF(p)", "exact orbit"]
 
 
 def test_a_proved_claim_that_fails_at_a_random_point_is_a_contradiction():
     with pytest.raises(Contradiction, match="c: Theorem 1 applies: a hypothesis, but it fails at a rational point"):
-        judge("c", FALSE, Settings(), PROOF)
+        certify("c", FALSE, Settings(), PROOF)
 
 
 def test_a_proved_claim_that_fails_on_the_orbit_is_a_contradiction(blind):
     with pytest.raises(Contradiction, match="but it fails at step 0 of an exact orbit"):
-        judge("c", FALSE, Settings(), PROOF, orbit(1, 2))
+        certify("c", FALSE, Settings(), PROOF, orbit(1, 2))
 
 
 def test_a_claim_proved_by_expansion_that_fails_on_the_orbit_is_a_contradiction(blind, monkeypatch):
     expanded = Evidence("expansion", "both sides are the same")
-    monkeypatch.setattr(judge_module, "expansion", lambda *_: expanded)
-    assert judge("c", TRUE, Settings(), None, orbit(1, 2)).evidence == expanded
+    monkeypatch.setattr(certify_module, "expansion", lambda *_: expanded)
+    assert certify("c", TRUE, Settings(), None, orbit(1, 2)).evidence == expanded
     with pytest.raises(Contradiction, match="both sides are the same, but it fails at step 0"):
-        judge("c", FALSE, Settings(), None, orbit(1, 2))
+        certify("c", FALSE, Settings(), None, orbit(1, 2))
 
 
 def test_a_theorem_proves_nothing_of_what_is_defined_nowhere():
-    found = judge("c", NOWHERE, Settings(), PROOF)
+    found = certify("c", NOWHERE, Settings(), PROOF)
     assert (found.verdict, found.also) == (UNDECIDED, ())
     assert "not defined at any" in found.evidence.summary
 
 
 def test_a_claim_that_fails_at_random_points_is_refuted_whatever_the_orbit_says():
-    found = judge("c", FALSE_BUT_ON_AN_ORBIT, Settings(), None, orbit(1, 2, 1))
+    found = certify("c", FALSE_BUT_ON_AN_ORBIT, Settings(), None, orbit(1, 2, 1))
     assert found.verdict is REFUTED
     assert found.evidence.method == "exact rational point"
     assert found.also[0].summary == "held exactly at 3 points of an orbit, eps = 1/10"
@@ -94,7 +94,7 @@ def test_a_claim_that_fails_at_random_points_is_refuted_whatever_the_orbit_says(
 
 
 def test_an_orbit_refutes_what_random_points_let_pass(blind):
-    found = judge("c", FALSE, Settings(), None, orbit(1, 2))
+    found = certify("c", FALSE, Settings(), None, orbit(1, 2))
     assert found.verdict is REFUTED
     assert found.evidence.summary == "fails at step 0 of an exact orbit"
     assert (found.witness.point, found.witness.left, found.witness.right) == (("1",), ("1",), ("2",))
@@ -110,12 +110,12 @@ def test_an_orbit_refutes_what_random_points_let_pass(blind):
     ],
 )
 def test_an_orbit_says_at_how_many_points_a_claim_held(points, summary, blind):
-    assert judge("c", POLE_FIRST, Settings(), None, orbit(*points)).also[-1].summary == summary
+    assert certify("c", POLE_FIRST, Settings(), None, orbit(*points)).also[-1].summary == summary
 
 
 @pytest.mark.parametrize(
     ("identity", "control", "verdict"), [(FALSE, False, REFUTED), (NOWHERE, False, UNDECIDED), (TRUE, True, SUPPORTED)]
 )
 def test_what_fails_or_is_nowhere_defined_is_not_expanded_and_no_control_is(identity, control, verdict, monkeypatch):
-    monkeypatch.setattr(judge_module, "expansion", lambda *_: pytest.fail("it was expanded"))
-    assert judge("c", identity, Settings(), control=control).verdict is verdict
+    monkeypatch.setattr(certify_module, "expansion", lambda *_: pytest.fail("it was expanded"))
+    assert certify("c", identity, Settings(), control=control).verdict is verdict

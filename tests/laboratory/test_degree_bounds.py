@@ -11,8 +11,14 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduced
+from kahanmaps.laboratory.growth.degree_bounds import (
+    bound_dynamical_degree,
+    decimal,
+    degree_above,
+    is_birational,
+    lower_bound,
+)
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.enclosure import decimal, degree_above, enclose, is_birational, lower_bound
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -37,7 +43,7 @@ def test_the_bounds_enclose_the_dynamical_degree_that_is_explained(name):
 
 @pytest.mark.parametrize("name", quick(INTEGRABLE, ["harmonic", "nahm_tetrahedral", "mcmillan"]))
 def test_no_integrable_map_gets_a_bound(name):
-    assert enclose(load(name).map, None, effort=-3) is None
+    assert bound_dynamical_degree(load(name).map, None, effort=-3) is None
 
 
 @given(st.integers(1, 10**6), st.integers(7, 200))
@@ -101,6 +107,6 @@ def test_a_map_that_is_not_birational_is_refused(monkeypatch):
     assert is_birational(good, rng)
     kahan = as_map(QuadraticSystem.from_text(["x", "y"], ["x", "y^2"]))
     assert not is_birational(kahan.at(GF(PRIME).convert(fmpq(-1)), GF(PRIME)), rng)  # into a line
-    monkeypatch.setattr("kahanmaps.laboratory.growth.enclosure.is_birational", lambda *_: False)
-    assert enclose(load("lotka_volterra").map, None) is None
-    assert enclose(load("lorenz").map, None) is None  # bounds are for the plane
+    monkeypatch.setattr("kahanmaps.laboratory.growth.degree_bounds.is_birational", lambda *_: False)
+    assert bound_dynamical_degree(load("lotka_volterra").map, None) is None
+    assert bound_dynamical_degree(load("lorenz").map, None) is None  # bounds are for the plane

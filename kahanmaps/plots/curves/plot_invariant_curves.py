@@ -31,7 +31,7 @@ _CROWDED = 0.06  # of the width of a panel: a number would cover the one before
 _NUMBERED = 4  # steps whose dots have their number beside them
 
 
-def draw_invariant_curves(
+def plot_invariant_curves(
     found: InvariantCurves,
     style: Style,
     projective: bool = False,

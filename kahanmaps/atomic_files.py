@@ -14,7 +14,7 @@ from typing import IO, Any
 
 
 @contextmanager
-def whole_file(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
+def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
     """A stream to a file beside `path`, which takes its place at the end of the block; if that raises, it goes.
 
     What stood there stays until then: whoever looks, at any moment and after any end, finds the old file or the new
@@ -56,7 +56,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
 
 
 @contextmanager
-def growing_file(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
+def open_append(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
     """A stream of text to a file that whoever looks sees grow; it is on the disk at the end of the block.
 
     Raises OSError that names `path`.
@@ -76,9 +76,9 @@ def named(path: str | os.PathLike[str]) -> Iterator[None]:
         raise
 
 
-def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file as `whole_file` does. Raises OSError where it cannot be written."""
-    with whole_file(path) as stream:
+def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file as `atomic_write` does. Raises OSError where it cannot be written."""
+    with atomic_write(path) as stream:
         stream.write(content)
 
 

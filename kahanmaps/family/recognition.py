@@ -38,11 +38,11 @@ _T = fmpq_poly([0, 1])
 
 
 @dataclass(frozen=True, eq=False)
-class RecognisedMember:
+class FamilyStructure:
     """A Hamiltonian system that was found to be a member: `member` is the system in the coordinates y with x = T y.
 
     T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of
-    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `recognised_member`; that `member` is the system is
+    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `find_family_structure`; that `member` is the system is
     verified at construction, exactly. Raises HypothesisError otherwise.
     """
 
@@ -129,7 +129,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     return _reduced([inverse * fmpq_mat(S) for S in found])
 
 
-def recognised_member(hamiltonian: CubicHamiltonian) -> RecognisedMember | None:
+def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
     """The system as a member of the family, if it is one: with an A that splits H the furthest, of small entries.
 
     H must be a homogeneous cubic and J invertible, in dimension 2m; otherwise, and where only the multiples of I
@@ -141,13 +141,13 @@ def recognised_member(hamiltonian: CubicHamiltonian) -> RecognisedMember | None:
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> H = parse_polynomial("x1^3 + x3^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
-    >>> found = recognised_member(CubicHamiltonian(H, standard_structure(4)))
+    >>> found = find_family_structure(CubicHamiltonian(H, standard_structure(4)))
     >>> found.text
     'H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)'
     >>> [g.label for g in found.member.associated()]
     ['++', '+-']
     >>> H = parse_polynomial("x1^3 + x1*x2*x3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
-    >>> recognised_member(CubicHamiltonian(H, standard_structure(4))) is None
+    >>> find_family_structure(CubicHamiltonian(H, standard_structure(4))) is None
     True
     """
     if _reason_against(hamiltonian):
@@ -163,17 +163,17 @@ def recognised_member(hamiltonian: CubicHamiltonian) -> RecognisedMember | None:
     space = structure_space(H)
     if len(space) == 1 and hamiltonian.dim > 2:
         return None
-    return RecognisedMember(hamiltonian, FamilyMember(_furthest(space), H), T, len(space))
+    return FamilyStructure(hamiltonian, FamilyMember(_furthest(space), H), T, len(space))
 
 
-def recognised_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
+def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     """H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none. Exact.
 
     Other structures J are not searched for.
 
-    >>> print(recognised_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "-q^2"])).H)
+    >>> print(find_cubic_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "-q^2"])).H)
     1/3*q^3 + 1/2*p^2
-    >>> recognised_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "p^2"])) is None
+    >>> find_cubic_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "p^2"])) is None
     True
     """
     if system.dim % 2:
@@ -190,19 +190,19 @@ def recognised_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     return CubicHamiltonian(H, J) if gradient(H) == field else None
 
 
-def recognised_member_of(system: QuadraticSystem | Any) -> RecognisedMember | None:
-    """`recognised_member` of the system, where x' = J grad H with the standard J; None otherwise.
+def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure | None:
+    """`find_family_structure` of the system, where x' = J grad H with the standard J; None otherwise.
 
     >>> rhs = ["3*x3^2", "x2^2", "-3*x1^2", "-2*x2*x4"]
-    >>> print(recognised_member_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
+    >>> print(find_family_structure_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
     H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)
     """
-    hamiltonian = recognised_hamiltonian(as_system(system))
-    return None if hamiltonian is None else recognised_member(hamiltonian)
+    hamiltonian = find_cubic_hamiltonian(as_system(system))
+    return None if hamiltonian is None else find_family_structure(hamiltonian)
 
 
-def reason_against(hamiltonian: CubicHamiltonian | None) -> str:
-    """In a sentence why the system is no member; None stands for one that `recognised_hamiltonian` has no H for."""
+def why_not_member(hamiltonian: CubicHamiltonian | None) -> str:
+    """In a sentence why the system is no member; None stands for one that `find_cubic_hamiltonian` has no H for."""
     if hamiltonian is None:
         return "x' is not J grad H with J = [[0, I], [-I, 0]]"
     return _reason_against(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
