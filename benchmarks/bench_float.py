@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
-from kahanmaps import random_member_with_eigenvalues, normal_form
+from kahanmaps import normal_form, random_member_with_eigenvalues
 from kahanmaps.maps.floats.blocks import planar_blocks
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.kernels import has_numba

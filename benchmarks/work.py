@@ -20,7 +20,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps import QuadraticSystem, random_member_with_eigenvalues
-from kahanmaps.family.random_members import random_member_with_chi, parse_chi
+from kahanmaps.family.random_members import parse_chi, random_member_with_chi
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 
 Row = dict[str, Any]  # contestant, work, seconds, ratio, note; `group` names the table

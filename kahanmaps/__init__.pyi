@@ -44,11 +44,11 @@ from .experiments.spec import read_spec as read_spec
 from .family.associated import AssociatedSystem as AssociatedSystem
 from .family.associated import FamilyMember as FamilyMember
 from .family.cubics import cubic_space as cubic_space
+from .family.planar import NormalForm as NormalForm
+from .family.planar import normal_form as normal_form
 from .family.random_members import random_member as random_member
 from .family.random_members import random_member_with_chi as random_member_with_chi
 from .family.random_members import random_member_with_eigenvalues as random_member_with_eigenvalues
-from .family.planar import NormalForm as NormalForm
-from .family.planar import normal_form as normal_form
 from .family.recognition import FamilyStructure as FamilyStructure
 from .family.recognition import find_family_structure as find_family_structure
 from .family.recognition import find_family_structure_of as find_family_structure_of
@@ -111,8 +111,8 @@ from .maps.floats.fast import FloatOrbit as FloatOrbit
 from .maps.floats.fast import to_floats as to_floats
 from .maps.floats.lyapunov import Lyapunov as Lyapunov
 from .maps.floats.lyapunov import lyapunov_exponents as lyapunov_exponents
-from .maps.implicit import MapFamily as MapFamily
 from .maps.implicit import ImplicitMap as ImplicitMap
+from .maps.implicit import MapFamily as MapFamily
 from .maps.kahan import KahanFamily as KahanFamily
 from .maps.kahan import KahanMap as KahanMap
 from .maps.normal_form.iterate import NthIterate as NthIterate
@@ -126,8 +126,8 @@ from .maps.orbits.orbit import orbit as orbit
 from .maps.polarised import polarised_map as polarised_map
 from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
-from .plots.plot import plot_orbits as plot_orbits
 from .plots.plot import plot as plot
+from .plots.plot import plot_orbits as plot_orbits
 from .reports.report import report_html as report_html
 from .reports.report import write_report as write_report
 from .systems.hamiltonian import CubicHamiltonian as CubicHamiltonian

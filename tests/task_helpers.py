@@ -5,8 +5,8 @@ from typing import Any
 
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.experiments.registry import task_kind
-from kahanmaps.experiments.results.system_spec import spec_of, system_from
 from kahanmaps.experiments.results.records import canonical
+from kahanmaps.experiments.results.system_spec import spec_of, system_from
 
 
 def made(file: SystemFile) -> SystemFile:

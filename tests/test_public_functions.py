@@ -123,7 +123,9 @@ COUNTS = {
     "the modulus": lambda value: km.GF(value).characteristic,
     "prime": lambda value: km.cycles("x' = y; y' = x - x^2", "1/5", value).prime,
     "m": lambda value: km.random_member(value, 1).m,
-    "the seed": lambda value: 3 * (km.random_member_with_eigenvalues([1, 2], value) == km.random_member_with_eigenvalues([1, 2], 3)),
+    "the seed": lambda value: (
+        3 * (km.random_member_with_eigenvalues([1, 2], value) == km.random_member_with_eigenvalues([1, 2], 3))
+    ),
     "an entry": lambda value: 3 if km.find_recurrence([value, 6, 12, 24, 48, 96]).rate.text == "2" else 0,
 }
 

@@ -13,8 +13,8 @@ from math import log2
 from flint import fmpq
 
 import kahanmaps as km
-from kahanmaps.experiments.results.system_spec import system_from
 from kahanmaps.experiments.results.records import Row
+from kahanmaps.experiments.results.system_spec import system_from
 from kahanmaps.maps.normal_form.planes_point import NormalSteps
 
 

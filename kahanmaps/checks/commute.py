@@ -10,9 +10,9 @@ from flint import fmpq
 from kahanmaps.algebra.fields import Field, rational
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import certify
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides, decide
-from kahanmaps.checks.certify import certify
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file

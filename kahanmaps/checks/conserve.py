@@ -8,14 +8,14 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import random_prime_field, derive_seed
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, linear_combinations
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import MAX_DIMENSION, certify
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.certify import MAX_DIMENSION, certify
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_functions, run_orbit, settings_and_claim
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file

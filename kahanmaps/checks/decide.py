@@ -27,7 +27,7 @@ from flint import fmpq
 
 from kahanmaps.algebra import work
 from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
-from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, derive_seed
+from kahanmaps.algebra.chance import PRIME_BITS, derive_seed, random_prime_field
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.roots import Root
 from kahanmaps.checks.claims import Certainty, Evidence, Witness

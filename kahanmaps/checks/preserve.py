@@ -9,9 +9,9 @@ from flint import fmpq
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import Contradiction, certify
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.certify import Contradiction, certify
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_tensor, run_orbit, settings_and_claim
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
@@ -22,14 +22,14 @@ from kahanmaps.invariants.phase_functions import (
     jacobian_determinant_sides,
 )
 from kahanmaps.invariants.poisson import (
-    MatrixPoissonTensor,
     HamiltonianTensor,
+    MatrixPoissonTensor,
     PoissonTensor,
     jacobi_defects,
     tensor_condition,
     transformation_sides,
 )
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -28,7 +28,7 @@ from kahanmaps.errors import counted
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.composed import ComposedMap
-from kahanmaps.maps.implicit import MapFamily, ImplicitMap
+from kahanmaps.maps.implicit import ImplicitMap, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint

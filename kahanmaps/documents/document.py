@@ -27,7 +27,7 @@ from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map, is_involution
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import MapFamily, ImplicitMap, why_no_map
+from kahanmaps.maps.implicit import ImplicitMap, MapFamily, why_no_map
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.polarised import MAX_DEGREE, polarised_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure

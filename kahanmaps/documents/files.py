@@ -20,6 +20,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.printing import format_number, format_polynomial
+from kahanmaps.atomic_files import write_atomically
 from kahanmaps.displayed import Displayed, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
@@ -30,11 +31,10 @@ from kahanmaps.documents.xpp import ENDING, is_ode, read_ode
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.algebraic import AlgebraicMap
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.atomic_files import write_atomically
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import ConjugateAssociate, FamilyMember

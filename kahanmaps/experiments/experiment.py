@@ -28,8 +28,8 @@ from kahanmaps.experiments.options import (
     read_time,
 )
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
-from kahanmaps.experiments.results.system_spec import ENDINGS, family_spec, find_file, spec_of
 from kahanmaps.experiments.results.records import Task, TaskLimits, canonical
+from kahanmaps.experiments.results.system_spec import ENDINGS, family_spec, find_file, spec_of
 
 PARAMETERS = "parameters."  # what the name of a value begins with that is a parameter of the system
 DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
@@ -168,7 +168,7 @@ class Experiment:
 
     name: str
     kind: TaskKind
-    system_spec: Sequence[Mapping[str, Any]]
+    system_specs: Sequence[Mapping[str, Any]]
     fixed: Mapping[str, Any]
     grid: Grid
     limits: TaskLimits
@@ -246,7 +246,7 @@ class ExperimentReader:
         if (name := self.sound("task")) is not None:
             with self._at("task"):
                 self.kind = task_kind(name)
-        system_spec = self._read_systems()
+        system_specs = self._read_systems()
         kind = self.kind
         if kind is None:
             return None  # what an option means depends on the task
@@ -265,11 +265,11 @@ class ExperimentReader:
             return None
         constant = {key: values[0] for key, values in fixed.items()}
         grid_axes: dict[str, Sequence[Any]] = dict(axes)
-        if len(system_spec) == 1:
-            constant["system"] = system_spec[0]
-        elif system_spec:
-            grid_axes = {"system": system_spec, **axes}
-        return Experiment(self.name, kind, system_spec, constant, Grid(grid_axes, zips), limits, tuple(self.skipped))
+        if len(system_specs) == 1:
+            constant["system"] = system_specs[0]
+        elif system_specs:
+            grid_axes = {"system": system_specs, **axes}
+        return Experiment(self.name, kind, system_specs, constant, Grid(grid_axes, zips), limits, tuple(self.skipped))
 
     @contextmanager
     def _at(self, key: str) -> Iterator[None]:
@@ -348,8 +348,8 @@ class ExperimentReader:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):
                 raise InputError(f"found {show(raw)}, expected a file, a name of the catalogue, or a list of these")
-            system_spec = self._read_files(place, references)
-            return AxisValues(option, [system_spec]) if system_spec else None
+            system_specs = self._read_files(place, references)
+            return AxisValues(option, [system_specs]) if system_specs else None
         if place.endswith(f".{TIME_STEP}"):
             read_eps = option.read  # of half the time step
             option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
@@ -475,7 +475,7 @@ class ExperimentReader:
 
     def _read_files(self, key: str, references: Sequence[str]) -> list[dict[str, Any]]:
         """The recipes of the files that the value of a key names."""
-        system_spec: dict[str, dict[str, Any]] = {}
+        system_specs: dict[str, dict[str, Any]] = {}
         names: dict[str, str] = {}  # of the files with these documents
         for number, reference in enumerate(references, start=1):
             place = f"{key}[{number}]" if len(references) > 1 else key
@@ -492,22 +492,22 @@ class ExperimentReader:
                         else:
                             self.mistake(place, f"{error}{suggestion(name, [_FAMILY_WORD])}")
                         continue
-                    if recipe["document"] in system_spec:
+                    if recipe["document"] in system_specs:
                         same = f"{name} says the same as {names[recipe['document']]}"
                         sentence = f"found {file.name} twice, expected every system once: {same}"
                         if self._skips and key == "system":
                             self.skipped.append((name, sentence))
                             continue
                         self.mistake(place, sentence)
-                    system_spec[recipe["document"]], names[recipe["document"]] = recipe, name
+                    system_specs[recipe["document"]], names[recipe["document"]] = recipe, name
                     if key == "system":
                         self.files.append(file)
                         with self._at(place):
                             self._require_kind(file)
-        if self.skipped and not system_spec:
+        if self.skipped and not system_specs:
             name, reason = self.skipped[0]
             self.mistake(key, f"found no system that can be used, expected one at least; {name} is skipped: {reason}")
-        return list(system_spec.values())
+        return list(system_specs.values())
 
     def _names(self, reference: str) -> list[str]:
         """The reference itself, or the files that match a pattern such as members/*.toml."""

@@ -60,7 +60,7 @@ def system_normal_form(
     'a recognised member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
     """
     from kahanmaps.family.planar import normal_form
-    from kahanmaps.family.recognition import why_not_member, find_cubic_hamiltonian, find_family_structure
+    from kahanmaps.family.recognition import find_cubic_hamiltonian, find_family_structure, why_not_member
 
     system = as_system(system)
     if system.dim > _MAX_DIMENSION:

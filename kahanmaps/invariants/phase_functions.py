@@ -38,7 +38,7 @@ from kahanmaps.algebra.work import count
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem

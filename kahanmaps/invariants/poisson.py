@@ -230,7 +230,8 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
         InputError: where P is identically 0, at that eps if it is given.
 
     >>> for entry in ("(10*eps - 1)*x", "x/(10*eps - 1)", "x + 10*eps - 1"):
-    ...     print([tensor_condition(MatrixPoissonTensor.from_text([["0", entry], [f"-({entry})", "0"]], ["x", "y"]), None)])
+    ...     tensor = MatrixPoissonTensor.from_text([["0", entry], [f"-({entry})", "0"]], ["x", "y"])
+    ...     print([tensor_condition(tensor, None)])
     ['where 10*eps - 1 is not 0']
     ['where 10*eps - 1 is not 0']
     ['']

@@ -39,9 +39,9 @@ from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.work import Budget, count
+from kahanmaps.checks.certify import MAX_DIMENSION, try_expand
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides, decide
-from kahanmaps.checks.certify import MAX_DIMENSION, try_expand
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
@@ -58,7 +58,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import MapFamily, ImplicitMap
+from kahanmaps.maps.implicit import ImplicitMap, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, as_map
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.polynomial import PolynomialField

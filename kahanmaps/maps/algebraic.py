@@ -8,7 +8,7 @@ from typing import Any
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import InputError
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 
 
 class AlgebraicMap(MapFamily):

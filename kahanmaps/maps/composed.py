@@ -14,13 +14,13 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.chance import random_prime_field, derive_seed
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import MapFamily, ImplicitMap, Map, nonzero_eps
+from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
 
 _BUDGET = 20_000_000  # products of terms

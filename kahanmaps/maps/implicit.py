@@ -27,7 +27,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
-from kahanmaps.algebra.chance import random_prime_field, derive_seed
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import QQ, Field, integer, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring

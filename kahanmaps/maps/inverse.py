@@ -16,7 +16,7 @@ from typing import Any
 
 from flint import Ordering, fmpq_mpoly, fmpz_mod_mpoly_ctx
 
-from kahanmaps.algebra.chance import random_prime_field, derive_seed
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.matrices import solve
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring

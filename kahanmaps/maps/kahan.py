@@ -28,7 +28,7 @@ from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapFamily, ElementaryMap, nonzero_eps
+from kahanmaps.maps.implicit import ElementaryMap, MapFamily, nonzero_eps
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 

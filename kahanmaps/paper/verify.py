@@ -29,13 +29,13 @@ from typing import Any, cast
 from flint import fmpq_poly
 
 from kahanmaps.algebra.bounds import BoundField, CoefficientSize, bound_of
-from kahanmaps.algebra.chance import random_prime_field, derive_seed
+from kahanmaps.algebra.chance import derive_seed, random_prime_field
 from kahanmaps.algebra.fields import CC, QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.printing import format_number
+from kahanmaps.checks.certify import Contradiction
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.checks.decide import Decision, Trial, decide
-from kahanmaps.checks.certify import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost, counted

@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
 from kahanmaps.algebra.printing import format_number
+from kahanmaps.atomic_files import write_atomically
 from kahanmaps.display.latex import latex_name
 from kahanmaps.errors import InputError
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, Style
 from kahanmaps.version import __version__
-from kahanmaps.atomic_files import write_atomically
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

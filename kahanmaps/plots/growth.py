@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.errors import InputError, printable
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.degree_bounds import DynamicalDegreeBounds
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.plots.figures import (
@@ -265,7 +265,9 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             patterns = Patterns(lengths, searched, told["some_confined"], str(told["running"]), series)
         if (told := record.get("enclosure")) is not None:
             names = ("steps", "degree_below", "degree_above", "prime", "eps_residue")
-            enclosure = DynamicalDegreeBounds(str(told["lower"]), str(told["upper"]), *(int(told[name]) for name in names))
+            enclosure = DynamicalDegreeBounds(
+                str(told["lower"]), str(told["upper"]), *(int(told[name]) for name in names)
+            )
         growth = DegreeGrowth(
             degrees,
             None if record["eps"] == "generic" else parse_number(record["eps"]),

@@ -15,8 +15,8 @@ from kahanmaps.display import markup
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.floats.ensemble import starts_in_box
-from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
+from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 from kahanmaps.plots.figures import require_matplotlib, svg_text
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import automatic_starts, plane_flow

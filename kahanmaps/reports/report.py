@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.printing import format_number, format_polynomial
+from kahanmaps.atomic_files import write_atomically
 from kahanmaps.checks.claims import Report, combined
 from kahanmaps.display import checks, markup
 from kahanmaps.display.laboratory import eps_sentence, result_html
@@ -25,7 +26,6 @@ from kahanmaps.reports.explore import explore_sections
 from kahanmaps.reports.page import CHARACTERS, Html, Section, page, page_template, system_section, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.sources import source
-from kahanmaps.atomic_files import write_atomically
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding

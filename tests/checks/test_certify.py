@@ -9,9 +9,9 @@ from flint import fmpq
 
 from kahanmaps.checks import certify as certify_module
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import Contradiction, certify
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Decision, Identity
-from kahanmaps.checks.certify import Contradiction, certify
 from kahanmaps.checks.settings import OrbitRun, Settings
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.orbits.iteration import OrbitEnd

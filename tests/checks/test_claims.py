@@ -126,7 +126,9 @@ def test_every_report_comes_out_the_same_from_the_same_seed_and_its_orbit_from_i
 @pytest.mark.parametrize(
     "check",
     [
-        lambda settings: check_commute(SystemFile.from_member(random_member_with_eigenvalues([1, -2], seed=1)), None, settings),
+        lambda settings: check_commute(
+            SystemFile.from_member(random_member_with_eigenvalues([1, -2], seed=1)), None, settings
+        ),
         lambda settings: check_measure(LOTKA_VOLTERRA, settings),
         lambda settings: check_poisson(SystemFile.from_member(MEMBER.member), settings),
     ],

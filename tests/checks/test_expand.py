@@ -7,10 +7,10 @@ from flint import fmpq
 
 from kahanmaps import QuadraticSystem, parse_rational_function
 from kahanmaps.checks import certify
+from kahanmaps.checks.certify import NotEqual, expansion
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.decide import Decision, Identity
-from kahanmaps.checks.certify import NotEqual, expansion
 from kahanmaps.checks.settings import Settings
 from kahanmaps.invariants.phase_functions import ClaimedIntegral
 

@@ -8,9 +8,14 @@ from flint import fmpq, fmpq_poly
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.experiments.options import FAMILY
-from kahanmaps.experiments.results.system_spec import document_text, family_spec, find_file, spec_of, system_from
 from kahanmaps.experiments.results.records import canonical
-from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues, random_eigenvalues
+from kahanmaps.experiments.results.system_spec import document_text, family_spec, find_file, spec_of, system_from
+from kahanmaps.family.random_members import (
+    random_eigenvalues,
+    random_member,
+    random_member_with_chi,
+    random_member_with_eigenvalues,
+)
 
 ROTOR = 'name = "rotor"\nvariables = ["x", "y"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*y", "-x*y"]\n'
 CATALOG = '[catalog]\ntitle = "Rotor"\nfacts = ["Measured: it turns."]\n'
@@ -56,7 +61,7 @@ def test_signs_pick_an_associated_system():
 # Files
 
 
-def test_every_system_of_the_catalogue_comes_back_equal():
+def test_every_system_of_the_catalogue_reads_back_equal():
     for name in names():
         assert again(load(name)) == load(name)
 

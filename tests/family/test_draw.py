@@ -9,8 +9,8 @@ from flint import fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.family.cubics import belongs
-from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.planar import normal_form
+from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi, defects
 
 t = fmpq_poly([0, 1])
@@ -40,7 +40,9 @@ def test_the_matrix_is_skew_hamiltonian_and_the_cubic_belongs_to_it(draw, seed):
     assert (defects(member.A), belongs(member.A, member.H)) == ([], True)
 
 
-@pytest.mark.parametrize("draw", [DRAWS["chi"], DRAWS["generic"], lambda seed: random_member_with_eigenvalues([1, 2], seed)])
+@pytest.mark.parametrize(
+    "draw", [DRAWS["chi"], DRAWS["generic"], lambda seed: random_member_with_eigenvalues([1, 2], seed)]
+)
 @over_seeds
 def test_no_planar_cubic_has_a_repeated_line(draw, seed):
     form = normal_form(draw(seed))

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduced
-from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.degree_bounds import (
+    bound_dynamical_degree,
     decimal,
     degree_above,
-    bound_dynamical_degree,
     is_birational,
     lower_bound,
 )
+from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -7,8 +7,8 @@ from search_helpers import analysis_of
 
 import kahanmaps as km
 from kahanmaps.documents.catalog import names
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 SYSTEMS: list[tuple[str, dict[str, Any]]] = [
     ("lotka_volterra", {"effort": -5}),
@@ -19,6 +19,7 @@ SYSTEMS: list[tuple[str, dict[str, Any]]] = [
     ("riccati", {}),
     ("harmonic", {}),
     ("euler_top", {"symbols": ["a1"]}),
+    ("x' = 0; y' = 0", {}),
     ("x' = 0; y' = 0; z' = 0", {}),
 ]
 

@@ -14,8 +14,8 @@ from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.planar import normal_form
+from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.floats import steps
 from kahanmaps.maps.floats.blocks import planar_blocks
 from kahanmaps.maps.floats.doubles import exact

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.etale import EtaleAlgebra
-from kahanmaps.family.random_members import random_member_with_chi, parse_chi
+from kahanmaps.family.random_members import parse_chi, random_member_with_chi
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import tau

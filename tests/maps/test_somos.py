@@ -53,7 +53,9 @@ def test_terms_and_what_is_left_out_of_them(H, y, z):
     scales = []
     for terms, exact in ((multiples, W), (sequence, U)):
         scale = {n: exact[n] / terms.integer(n) for n in range(1, 41)}
-        assert all(split_by_primes(x.p, primes)[0] in (1, -1) and split_by_primes(x.q, primes)[0] == 1 for x in scale.values())
+        assert all(
+            split_by_primes(x.p, primes)[0] in (1, -1) and split_by_primes(x.q, primes)[0] == 1 for x in scale.values()
+        )
         assert all(primes.gcd(terms.integer(n)) == 1 for n in range(1, 41))
         assert all(terms.part(n) == scale[n + 1] * scale[n - 1] / scale[n] ** 2 for n in range(2, 39))
         scales.append(scale)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.checks.claims import Certainty
+from kahanmaps.paper.claims.beyond_table import beyond_table, smallest_counterexample, table
 from kahanmaps.paper.claims.further_claims import STATEMENTS
-from kahanmaps.paper.claims.beyond_table import smallest_counterexample, beyond_table, table
 from kahanmaps.paper.variations import VARIATIONS
 
 PAGE = Path(__file__).parent.parent.parent / "docs" / "beyond.md"

@@ -17,10 +17,10 @@ from kahanmaps.plots.growth import (
     HeightCurve,
     curves_of_record,
     degrees_of_record,
-    plot_degrees,
-    plot_heights,
     fit_of,
     height_curves,
+    plot_degrees,
+    plot_heights,
 )
 
 TENTH = fmpq(1, 10)

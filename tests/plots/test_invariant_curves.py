@@ -13,9 +13,9 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.plots.curves.plot_invariant_curves import Disc, plot_invariant_curves, panels_of, view_of
 from kahanmaps.plots.curves.invariant_curves import MAX_POINTS, find_invariant_curves
 from kahanmaps.plots.curves.plane_cubics import ONE_LINE, THREE_LINES, ZERO
+from kahanmaps.plots.curves.plot_invariant_curves import Disc, panels_of, plot_invariant_curves, view_of
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -160,7 +160,7 @@ def test_wrong_sizes_are_refused(starts, steps, message):
         find_invariant_curves(load("paper_m2"), starts, "1/20", steps)
 
 
-def test_a_system_without_normal_form_is_told_why():
+def test_a_system_without_normal_form_is_refused_with_the_reason():
     repeated = SystemFile.from_member(random_member_with_eigenvalues([1, 1], seed=7))
     for file, reason in (
         (load("euler_top"), "x' is not J grad H"),

@@ -7,7 +7,6 @@ import pytest
 from flint import arb, ctx
 
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.plots.curves.plot_invariant_curves import Disc, Rectangle
 from kahanmaps.plots.curves.plane_cubics import (
     ONE_LINE,
     REPEATED,
@@ -17,6 +16,7 @@ from kahanmaps.plots.curves.plane_cubics import (
     symmetric_coordinates,
     transformed,
 )
+from kahanmaps.plots.curves.plot_invariant_curves import Disc, Rectangle
 
 FORMS = {
     "three lines": (1.0, 0.0, -3.0, 0.0),

@@ -6,7 +6,7 @@ from matplotlib.collections import PathCollection
 from kahanmaps.documents.catalog import load
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.portraits.portrait import plot_portrait, neighbours, portrait_of
+from kahanmaps.plots.portraits.portrait import neighbours, plot_portrait, portrait_of
 from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, euler_orbits, walked
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem

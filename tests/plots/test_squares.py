@@ -9,15 +9,15 @@ from flint import fmpq
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues, parse_chi
+from kahanmaps.family.random_members import parse_chi, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots import squares as module
 from kahanmaps.plots.squares import (
     MapPair,
     _in_two_digits,
-    plot_squares,
     pair_of_systems,
     pairs_of_member,
+    plot_squares,
     squares,
     widest_axes,
 )
@@ -74,7 +74,7 @@ def test_a_gap_too_small_for_machine_numbers_is_a_gap():
     assert 0 < found.gap < 1e-29
 
 
-def test_a_singular_point_is_told_and_only_what_is_there_is_compared():
+def test_a_singular_point_is_reported_and_only_existing_corners_are_compared():
     # x~ = x/(1 - 2 eps x) has a pole at x = 5 for eps = 1/10; from 5/3 it is met at the third step
     pair = plane_pair(["x^2", "0"], ["0", "y^2"])
     found = squares(pair, [5, 2], "1/10")

@@ -30,10 +30,10 @@ from math import inf
 from typing import IO, Any
 
 from kahanmaps.algebra.printing import NUMBER, csv_line, guarded
+from kahanmaps.atomic_files import atomic_write
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.records import Row, encodable
 from kahanmaps.version import __version__
-from kahanmaps.atomic_files import atomic_write
 
 BEFORE = ("experiment", "number", "key", "task")
 BETWEEN = ("outcome", "verdict")

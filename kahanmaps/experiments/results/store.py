@@ -33,6 +33,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
+from kahanmaps.atomic_files import resolved
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note_source, quoted
 from kahanmaps.experiments.results.records import (
@@ -47,7 +48,6 @@ from kahanmaps.experiments.results.records import (
     digest,
     encodable,
 )
-from kahanmaps.atomic_files import resolved
 
 # A change that older versions cannot read increases it. Format 2 is this one with two more columns, which nobody reads.
 FORMATS = (1, 2)

@@ -26,11 +26,11 @@ from kahanmaps.experiments.options import FAMILY
 from kahanmaps.experiments.results.records import canonical, digest
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.random_members import (
+    parse_chi,
+    random_eigenvalues,
     random_member,
     random_member_with_chi,
     random_member_with_eigenvalues,
-    parse_chi,
-    random_eigenvalues,
 )
 
 _KEPT = 16  # systems that a child keeps: tasks that differ in eps only come one after the other

@@ -38,8 +38,8 @@ from typing import Any
 from kahanmaps.errors import InputError, KahanmapsError, is_out_of_memory
 from kahanmaps.experiments.options import OTHER
 from kahanmaps.experiments.registry import task_kind, task_kinds
-from kahanmaps.experiments.results.system_spec import system_from
 from kahanmaps.experiments.results.records import Documents, Job, Outcome, Record, Task, canonical
+from kahanmaps.experiments.results.system_spec import system_from
 from kahanmaps.processes import end_with_parent
 from kahanmaps.version import __version__
 

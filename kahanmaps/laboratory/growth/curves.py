@@ -29,7 +29,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import Budget, count
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel, row_units
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 
 _MINORS = 5  # the largest dimension in which minors are taken
 _MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^60

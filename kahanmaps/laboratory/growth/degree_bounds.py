@@ -40,7 +40,7 @@ from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of
 from kahanmaps.laboratory.singular.written import forms_over_eps
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import homogeneous_map
 
@@ -175,7 +175,9 @@ def lower_bound(below: int, above: int, steps: int) -> arb | None:
         return (arb(fmpq(below - 1, 2 * (above - 1)) - 1).acosh() / steps).exp()
 
 
-def _lower(map_: Map, rng: random.Random, budget: Budget, progress: Callable[[str], None]) -> DynamicalDegreeBounds | None:
+def _lower(
+    map_: Map, rng: random.Random, budget: Budget, progress: Callable[[str], None]
+) -> DynamicalDegreeBounds | None:
     """The best lower bound above 1, rounded down; there is no upper one yet."""
     line = Line(map_, rng, budget.part(0.5), _LARGEST)
     degrees = [1]

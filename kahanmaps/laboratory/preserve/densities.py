@@ -245,10 +245,14 @@ def with_factors(
     laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed, algebraic=True)
     if laboratory.defect:
         return found
-    product, anti_invariant = _products(laboratory, max_degree, Budget(), integrals)  # of a map: nothing is sought of a flow
+    product, anti_invariant = _products(
+        laboratory, max_degree, Budget(), integrals
+    )  # of a map: nothing is sought of a flow
     if product is None:
         return replace(found, anti_invariant=anti_invariant)
-    return replace(found, densities=(product,), degree=product.degree(laboratory.map.dim), anti_invariant=anti_invariant)
+    return replace(
+        found, densities=(product,), degree=product.degree(laboratory.map.dim), anti_invariant=anti_invariant
+    )
 
 
 def _search(

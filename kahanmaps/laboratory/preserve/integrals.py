@@ -129,11 +129,12 @@ class TimeDependentIntegral:
 class IntegralSearch(Search):
     """What `find_integrals` found.
 
-    `integrals` are functionally independent, also together with those that depend on time, `time_dependent`, or those whose
-    formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits show (measured);
-    `by_theorems` is how many independent integrals the Kahan map has by theorems (hamiltonian_structure.py), `theorems`
-    says which (with symbols: at random values). `reason` says what is missing and why, empty where nothing is.
-    `period_at_values` is the number of points of orbits that close where the symbols have the values of the file.
+    `integrals` are functionally independent, also together with those that depend on time, `time_dependent`, or
+    those whose formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits
+    show (measured); `by_theorems` is how many independent integrals the Kahan map has by theorems
+    (hamiltonian_structure.py), `theorems` says which (with symbols: at random values). `reason` says what is
+    missing and why, empty where nothing is. `period_at_values` is the number of points of orbits that close where
+    the symbols have the values of the file.
     """
 
     integrals: tuple[FoundIntegral, ...]

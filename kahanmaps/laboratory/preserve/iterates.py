@@ -26,9 +26,9 @@ from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import SPENT, Budget
+from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.displayed import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
@@ -37,7 +37,13 @@ from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
 from kahanmaps.laboratory.preserve.darboux.cofactors import SearchStep, SpaceSearch
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import TWO_POINT_DEGREE, TWO_POINT_BASES, TwoPointBasis, bases_with_spaces, pairs_of
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
+    TWO_POINT_BASES,
+    TWO_POINT_DEGREE,
+    TwoPointBasis,
+    bases_with_spaces,
+    pairs_of,
+)
 from kahanmaps.laboratory.preserve.search import bases_of
 from kahanmaps.maps.implicit import MapFamily
 

@@ -45,7 +45,7 @@ from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
-from kahanmaps.maps.implicit import MapFamily, ElementaryMap
+from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60

@@ -32,11 +32,11 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.following import AlongCurves, TestCurve, Range, divided
+from kahanmaps.laboratory.singular.following import AlongCurves, Range, TestCurve, divided
 from kahanmaps.laboratory.singular.jets import Function, JetStep, form_order, image_of, modulo, roots_modulo
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapFamily, ElementaryMap
+from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
 Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
 

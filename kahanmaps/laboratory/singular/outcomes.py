@@ -27,7 +27,15 @@ from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, counted
-from kahanmaps.laboratory.singular.following import NO_ORBIT_DATA, NOTHING, AlongCurves, TestCurve, OrbitData, Range, Tracked
+from kahanmaps.laboratory.singular.following import (
+    NO_ORBIT_DATA,
+    NOTHING,
+    AlongCurves,
+    OrbitData,
+    Range,
+    TestCurve,
+    Tracked,
+)
 from kahanmaps.laboratory.singular.jets import (
     JetStep,
     Letters,
@@ -331,9 +339,7 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: R
     return found
 
 
-def unwritten(
-    map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False
-) -> list[Hypersurface]:
+def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
     """The contracted hypersurfaces without their polynomials, told apart by multiplicity and outcome of random points.
 
     At one exact `eps` (half the time step), on lines modulo random primes; the poles, or the others but for infinity.

@@ -30,7 +30,7 @@ from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import Hypersurface, Tracking, Written, outcome_of
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 

@@ -22,10 +22,10 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
 from kahanmaps.algebra.work import count
 from kahanmaps.checks import theorems
+from kahanmaps.checks.certify import certify
 from kahanmaps.checks.claims import Evidence, Finding
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.certify import certify
 from kahanmaps.checks.settings import Settings
 from kahanmaps.laboratory.symmetry.commuting_space import CommutingSpace, coefficients_of, combination, field_at
 from kahanmaps.maps.kahan import KahanFamily

@@ -21,7 +21,7 @@ from typing import Any
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
-from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, FloatStep, BatchState, RecordTable
+from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, BatchState, FloatStep, RecordTable
 from kahanmaps.maps.floats.straight_line import Code, Value
 
 _FORMS = {  # of operations: $v is the type of a vector of numbers, $m of truth values, $s its name in functions
@@ -215,7 +215,9 @@ class MachineCode:
         text = Template(_LOOPS.safe_substitute(parts)).substitute(words)
         self._engine, self._call = _compiled(text)
 
-    def advance(self, lanes: BatchState, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
+    def advance(
+        self, lanes: BatchState, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]
+    ) -> None:
         """Take the orbits low, ..., high - 1 `steps` steps from the index `first`; there are at most two tables."""
         records: list[Any] = []
         for every, states in tables:

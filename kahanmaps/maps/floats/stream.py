@@ -19,8 +19,8 @@ from typing import IO, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kahanmaps.errors import InputError
 from kahanmaps.atomic_files import named, sync
+from kahanmaps.errors import InputError
 
 
 class NpyFile:

@@ -16,6 +16,7 @@ from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
 from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.printing import json_float
+from kahanmaps.atomic_files import open_append
 from kahanmaps.displayed import data_frame
 from kahanmaps.errors import BadPrime, InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
@@ -35,7 +36,6 @@ from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.version import __version__
-from kahanmaps.atomic_files import open_append
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember

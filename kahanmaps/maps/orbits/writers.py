@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import IO, Any
 
 from kahanmaps.algebra.printing import csv_line, guarded
+from kahanmaps.atomic_files import atomic_write, open_append, write_atomically
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import eps_words
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.version import __version__
-from kahanmaps.atomic_files import open_append, atomic_write, write_atomically
 
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000

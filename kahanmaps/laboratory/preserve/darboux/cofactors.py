@@ -32,10 +32,15 @@ from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, TwoPointBasis, gradient_rank, gradients_of_ratios
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
+    DarbouxSpace,
+    TwoPointBasis,
+    gradient_rank,
+    gradients_of_ratios,
+)
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
 from kahanmaps.laboratory.singular.jets import modulo
-from kahanmaps.maps.implicit import MapFamily, Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 

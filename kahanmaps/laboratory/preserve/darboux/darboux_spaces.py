@@ -359,7 +359,14 @@ class TwoPointBasis(NamedTuple):
         return f"{kind} between x and x{'~' * self.shift}{minors}"
 
 
-TWO_POINT_BASES = (TwoPointBasis(0, 1), TwoPointBasis(1, 1), TwoPointBasis(1, -1), TwoPointBasis(2, -1), TwoPointBasis(3, -1), TwoPointBasis(4, -1))
+TWO_POINT_BASES = (
+    TwoPointBasis(0, 1),
+    TwoPointBasis(1, 1),
+    TwoPointBasis(1, -1),
+    TwoPointBasis(2, -1),
+    TwoPointBasis(3, -1),
+    TwoPointBasis(4, -1),
+)
 
 
 @cache
@@ -424,7 +431,9 @@ def two_point_spaces(map_: ModularMap, lift: TwoPointBasis) -> list[DarbouxSpace
     return [DarbouxSpace.spanned_by(map_.dim, TWO_POINT_DEGREE, span, map_.prime)]
 
 
-def bases_with_spaces(map_: ModularMap, lifts: Sequence[TwoPointBasis] = TWO_POINT_BASES) -> list[tuple[TwoPointBasis, list[DarbouxSpace]]]:
+def bases_with_spaces(
+    map_: ModularMap, lifts: Sequence[TwoPointBasis] = TWO_POINT_BASES
+) -> list[tuple[TwoPointBasis, list[DarbouxSpace]]]:
     """The lifts that have spaces, with these: of rank 1 or, where there are none, of rank 2."""
     found = []
     for lift in lifts:

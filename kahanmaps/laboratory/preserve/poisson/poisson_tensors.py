@@ -26,9 +26,9 @@ from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
 from kahanmaps.algebra.work import SPENT, Budget, count
+from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
 from kahanmaps.displayed import latex
 from kahanmaps.documents.inline import as_file

@@ -24,7 +24,7 @@ from flint import fmpq, fmpz, fmpz_mat
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.residues import from_residues
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import Map, ElementaryMap
+from kahanmaps.maps.implicit import ElementaryMap, Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_search import Curve, Rows, Sections, curve, points_needed
 from kahanmaps.maps.orbits.relations.elliptic_steps import Coordinates, EllipticSteps
