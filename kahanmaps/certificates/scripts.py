@@ -18,6 +18,8 @@ from kahanmaps.certificates.identities import ConservedFunction, InvariantVolume
 from kahanmaps.certificates.rocq import polynomial_text
 
 _PARI = """\
+default(recover, 0);  \\\\ an error ends gp with a status that is not 0
+default(parisizemax, 2*10^9);
 ok = 1;
 det(A) = matdet(A);
 check(text, holds) = {{ print(text, ": ", if(holds, "true", "FALSE")); if(!holds, ok = 0); }}
@@ -134,7 +136,15 @@ def _script(
     old = [letters[name] for name in data.variables]
 
     def text(polynomial: fmpq_mpoly) -> str:
-        return polynomial_text(polynomial, [letters[name] for name in names_of(polynomial)], "*", to.power)
+        return total(polynomial_text(polynomial, [letters[name] for name in names_of(polynomial)], "*", to.power))
+
+    def total(text: str) -> str:
+        """A sum; of many terms in parts, as Python reads no expression that is nested a thousand times."""
+        terms = re.split(r" (?=[+-] )", text)
+        parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
+        if to is _GP or len(parts) == 1:
+            return text
+        return f"sum([{', '.join(parts)}])"
 
     def homogeneous(polynomial: fmpq_mpoly, degree: int) -> str:
         """The polynomial with powers of h that make it homogeneous of the degree in the variables."""
@@ -144,7 +154,7 @@ def _script(
             spare = degree - sum(int(k) for k in exponents[:n])
             powers = [f"{a}{to.power}{k}" for a, k in zip([*names, "h"], [*exponents, spare], strict=True) if k]
             pieces.append("*".join([f"({coefficient})", *powers]))
-        return " + ".join(pieces) or "0"
+        return total(" + ".join(pieces) or "0")
 
     def at_numerators(entry: fmpq_mpoly) -> str:
         """D times an entry of L at x~ = N/D; it is of degree at most 1 in x~."""
@@ -158,6 +168,8 @@ def _script(
         return " + ".join(pieces) or "0"
 
     def matrix(rows: Sequence[Sequence[str]]) -> str:
+        if n == 1 and to is _GP:  # [a] would be a vector
+            return f"Mat({rows[0][0]})"
         return to.matrix.format(to.next_row.join(", ".join(row) for row in rows))
 
     names = [letters[name] for name in (*data.names, *data.new)]

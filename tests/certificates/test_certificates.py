@@ -1,0 +1,150 @@
+"""Certificates: Coq, PARI/GP and SymPy accept what is true, and refuse it with one coefficient changed."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.certificates.certificate import certificate
+from kahanmaps.certificates.identities import (
+    FalseClaim,
+    conserved_function,
+    homogeneous_value,
+    invariant_volume,
+    map_data,
+)
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.inline import System
+from kahanmaps.errors import InputError
+from kahanmaps.languages.formulas import Formulas
+
+PROGRAMS = {
+    "rocq": (["coqc"], ".v", r"(Definition cofactor : R := )", r"\1 1 + "),
+    "gp": (["gp", "-q"], ".gp", r"^(C = \()", r"\g<1>1 + "),
+    "sympy": ([sys.executable], ".py", r"^(C = \()", r"\g<1>1 + "),
+}
+SYSTEMS = ["harmonic", "euler_top", "weierstrass", "lyness"]
+FURTHER = ["henon_heiles", "nahm_tetrahedral", "planar_cubic_hamiltonian", "qrt_symmetric", "volterra_periodic_3"]
+
+
+def run(checker: str, text: str, folder) -> subprocess.CompletedProcess[str]:
+    program, ending, _, _ = PROGRAMS[checker]
+    if shutil.which(program[0]) is None:
+        pytest.skip(f"{program[0]} is not installed")
+    path = folder / f"proof{ending}"
+    path.write_text(text)
+    return subprocess.run([*program, path], capture_output=True, text=True, stdin=subprocess.DEVNULL, cwd=folder)
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+@pytest.mark.parametrize("name", [*SYSTEMS, *(pytest.param(name, marks=pytest.mark.slow) for name in FURTHER)])
+def test_a_program_that_is_not_ours_accepts_every_claim_of_a_system(name, checker, tmp_path):
+    text = certificate(load(name), checker)
+    done = run(checker, text, tmp_path)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    assert "FALSE" not in done.stdout
+    assert done.stdout.count(": true\n") == (0 if checker == "rocq" else text.count('check("'))
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+@pytest.mark.parametrize("name", ["harmonic", "lyness"])
+def test_a_certificate_with_one_coefficient_changed_is_refused(name, checker, tmp_path):
+    _, _, where, changed = PROGRAMS[checker]
+    text, count = re.subn(where, changed, certificate(load(name), checker), flags=re.MULTILINE)
+    assert count
+    assert run(checker, text, tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker, tmp_path):
+    text = certificate(load("lotka_volterra"), checker, ["volume"])  # dx/(x*y)
+    wrong = re.sub(r"(Definition num .* := |^P = )\(?x \* ?y\)?|(^P = )\(x\*y\)", r"\1\2(x)", text, flags=re.MULTILINE)
+    assert wrong != text
+    assert run(checker, wrong, tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+def test_variables_with_the_names_of_words_of_the_programs_are_renamed(checker, tmp_path):
+    text = certificate(System("I' = fun; fun' = -I"), checker, integrals={"O": "(I^2 + fun^2)/3"})
+    assert run(checker, text, tmp_path).returncode == 0
+
+
+@given(st.integers(1, 50), st.integers(1, 50), st.integers(1, 50), st.integers(1, 20))
+def test_the_scaled_value_is_that_at_the_image(x, y, z, eps):
+    """D^k P(N/D) against P at the image that the map itself computes, modulo a prime."""
+    formulas, field = Formulas(load("euler_top")), GF(2**61 - 1)
+    names = (*formulas.names, "eps")
+    data = map_data(formulas.equation, formulas.variables, formulas.new, names)
+    P = parse_rational_function("x1^2*x2 - 3*x3 + eps*x1 + 5", names).numerator
+    point = [field.convert(value) for value in (x, y, z)]
+    step = field.convert(f"1/{eps}")
+    image = formulas.map.at(f"1/{eps}", field).step(tuple(point))
+
+    def at(polynomial, values):
+        total = field.zero
+        for exponents, coefficient in polynomial.terms():
+            term = field.convert(coefficient)
+            for value, exponent in zip((*values, step), exponents, strict=True):
+                term *= value ** int(exponent)
+            total += term
+        return total
+
+    D = at(data.determinant, point)
+    assert at(homogeneous_value(P, 4, data), point) == D**4 * at(P, image)
+
+
+def test_the_adjugate_solves_the_equation_of_the_map():
+    formulas = Formulas(load("volterra_periodic_4"))
+    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    n = data.dim
+    for i in range(n):
+        row = data.rows[i]
+        assert sum((row[j] * data.numerators[j] for j in range(n)), row[0] * 0) == data.determinant * row[-1]
+        for k in range(n):
+            entry = sum((data.adjugate[i][j] * data.rows[j][k] for j in range(n)), row[0] * 0)
+            assert entry == (data.determinant if i == k else 0)
+
+
+@pytest.mark.parametrize("function", ["x1^2 + x2^2", "(x1^2 + x3^2)/(1 + eps*x2)"])
+def test_a_function_that_is_not_conserved_has_no_certificate(function):
+    with pytest.raises(FalseClaim, match="F is not conserved"):
+        certificate(load("euler_top"), "gp", integrals={"F": function})
+
+
+def test_a_density_that_is_not_invariant_has_no_certificate():
+    formulas = Formulas(load("lotka_volterra"))
+    names = (*formulas.names, "eps")
+    data = map_data(formulas.equation, formulas.variables, formulas.new, names)
+    with pytest.raises(FalseClaim, match="dx/phi is not invariant"):
+        invariant_volume(data, parse_rational_function("x", names))
+
+
+@pytest.mark.parametrize(
+    ("system", "arguments", "message"),
+    [
+        ("lorenz", {"checker": "gp"}, "no integral or invariant volume form of lorenz is known: give --integral"),
+        ("euler_top", {"checker": "coq"}, "expected the checker rocq, gp, sympy, got 'coq'"),
+        ("euler_top", {"checker": "gp", "claims": ["F9"]}, "expected one of F1, F2, volume"),
+        ("zander_120", {"checker": "gp", "claims": ["F"]}, "no claim 'F' of zander_120"),
+    ],
+)
+def test_what_cannot_be_certified_is_said_in_one_sentence(system, arguments, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        certificate(load(system), **arguments)
+
+
+def test_the_conserved_polynomials_have_the_same_cofactor_over_Z():
+    formulas = Formulas(load("euler_top"))
+    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    claim = conserved_function(data, "F1", formulas.integrals["F1"])
+    assert homogeneous_value(claim.numerator, claim.degree, data) == claim.cofactor * claim.numerator
+    assert homogeneous_value(claim.denominator, claim.degree, data) == claim.cofactor * claim.denominator
+    assert all(c.q == 1 for _, c in claim.cofactor.terms())
