@@ -161,9 +161,9 @@ def invariant_volume(data: MapData, function: RationalFunction) -> InvariantVolu
         return InvariantVolume("volume", P, Q, k, derivative, True)
     # det L at x~ = N/D: D L(x, N/D) has polynomial entries, as L is of degree 1 in x~.
     point = [*data.numerators, *ring(data.names).gens()[n:]]
-    entries = [[_at_numerators(entry, data, point) for entry in row] for row in derivative]
+    entries_at_image = [[_at_numerators(entry, data, point) for entry in row] for row in derivative]
     left = _times(_times(homogeneous_value(P, k, data), Q), data.determinant ** (n + 1))
-    right = _times(_times(homogeneous_value(Q, k, data), P), determinant(entries))
+    right = _times(_times(homogeneous_value(Q, k, data), P), determinant(entries_at_image))
     if left != right:
         raise FalseClaim("dx/phi is not invariant: no certificate can be written")
     return InvariantVolume("volume", P, Q, k, derivative, False)
@@ -172,7 +172,8 @@ def invariant_volume(data: MapData, function: RationalFunction) -> InvariantVolu
 def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
     """The determinant of a square matrix of polynomials. Raises InputError where it has too many terms."""
     *_, last = kernel_minors([[*row, row[0] * 0] for row in matrix], _times)
-    return -last if len(matrix) % 2 else last  # the last of the signed minors
+    signed: fmpq_mpoly = -last if len(matrix) % 2 else last  # the last of the signed minors
+    return signed
 
 
 def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmpq_mpoly:

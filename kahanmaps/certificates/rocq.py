@@ -251,7 +251,7 @@ def rocq_certificate(
 
 def polynomial_text(polynomial: fmpq_mpoly, letters: Sequence[str], times: str = " * ", power: str = " ^ ") -> str:
     """A polynomial with integral coefficients in the letters, as sums of products."""
-    pieces = []
+    pieces: list[str] = []
     for exponents, coefficient in polynomial.terms():
         factors = [name if k == 1 else f"{name}{power}{k}" for name, k in zip(letters, exponents, strict=True) if k]
         size = abs(coefficient)
@@ -265,7 +265,7 @@ def determinant_text(entries: Sequence[Sequence[str]], times: str = " * ") -> st
     """The determinant of a matrix of texts, expanded along its first row."""
     if len(entries) == 1:
         return entries[0][0]
-    pieces = []
+    pieces: list[str] = []
     for j, entry in enumerate(entries[0]):
         minor = [[*row[:j], *row[j + 1 :]] for row in entries[1:]]
         inner = determinant_text(minor, times)
