@@ -164,7 +164,7 @@ def drawn(found, **how):
 def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():
     found = survey(load("weierstrass"), ["1/4", "1/8"], 300, [("", "known")], ("generic", "rk4", "midpoint"))
     figure = drawn(found)
-    assert [axes.get_ylabel() for axes in figure.axes] == ["relative error of modified_H", "relative error of $H$"]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["relative error of modified $H$", "relative error of $H$"]
     assert [len(axes.lines) for axes in figure.axes] == [3, 3]
     assert len({line.get_linestyle() for line in figure.axes[0].lines}) == 3
     assert all(line.get_ydata().max() < axes.get_ylim()[1] for axes in figure.axes for line in axes.lines)

@@ -36,7 +36,7 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     click.option(
         "--colour-by",
         "--color-by",
-        "colour",
+        "color_by",
         default="orbit",
         show_default=True,
         metavar="F",
@@ -49,7 +49,7 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     click.option(
         "--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts."
     ),
-    click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below."),
+    click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in gray below."),
     click.option(
         "--flow", is_flag=True, help="The solutions of the differential equation through the starts, as lines."
     ),
@@ -66,13 +66,13 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
       kahanmaps plot portrait weierstrass --eps 1/20 --levels modified_H -o w.svg
       kahanmaps plot portrait lotka_volterra --eps 1/10 --flow -o flow.pdf
 
-    In the plane of a planar system grey arrows show the direction of the flow,
+    In the plane of a planar system gray arrows show the direction of the flow,
     marks its equilibria, and dashes the separatrices of saddles; rings or marks
     are starts. With --levels or --euler there are no arrows.
 
     Without starts sixteen are chosen around an equilibrium. Without --axes the
     projection with the largest spread is drawn. Standard error says what was
-    chosen, how many points lie outside, and which orbits ended early. Colours go
+    chosen, how many points lie outside, and which orbits ended early. Colors go
     from dark to light with the value; the widest orbits are drawn first.
 
     Ctrl-C ends it without a picture.
@@ -88,9 +88,9 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     starts = _starts(file, field, eps, options)
     default = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
     steps = default if options["steps"] is None else options["steps"]
-    colour = options["colour"]
-    if colour not in ("orbit", "step"):
-        colour = lib.asked_function(file, eps, colour)
+    color = options["color_by"]
+    if color not in ("orbit", "step"):
+        color = lib.asked_function(file, eps, color)
     levels = None if options["levels"] is None else lib.asked_axis(file, eps, options["levels"])
     axes = _asked_axes(file, eps, options)
     found = lib.walked(
@@ -110,13 +110,13 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         euler = lib.euler_orbits(field or file.system, -eps if options["backward"] else eps, starts, steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
     window = window_from(options, len(axes))
-    shown = lib.portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
+    shown = lib.portrait_of(found, axes, color=color, window=window, euler=euler, join=options["lines"])
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
     if field is None and options["flow"]:
         raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
     if field is not None:
         flow = lib.plane_flow(field, plane if len(axes) == 2 and not options["no_field"] else [], shown.window)
-        if options["levels"] or options["euler"]:  # arrows among many grey lines show nothing
+        if options["levels"] or options["euler"]:  # arrows among many gray lines show nothing
             flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
         if options["flow"]:
             flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, found, options["backward"]))
@@ -147,7 +147,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     if shown.left_out:
         notes.append(f"{shown.left_out} of {points} points lie outside the window (--window)")
     if shown.undefined:
-        notes.append(f"{shown.undefined} of {points} points are left out: an axis or the colour has a pole there")
+        notes.append(f"{shown.undefined} of {points} points are left out: an axis or the color has a pole there")
     return Drawn(figure, file, [*talk, *notes], 3 if found.ended else 0)
 
 

@@ -24,7 +24,7 @@ from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for
 from kahanmaps.plots.portraits.windows import Window, window_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-SADDLE, CENTRE, FOCUS, NODE, DEGENERATE = "saddle", "centre", "focus", "node", "degenerate equilibrium"
+SADDLE, CENTER, FOCUS, NODE, DEGENERATE = "saddle", "center", "focus", "node", "degenerate equilibrium"
 _NEWTON_STARTS, _NEWTON_STEPS = 60, 40
 _MAX_DIMENSION = 20  # in which more than the origin and (1, ..., 1) are taken as starts
 _ZERO = 1e-7  # parts of eigenvalues, relative to the largest
@@ -57,7 +57,7 @@ class Equilibrium:
         if (real > least).any() and (real < -least).any():
             return SADDLE
         if (np.abs(real) <= least).all():
-            return CENTRE
+            return CENTER
         if (np.abs(real) <= least).any():
             return DEGENERATE
         return FOCUS if (np.abs(values.imag) > least).any() else NODE
@@ -68,7 +68,7 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> sorted((one.point.round(6).tolist(), one.kind) for one in equilibria(pendulum))
-    [([0.0, 0.0], 'saddle'), ([1.0, 0.0], 'centre')]
+    [([0.0, 0.0], 'saddle'), ([1.0, 0.0], 'center')]
     """
     n = system.dim
     f = VectorField(system)
