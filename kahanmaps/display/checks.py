@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.display import markup
-from kahanmaps.displayed import html_form, shorten, text_form
+from kahanmaps.display_protocols import html_form, shorten, text_form
 from kahanmaps.errors import counted
 from kahanmaps.maps.convention import eps_words
 

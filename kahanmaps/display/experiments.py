@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kahanmaps.display import markup
-from kahanmaps.displayed import html_form
+from kahanmaps.display_protocols import html_form
 from kahanmaps.experiments.results.store import Store, StoreError
 from kahanmaps.experiments.results.summary import Summary
 

@@ -21,7 +21,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import PLAIN, Notation, above_and_below, first_terms
 from kahanmaps.display.markup import escape
-from kahanmaps.displayed import latex_form
+from kahanmaps.display_protocols import latex_form
 from kahanmaps.errors import InputError, counted
 
 # TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.

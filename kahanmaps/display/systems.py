@@ -22,7 +22,7 @@ from kahanmaps.display.latex import (
     latex_polynomial,
     matrix,
 )
-from kahanmaps.displayed import html_form, latex_form, text_form
+from kahanmaps.display_protocols import html_form, latex_form, text_form
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import counted
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember

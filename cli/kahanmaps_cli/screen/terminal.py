@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps.displayed import shorten as shorten
+from kahanmaps.display_protocols import shorten as shorten
 from kahanmaps.errors import printable
 
 if TYPE_CHECKING:

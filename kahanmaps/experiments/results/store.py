@@ -34,7 +34,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from kahanmaps.atomic_files import resolved
-from kahanmaps.displayed import Displayed
+from kahanmaps.display_protocols import HtmlDisplay
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note_source, quoted
 from kahanmaps.experiments.results.records import (
     KEY_LENGTH,
@@ -177,7 +177,7 @@ class StoredTask(NamedTuple):
     attempts: int
 
 
-class Store(Displayed):
+class Store(HtmlDisplay):
     """A database of results. Make one with `Store.open`, and close it, best by `with`.
 
     >>> from tempfile import TemporaryDirectory
