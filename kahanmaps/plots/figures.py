@@ -312,7 +312,7 @@ def format_of(path: str, requested: str | None) -> str:
     extension = requested or Path(path).suffix.removeprefix(".").lower()
     if extension not in FORMATS:
         given = f"the extension .{extension}" if extension else "no extension"
-        raise InputError(f"{path}: expected the extension .pdf, .svg or .png, got {given}; or give --format")
+        raise InputError(f"{path}: found {given}, expected .pdf, .svg or .png, or the option --format")
     return extension
 
 

@@ -73,7 +73,7 @@ def test_settings_of_a_user_do_not_get_into_a_picture_and_are_left_as_they_were(
 )
 def test_the_format_is_that_of_the_ending_or_the_one_asked_for(path, asked, expected):
     if expected is None:
-        with pytest.raises(InputError, match=r"expected the extension \.pdf, \.svg or \.png"):
+        with pytest.raises(InputError, match=r"expected \.pdf, \.svg or \.png"):
             format_of(path, asked)
     else:
         assert format_of(path, asked) == expected

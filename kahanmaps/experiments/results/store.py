@@ -247,7 +247,7 @@ class Store(HtmlDisplay):
         if not exists and not create:
             raise StoreError(f"there is no database {self.name}: check the name, or run the batch to make it")
         if not self.path.parent.is_dir():
-            raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; make it first")
+            raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; create it first")
         mode = "rwc" if create else "rw"
         if self._is_readonly:
             # Reading has to write where a killed writer left a journal. Where no process may write, none does.
