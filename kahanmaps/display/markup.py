@@ -86,7 +86,7 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """Return a table; `head` and `caption` are text, the cells of `rows` are HTML. The last cell of a short row is wide.
+    """Return a table; `head` and `caption` are text, cells are HTML. The last cell of a short row spans the others.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
