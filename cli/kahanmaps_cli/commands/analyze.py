@@ -23,10 +23,10 @@ from kahanmaps_cli.signals import INTERRUPTED
 @opt.symbolic_option
 @opt.effort_options
 @opt.seed_option
-@click.option("--markdown", is_flag=True, help="The report in Markdown.")
+@click.option("--markdown", is_flag=True, help="Print the report in Markdown.")
 @opt.output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
-    """What the map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
+    """Analyze the map of SYSTEM: report what it preserves, how it grows, and a verdict on integrability.
 
     \b
       kahanmaps analyze euler_top --symbolic a1,a2,a3
@@ -36,15 +36,14 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)" --json
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
-    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).
-    Fixed points with eigenvalues, and a system of the catalogue that an affine change of variables leads to.
-    Integrals and densities in closed form with their proofs, which integrals of the flow it keeps, deforms and loses,
-    genus and base points of the curves of a planar integral, Hirota-Kimura relations, degrees of the iterates and their
-    recurrence, heights, symmetries and reversing ones, commuting systems, singularity confinement, and whether the
-    system belongs to the commuting family, in these or other affine coordinates. Claims in the file are not read.
-    Without --eps everything is for every eps.
+    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md). The report
+    contains fixed points with eigenvalues; an affinely equivalent system of the catalogue; integrals and densities with
+    proofs; the integrals of the flow that the map keeps, deforms or loses; genus and base points of the curves of a
+    planar integral; Hirota-Kimura relations; degrees of the iterates and their recurrence; heights; symmetries and
+    reversing symmetries; commuting systems; singularity confinement; and membership in the commuting family. Claims in
+    the file are not used. Without --eps the results hold for every eps.
 
-    proved, supported: formulas, as identities in x and eps. measured: modulo primes and along orbits, which is
+    Formulas are proved or supported as identities in x and eps. Results measured modulo primes and along orbits are
     evidence. The number of integrals and the growth are separate findings.
 
     Exit status: 0 there is a verdict, 2 usage error, 3 undecided.

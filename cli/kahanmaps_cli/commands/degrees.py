@@ -22,7 +22,7 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.eps_options,
     opt.effort_options,
     click.option(
-        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
+        "--terms", type=int, metavar="N", help="Compute d_1, ..., d_N (default: until a recurrence is certain)."
     ),
     click.option(
         "--max-degree",
@@ -30,7 +30,7 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
         metavar="D",
         default=lib.ITERATE_DEGREE,
         show_default=True,
-        help="Work out no larger degree.",
+        help="Compute no larger degree.",
     ),
     opt.seed_option,
 )
@@ -40,11 +40,11 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
 @opt.system_options
 @degree_options
 @click.option(
-    "--steps", type=int, metavar="N", help="Steps to follow singularities for (default: as singularities does)."
+    "--steps", type=int, metavar="N", help="Number of steps to trace singularities (default: as in singularities)."
 )
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
+    """Compute the degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
 
     \b
       kahanmaps degrees euler_top
@@ -53,8 +53,8 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps degrees --rhs "x' = x*(1-y); y' = y*(x-1)"
       kahanmaps degrees henon_heiles -p c=-2..0:1/2 --terms 6
 
-    The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 61 bits, two of
-    each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
+    The degree of Phi^n as a map of projective space is measured on two random lines modulo random primes of 61 bits.
+    Without --eps, eps is a random residue. Measured degrees are evidence, not proof.
 
     The hypersurfaces that the map contracts are followed, and explain the degrees for all times: generating function,
     recurrence, dynamical degree; of long compositions, map by map. A line for each of them says when it comes
@@ -62,14 +62,14 @@ def command(system: str | None, **options: Any) -> int:
     than determine it, with terms enough beyond the last confinement, and else there is an estimate only. "no
     confinement" is said with the number of steps that were tried.
 
-    In the plane a dynamical degree above 1 is proved: its bounds are then exact. Proved is also the growth of monomial
-    maps, by powers of the exponent matrix, and of maps with an iterate of degree 1, whose formulas are composed.
+    In the plane a dynamical degree above 1 is proved by exact bounds. The growth of monomial maps is proved by powers
+    of the exponent matrix, and that of maps with an iterate of degree 1 by composing formulas.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line. Values without a map are named at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
+    record) for each combination of values. Values at which the map is undefined are listed at the end.
 
-    Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
-    vary; 2 usage error; 3 undecided, or stopped early.
+    Exit status: 0 a recurrence was found, all requested terms were computed, or the iterates are constant or undefined
+    from some step on; 2 usage error; 3 undecided, or stopped early.
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
 

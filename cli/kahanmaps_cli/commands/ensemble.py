@@ -30,18 +30,20 @@ _VALUES = 200_000  # of them at most
 @opt.system_options
 @opt.random_starts_options
 @opt.eps_options
-@click.option("--steps", type=int, metavar="N", required=True, help="How many steps to take.")
+@click.option("--steps", type=int, metavar="N", required=True, help="Number of steps.")
 @opt.backward_option
-@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points there.")
+@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points to FILE.npy.")
 @click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
 @opt.integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
-@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Makes no difference to numbers, only to speed.")
-@click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
-@click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
+@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Method (default: chosen automatically).")
+@click.option(
+    "--kernel", type=click.Choice(("numpy", "numba")), help="Library that iterates: same numbers, other speed."
+)
+@click.option("--threads", type=Whole(1), metavar="T", help="Number of threads of numba (default: all processors).")
+@click.option("-v", "--verbose", is_flag=True, help="Print the method on standard error.")
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """Many orbits of the map of SYSTEM at once: how many go through, and how well integrals are kept.
+    """Iterate many orbits of the map of SYSTEM at once: how many complete, and how far integrals drift.
 
     \b
       kahanmaps ensemble paper_m2 --random 1000 --box 1/2 --seed 1 \\
@@ -51,9 +53,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
       kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 \\
           --steps 1000 --integral F1
 
-    FILE.npy is an array (records, orbits, dimension): row k holds step k K. It grows while the orbits are walked, and
-    is valid at every moment, also after Ctrl-C. Orbits that have ended early are NaN there. Starts in text are exact
-    numbers, separated by commas or blanks; # starts a comment, and a first line may name the columns.
+    FILE.npy is an array (records, orbits, dimension) whose row k holds step k K. It grows during the computation and is
+    valid at any time, also after Ctrl-C. Orbits that ended early are NaN. Initial points in text files are exact
+    numbers separated by commas or blanks; # starts a comment, and a first line may name the columns.
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """

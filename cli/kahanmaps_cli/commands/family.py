@@ -24,16 +24,18 @@ F = TypeVar("F", bound=Callable[..., Any])
 draw_options: Callable[[F], F] = opt.stack(
     click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
     click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
-    click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
-    click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),
-    click.option("--size", type=int, metavar="N", help="Bound for the integer coefficients drawn (default 2 or 1)."),
+    click.option("--generic", is_flag=True, help="Draw a random integer polynomial chi, typically irreducible over Q."),
+    click.option("--chi", metavar="EXPR", help="The polynomial chi in t, e.g. '(t-1)*(t^2-2)'."),
+    click.option("--size", type=int, metavar="N", help="Bound for the random integer coefficients (default 2 or 1)."),
 )
 DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 
 
 @click.group("family", cls=SuggestingGroup)
 def command() -> None:
-    """Members of the commuting family: A skew-Hamiltonian (A^T J = J A), H a cubic with A Hess(H) = Hess(H) A^T.
+    """Construct and inspect members of the commuting family.
+
+    A member consists of a skew-Hamiltonian matrix A (A^T J = J A) and a cubic H with A Hess(H) = Hess(H) A^T.
 
     \b
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
@@ -46,13 +48,13 @@ def command() -> None:
 
 @command.command("new")
 @draw_options
-@click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
+@click.option("--signs", metavar="S1,S2,...", help="Choose an associated system: 1 or -1 for each factor of chi.")
 @opt.seed_option
-@click.option("--name", help="The name in the file.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
+@click.option("--name", help="Name of the system in the file.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @opt.quiet_option
 def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
-    """Draw a member at random and write it as a system file.
+    """Generate a random member and write it as a system file.
 
     \b
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
@@ -60,7 +62,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
       kahanmaps family new --chi '(t-1)*(t^2-2)' --seed 1
       kahanmaps family new --m 2 --seed 3 --signs 1,-1 -o g.toml
 
-    Without --eigenvalues, --generic or --chi the eigenvalues are distinct small integers drawn from the seed.
+    Without --eigenvalues, --generic or --chi the eigenvalues are distinct small random integers.
     """
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
@@ -114,7 +116,9 @@ def draw_member(
 
 @command.command("show")
 @opt.system_options
-@click.option("--normal-form", is_flag=True, help="Also the system as one planar cubic h(X, Y) over K = Q[t]/chi.")
+@click.option(
+    "--normal-form", is_flag=True, help="Also print the normal form: one planar cubic h(X, Y) over K = Q[t]/chi."
+)
 @opt.json_option
 def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
@@ -125,8 +129,8 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
       kahanmaps family show hamiltonian.toml
       kahanmaps family show paper_m3 --json | jq -r '.hamiltonians[1]'
 
-    For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
-    A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
+    For a SYSTEM of kind [hamiltonian] or [system] a matrix A is searched for: it is a member if there is an A with
+    A^T J = J A and A Hess(H) = Hess(H) A^T that is not a multiple of I.
     """
     file = opt.load_system(system, options)
     recognised, member = None, file.member
@@ -204,10 +208,10 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
 @command.command("space")
 @opt.system_argument
 @opt.parameter_option
-@click.option("--matrix", metavar="ROWS", help="A itself instead of a file: '1,0;0,1'.")
+@click.option("--matrix", metavar="ROWS", help="The matrix A instead of a SYSTEM, e.g. '1,0;0,1'.")
 @opt.json_option
 def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: str | None, as_json: bool) -> None:
-    """The space of cubics H with A Hess(H) = Hess(H) A^T: its dimension, 4m for generic A, and a basis.
+    """Compute the space of cubics H with A Hess(H) = Hess(H) A^T: its dimension (4m for generic A) and a basis.
 
     \b
       kahanmaps family space paper_m3
@@ -253,12 +257,14 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
 @command.command("associated")
 @opt.system_argument
 @opt.parameter_option
-@click.option("--write-to", type=OutputFolder(), metavar="DIR", help="Write each as a system file to DIR.")
+@click.option(
+    "--write-to", type=OutputFolder(), metavar="DIR", help="Write each associated system as a system file to DIR."
+)
 @opt.json_option
 def associated(
     system: str | None, parameters: tuple[tuple[str, str], ...], write_to: str | None, as_json: bool
 ) -> None:
-    """All rational associated systems up to sign: signs, B_s as a polynomial in A, and K_s with grad K_s = B_s grad H.
+    """List all rational associated systems up to sign: signs, B_s as a polynomial in A, K_s with grad K_s = B_s grad H.
 
     \b
       kahanmaps family associated paper_m3
@@ -330,8 +336,10 @@ def associated(
 
 @command.command("tensor")
 @opt.system_options
-@click.option("--algebra", metavar="CHI", required=True, help="K = Q[t]/(chi), chi a polynomial in t: 't^2-2'.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
+@click.option(
+    "--algebra", metavar="CHI", required=True, help="Polynomial chi in t of the algebra K = Q[t]/(chi), e.g. 't^2-2'."
+)
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @opt.quiet_option
 def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **options: Any) -> None:
     """Write a quadratic system over the algebra K = Q[t]/(chi) as one over Q.

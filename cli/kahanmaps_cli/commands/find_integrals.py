@@ -32,19 +32,19 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     "sets",
     metavar="LIST",
     multiple=True,
-    help="A Hirota-Kimura basis of these polynomials instead, e.g. 'x^2,y^2,1'; x~ is the image of x.",
+    help="Search for a Hirota-Kimura basis of these monomials, e.g. 'x^2,y^2,1'; x~ is the image of x.",
 )
 @click.option(
     "--darboux",
     type=click.IntRange(1, 12),
     metavar="DEGREE",
-    help="Instead: all discrete Darboux polynomials up to it; with --flow those of the differential equation.",
+    help="Search for discrete Darboux polynomials up to this degree; with --flow for those of the vector field.",
 )
-@click.option("--flow", is_flag=True, help="Integrals of the differential equation, and what the map makes of them.")
+@click.option("--flow", is_flag=True, help="Compare with the integrals of the differential equation.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
-    """Integrals of the map of SYSTEM in closed form: how many, formulas P/Q, and their proofs.
+    """Search for rational integrals of the map of SYSTEM and prove them; measure how many there are.
 
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
@@ -58,16 +58,16 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals lorenz --parameter b=20 --flow --darboux 3
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
-    Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
-    from theorems, and from orbits, measured modulo primes; every formula is verified as an identity. Where there is
-    none in x alone it may contain x~, the image of x, x~~, that of x~, and so on. --flow adds which integrals of the
-    differential equation those of the map tend to as eps -> 0, and which are lost.
+    Without --eps the formulas contain eps (the time step is 2 eps). The number of independent integrals is known from
+    theorems, and measured along orbits modulo primes; every formula is verified as an identity. An integral may contain
+    the image x~ of x, the image x~~ of x~, and so on. --flow adds the limits of the integrals as eps -> 0, and the
+    integrals of the differential equation that the map loses.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line. Values without a map are named at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
+    record) for each combination of values. Values at which the map is undefined are listed at the end.
 
-    Exit status: 0 every integral that theorems give or orbits show has a formula, 2 usage error, 3 some have none,
-    orbits were not measured, or the time was too short.
+    Exit status: 0 as many formulas were found as theorems and orbits predict, 2 usage error, 3 fewer, or orbits were
+    not measured.
     """
     require_one_form(options)
 

@@ -21,10 +21,10 @@ from kahanmaps_cli.screen.terminal import tell
     metavar="D",
     help="Largest degree of entries (default: 3 in dimension 3, else 2).",
 )
-@click.option("--denominator", metavar="EXPR", help="A function that all entries are divided by, e.g. a density.")
+@click.option("--denominator", metavar="EXPR", help="Common denominator of the entries, e.g. a density.")
 @search_options("poisson")
 def command(system: str | None, **options: Any) -> int:
-    """Poisson tensors of SYSTEM: skew P(x), its entries polynomials, that the map preserves, dPhi P dPhi^T = P(x~).
+    """Search for Poisson tensors P with polynomial entries that the map of SYSTEM preserves: dPhi P dPhi^T = P(x~).
 
     \b
       kahanmaps find-poisson lotka_volterra
@@ -32,11 +32,11 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-poisson volterra_periodic_4 --degree 3
       kahanmaps find-poisson weierstrass --symbolic g2 --toml
 
-    They are told by brackets {x_i, x_j} = P_ij, with rank, the Jacobi identity, the Casimirs and the involution of the
-    integrals that are found; products of polynomial integrals and others are left out. Without --eps the formulas
-    contain eps (the time step is 2 eps).
+    Each is printed by its brackets {x_i, x_j} = P_ij, with its rank, the Jacobi identity, Casimirs, and integrals in
+    involution; products with polynomial integrals are omitted. Without --eps the formulas contain eps (the time step is
+    2 eps).
 
-    Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
+    Exit status: 0 found, 2 usage error, 3 none up to the degree tried.
     """
     require_one_form(options)
     with SearchProgress(options) as search:

@@ -22,25 +22,28 @@ _DEFAULT_STARTS = 16
 @opt.system_options
 @opt.random_starts_options
 @opt.eps_options
-@click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="How many steps to count.")
-@click.option("--transient", type=int, metavar="K", help="Steps before those, not counted (default: a tenth).")
+@click.option(
+    "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps to average over."
+)
+@click.option("--transient", type=int, metavar="K", help="Initial steps to discard (default: a tenth).")
 @opt.seconds_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Lyapunov exponents of float orbits of the map of SYSTEM, by the exact tangent map.
+    """Estimate Lyapunov exponents of floating-point orbits of the map of SYSTEM, by the exact tangent map.
 
     \b
       kahanmaps lyapunov lorenz --eps 1/400 --box 5 --steps 20000
       kahanmaps lyapunov euler_top --eps 1/10 --random 100 --seed 1
       kahanmaps lyapunov henon_heiles --eps 1/10 --box 1/3 --json
 
-    Per unit of time, which is 1/(2 eps) steps, and per step: means over the starts, their spread, and how far the first
-    half of the steps is from all of them. Without --starts and --random there are 16 random starts.
+    The output has exponents per unit of time, which is 1/(2 eps) steps, and per step: means over the initial points,
+    their spread, and the difference between the first half of the steps and all of them. The default is 16 random
+    initial points.
 
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is checked against log |det dPhi|.
 
-    Exit status: 0 all orbits went through, 2 usage error, 3 some ended early or --seconds stopped all.
+    Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, or --seconds stopped them.
     """
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]

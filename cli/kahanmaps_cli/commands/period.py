@@ -20,16 +20,21 @@ _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from secon
 
 @click.command("period")
 @system_options
-@click.option("--start", type=PointText(), metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
-@click.option("--levels", type=int, metavar="N", help="Instead: the levels on which all orbits have period N.")
+@click.option("--start", type=PointText(), metavar="X", help="Initial point, e.g. 1/2,-1/3,0.25.")
+@click.option("--levels", type=int, metavar="N", help="Find the levels on which all orbits have period N instead.")
 @eps_options
 @click.option(
-    "--arithmetic", type=Arithmetic(), metavar="KIND", default="exact", show_default=True, help="exact or mod:P."
+    "--arithmetic",
+    type=Arithmetic(),
+    metavar="KIND",
+    default="exact",
+    show_default=True,
+    help="Arithmetic: exact or mod:P.",
 )
-@click.option("-v", "--verbose", is_flag=True, help="Say on standard error what was found in the system.")
+@click.option("-v", "--verbose", is_flag=True, help="Print the normal form on standard error.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """The exact period of an orbit of a member of the commuting family, without walking it.
+    """Compute the exact period of an orbit of a member of the commuting family without iterating it.
 
     \b
       kahanmaps period paper_m3 --start 1,2,3,4,5,6 --eps 1/10
@@ -43,15 +48,15 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     In every plane of its normal form the map is a translation on a cubic curve, and the period is the order of a point.
     Modulo P it is computed; over Q the orbit is proved periodic or aperiodic.
 
-    SYSTEM may be a member of the family without saying so. The translation goes on where the map does not, through
-    poles: if the orbit meets one, the period is that of the orbit continued, and the output says so.
+    SYSTEM need not be declared as a member. The translation extends the map through poles: if the orbit meets one, the
+    output says so, and the period is that of the extended orbit.
 
     --levels N prints the polynomial psi_N whose roots gamma = 1 - disc(h) level^2 are the levels with period N or a
     divisor, and the rational gamma with period N; with SYSTEM and eps also these levels in each plane at a rational
     root of chi, as values of the integral h/(1 + eps^2 D).
 
-    Exit status: 0 found (or proved that there is none), 2 usage error, also where there is no normal form, 3 undecided,
-    or the orbit comes to a point where it cannot be continued.
+    Exit status: 0 found (or proved that there is none), 2 usage error or no normal form, 3 undecided, or the orbit
+    reaches a point where it cannot be continued.
     """
     if (options["levels"] is None) == (options["start"] is None):
         raise click.UsageError("give --start X, or --levels N, one of the two")

@@ -16,13 +16,13 @@ from kahanmaps_cli.screen.terminal import formula, tell, tell_entry
 @click.command("systems")
 @click.argument("name", required=False, shell_complete=complete_system)
 @parameter_option
-@click.option("--toml", "as_toml", is_flag=True, help="The system file itself, to copy and change.")
-@click.option("--latex", "as_latex", is_flag=True, help="Equations, integrals and density in LaTeX.")
+@click.option("--toml", "as_toml", is_flag=True, help="Print the system file.")
+@click.option("--latex", "as_latex", is_flag=True, help="Print equations, integrals and density in LaTeX.")
 @json_option
 def command(
     name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: bool, as_latex: bool, as_json: bool
 ) -> None:
-    """List the named systems, or show one: its equations, what is known of it, and from where.
+    """List the systems of the catalogue, or show one: its equations and what is known about it, with references.
 
     \b
       kahanmaps systems

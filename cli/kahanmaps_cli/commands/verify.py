@@ -49,18 +49,24 @@ _LEGEND = {
 @opt.parameter_option
 @draw_options
 @opt.eps_options
-@click.option("--universal", is_flag=True, help="Not one member: everything at random over GF(p), for every member.")
 @click.option(
-    "--beyond", is_flag=True, help="A table of what survives for other H, J, steps and A, with counterexamples."
+    "--universal", is_flag=True, help="Check the generic member at random points over GF(p) instead of one member."
 )
-@click.option("--controls", is_flag=True, help="Run every claim on input that breaks one hypothesis: it has to fail.")
+@click.option(
+    "--beyond",
+    is_flag=True,
+    help="Print which statements survive for other H, J, time steps and A, with counterexamples.",
+)
+@click.option(
+    "--controls", is_flag=True, help="Also check every claim on input that violates one hypothesis, where it must fail."
+)
 @click.option(
     "--section",
     "sections",
     type=int,
     metavar="N",
     multiple=True,
-    help="Only this section (1 to 9; 10: beyond the paper). Repeatable.",
+    help="Restrict to this section (1 to 9; 10 is beyond the paper). Repeatable.",
 )
 @click.option(
     "--order",
@@ -70,13 +76,15 @@ _LEGEND = {
     show_default=True,
     help="Order in eps^2 of the series of the integrals.",
 )
-@click.option("--balls", "ball_bits", type=int, metavar="BITS", help="Also over complex balls, all roots enclosed.")
+@click.option(
+    "--balls", "ball_bits", type=int, metavar="BITS", help="Also compute over complex balls that enclose all roots."
+)
 @opt.evidence_options
-@click.option("--markdown", "as_markdown", is_flag=True, help="The table in Markdown.")
+@click.option("--markdown", "as_markdown", is_flag=True, help="Print the table in Markdown.")
 @opt.verbose_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Every statement of the paper of Petrera and Suris, put to the test for a member of its family.
+    """Check every statement of the paper of Petrera and Suris for a member of its family.
 
     \b
       kahanmaps verify                        # a random member with m = 3
@@ -84,13 +92,13 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --m 4 --generic --seed 2          # chi irreducible over Q
       kahanmaps verify --chi '(t-1)*(t^2+1)' --balls 128
       kahanmaps verify --universal --m 3      # theorems for the generic member
-      kahanmaps verify --controls --section 6            # what makes it fail
+      kahanmaps verify --controls --section 6            # violated hypotheses
       kahanmaps verify --m 2 --json | jq '.claims[0]'
-      kahanmaps verify --beyond             # what survives of them
+      kahanmaps verify --beyond             # other H, J, A
 
-    The member is SYSTEM, or drawn from --m, --eigenvalues, --generic or --chi; without any of these m = 3. Claims are
+    The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi (default: m = 3). Claims are
     proved by expanding them symbolically, verified exactly, or supported at random points over GF(p) with a bound on
-    the error. Misprints stand in the table in both forms. m = 1 to 8; beyond m = 6 claims that sum over all eigenvalues
+    the error. Misprints are checked in both forms. m = 1 to 8; beyond m = 6 claims that sum over all eigenvalues
     are supported only.
 
     Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 usage error, 3 one is undecided.
