@@ -147,9 +147,9 @@ def task_kinds() -> Mapping[str, TaskKind]:
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):
         try:
             import_module(module)
-        except Exception as error:  # it is somebody's module: whatever it raises
-            told = f"{type(error).__name__}: {error}"
-            raise InputError(f"{ENVIRONMENT} names the module {module}, which cannot be imported: {told}") from error
+        except Exception as error:  # a module of a user may raise anything
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(f"{ENVIRONMENT} names the module {module}, which cannot be imported: {reason}") from error
     return _KINDS
 
 

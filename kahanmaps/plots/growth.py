@@ -257,18 +257,18 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
         if not (1 <= len(degrees) <= _MAX_TERMS and any(degrees)):
             raise InputError("no degrees, or all of them 0")
         patterns = enclosure = None
-        if (told := record.get("singularities")) is not None:
-            known = told.get("generating_function") or {}
+        if (data := record.get("singularities")) is not None:
+            known = data.get("generating_function") or {}
             series = tuple(tuple(int(c) for c in known[part]) for part in ("numerator", "denominator") if known)
             if series and not (max(map(len, series)) <= _MAX_TERMS and series[1][:1] == (1,)):
                 raise InputError("no generating function with a short denominator that begins with 1")
-            lengths = tuple(int(length) for length in told["lengths"])
-            searched = None if told["searched"] is None else int(told["searched"])
-            patterns = Patterns(lengths, searched, told["some_confined"], str(told["running"]), series)
-        if (told := record.get("enclosure")) is not None:
+            lengths = tuple(int(length) for length in data["lengths"])
+            searched = None if data["searched"] is None else int(data["searched"])
+            patterns = Patterns(lengths, searched, data["some_confined"], str(data["running"]), series)
+        if (data := record.get("enclosure")) is not None:
             names = ("steps", "degree_below", "degree_above", "prime", "eps_residue")
             enclosure = DynamicalDegreeBounds(
-                str(told["lower"]), str(told["upper"]), *(int(told[name]) for name in names)
+                str(data["lower"]), str(data["upper"]), *(int(data[name]) for name in names)
             )
         growth = DegreeGrowth(
             degrees,

@@ -1,4 +1,4 @@
-"""How pictures look: sizes as a journal states them, colors that everybody can tell apart.
+"""How pictures look: sizes as a journal states them, colors that color-blind readers can tell apart.
 
 The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up
 to four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown by
@@ -55,7 +55,7 @@ class Style:
         self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
-        """Width and height in inches; `aspect` is height over width where no height is asked for."""
+        """Width and height in inches; `aspect` is height over width where the style has no height."""
         height = self.width * aspect if self.height is None else self.height
         return self.width / CENTIMETRES_PER_INCH, height / CENTIMETRES_PER_INCH
 

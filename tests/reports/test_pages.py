@@ -140,7 +140,7 @@ def test_a_system_with_an_algebraic_parameter_is_drawn_around_its_fixed_points()
     assert "separatrix" in html
     assert "outside" not in html
     which = Pictures().portrait(km.System(field, a="root of t^2 - 2"), None)
-    assert "machine numbers: not drawn, for a root of t^2 - 2 may be -1.41421, 1.41421" in which
+    assert "floating point: not drawn, for a root of t^2 - 2 may be -1.41421, 1.41421" in which
 
 
 def test_browsers_are_told_to_run_no_script_and_to_load_nothing(drawn):

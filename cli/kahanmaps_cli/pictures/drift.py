@@ -74,7 +74,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         raise lib.InputError("found eps = 0, expected another number: at eps = 0 every map is the identity")
     messages: list[str] = []
     if options["integrals"]:
-        functions = lib.asked_functions(real_approximation, eps, options["integrals"])
+        functions = lib.requested_functions(real_approximation, eps, options["integrals"])
     else:
         known = lib.known_functions(real_approximation, eps)
         own = [function for function in known if function.name != "H"]

@@ -99,8 +99,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     steps = default if options["steps"] is None else options["steps"]
     color = options["color_by"]
     if color not in ("orbit", "step"):
-        color = lib.asked_function(file, eps, color)
-    levels = None if options["levels"] is None else lib.asked_axis(file, eps, options["levels"])
+        color = lib.requested_function(file, eps, color)
+    levels = None if options["levels"] is None else lib.requested_axis(file, eps, options["levels"])
     axes = _requested_axes(file, eps, options)
     found = lib.walked(
         lib.ensemble_of_file(file, eps, starts, steps, backward=options["backward"]),
@@ -110,7 +110,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     if axes is None:
         count = 3 if options["space"] else 2
         chosen = [file.variables[k] for k in lib.fullest_axes(found.points.reshape(-1, file.dim), count)]
-        axes = tuple(lib.asked_axis(file, eps, name) for name in chosen)
+        axes = tuple(lib.requested_axis(file, eps, name) for name in chosen)
         if file.dim > count:
             notes.append(f"axes {', '.join(chosen)}: the projection with the largest spread (--axes chooses)")
     euler = None
@@ -221,11 +221,11 @@ def _requested_axes(
         if len(set(pieces)) < len(pieces):
             raise lib.InputError(f"found --axes {text[:60]}, expected different axes")
         return tuple(
-            "step" if piece == "step" and "step" not in file.variables else lib.asked_axis(file, eps, piece)
+            "step" if piece == "step" and "step" not in file.variables else lib.requested_axis(file, eps, piece)
             for piece in pieces
         )
     if file.dim == 1 and count == 2:
-        return "step", lib.asked_axis(file, eps, file.variables[0])
+        return "step", lib.requested_axis(file, eps, file.variables[0])
     if file.dim < count:
         raise lib.InputError(f"found {file.dim} variables, expected at least {count}, one for each axis")
     return None
