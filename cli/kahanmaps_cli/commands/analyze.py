@@ -11,9 +11,9 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import symbols_and_eps
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import echo, formula, on_terminal, tell
+from kahanmaps_cli.screen.terminal import formula, on_terminal, print_raw, print_stdout
 from kahanmaps_cli.signals import INTERRUPTED
 
 
@@ -73,17 +73,17 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
             lines += [f"## {name}", ""]
             lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
             lines.append("")
-        echo("\n".join([*lines, found.work]))
+        print_raw("\n".join([*lines, found.work]))
     else:
-        report.tell(found.sections)
+        report.print_new(found.sections)
         final = found.conclusion
-        tell("\nverdict", style="bold")
-        tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
-        tell(found.work)
+        print_stdout("\nverdict", style="bold")
+        print_stdout(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
+        print_stdout(found.work)
     if search.is_over:
         return 3
     if found.interrupted:
-        say("interrupted: the verdict rests on what was found so far")
+        print_stderr("interrupted: the verdict rests on what was found so far")
         return INTERRUPTED
     return 3 if found.conclusion.kind == "undecided" else 0
 
@@ -101,16 +101,16 @@ class _Report:
         if self._is_silent:
             return
         if begins:
-            tell(lib.analysis_head(found))
-        self.tell(found.final_sections)
+            print_stdout(lib.analysis_head(found))
+        self.print_new(found.final_sections)
 
-    def tell(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
+    def print_new(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
         """Print the sections that have not been printed yet."""
         if self.progress is not None and len(sections) > self._told:
             self.progress.clear()
         for name, lines in sections[self._told :]:
-            tell(f"\n{name}", style="bold")
+            print_stdout(f"\n{name}", style="bold")
             for line in lines:
-                tell(f"{line.status}\t{formula(line.text)}")
+                print_stdout(f"{line.status}\t{formula(line.text)}")
         self._told = max(self._told, len(sections))
         sys.stdout.flush()

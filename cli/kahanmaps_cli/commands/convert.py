@@ -9,7 +9,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import as_typed, say
+from kahanmaps_cli.screen.progress import as_typed, print_stderr
 
 # Those of kahanmaps.languages.convert, which --help does not load.
 _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran", "toml")
@@ -77,7 +77,7 @@ def _write(text: str, name: str, language: str, output: str | None, quiet: bool)
         return
     lib.write_atomically(output, text.encode())
     if not quiet:
-        say(f"{output}: {name} for {language}, {len(text.splitlines())} lines")
+        print_stderr(f"{output}: {name} for {language}, {len(text.splitlines())} lines")
 
 
 def _split(text: str) -> list[str]:

@@ -10,7 +10,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
 
@@ -70,11 +70,11 @@ def command(system: str | None, **options: Any) -> int:
 def _print(file: lib.SystemFile, runs: list[lib.Census]) -> None:
     what = "the Kahan map" if file.is_quadratic else file.map.kind
     share = lib.eps_share(file.map)
-    tell(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
+    print_stdout(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
     for census in runs:
         at = f", eps = {census.eps}" if file.map.has_eps else ""
-        tell(f"\n# p = {census.prime}{at}")
-        tell(str(census))
+        print_stdout(f"\n# p = {census.prime}{at}")
+        print_stdout(str(census))
 
 
 def _record(file: lib.SystemFile, options: dict[str, Any], runs: list[lib.Census]) -> dict[str, Any]:

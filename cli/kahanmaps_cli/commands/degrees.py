@@ -11,7 +11,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
 _SHOWN = 8  # degrees in a line of a table
@@ -104,8 +104,8 @@ def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 61 bits"
     at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_told(eps, file.map)
     how = f"{lines}: measured, not proved" if found.primes else "powers of the exponent matrix: exact"
-    tell(f"# {file.name}{at}, {how}")
-    tell(found.text)
+    print_stdout(f"# {file.name}{at}, {how}")
+    print_stdout(found.text)
 
 
 def _record(

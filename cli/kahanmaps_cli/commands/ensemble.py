@@ -14,9 +14,9 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Whole
 from kahanmaps_cli.runs.ensemble_starts import normal_form_for, requested_starts, starts_record
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Progress, print_stderr
 from kahanmaps_cli.screen.render import json_number, print_json, record_of, short_float
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.signals import interruptible
 
 MAX_STEPS = 10**13  # years
@@ -89,7 +89,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     method = "generic" if form is None else "normal-form"
     if verbose and not quiet:
         why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
-        say(f"method {method}: {why}; kernel {ensemble.kernel}")
+        print_stderr(f"method {method}: {why}; kernel {ensemble.kernel}")
     # Integrals are looked at more often than the first and the last point are written.
     whole = every or max(1, steps)
     interval = whole
@@ -145,9 +145,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     else:
         _print(file, eps, options["backward"], ensemble.kernel, found)
     if not quiet and output is not None:
-        say(f"{output}: {counted(records, 'record')} of {counted(ensemble.n, 'orbit')}")
+        print_stderr(f"{output}: {counted(records, 'record')} of {counted(ensemble.n, 'orbit')}")
     if not quiet and ensemble.step < steps:
-        say(f"interrupted after step {ensemble.step}")
+        print_stderr(f"interrupted after step {ensemble.step}")
     return 130 if ensemble.step < steps else 0 if found["counts"]["completed"] == ensemble.n else 3
 
 
@@ -172,7 +172,7 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
 
 def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, found: dict[str, Any]) -> None:
     """Tab-separated lines, aligned on a terminal."""
-    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
+    print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
     rows = [("orbits", str(found["orbits"])), ("steps", str(found["steps_taken"])), ("kernel", kernel)]
     rows += [(word, str(number)) for word, number in found["counts"].items()]
     near = found["near_singular"]
@@ -190,4 +190,4 @@ def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, found: d
     if more:
         rows.append(("ended early", f"and {counted(more, 'more orbit')}"))
     for name, text in rows:
-        tell(f"{name}\t{text}", 15)
+        print_stdout(f"{name}\t{text}", 15)

@@ -14,9 +14,9 @@ from kahanmaps.errors import InputError, counted, quoted
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder, file_name, will_write
-from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.terminal import formula, print_stdout
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -77,7 +77,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     _write(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
-        say(f"{where}dimension {member.dim}; {lib.diagnosis(member.A)}")
+        print_stderr(f"{where}dimension {member.dim}; {lib.diagnosis(member.A)}")
 
 
 def drawn_file(options: dict[str, Any]) -> lib.SystemFile:
@@ -174,34 +174,36 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     if as_json:
         print_json(data)
         return
-    tell(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
+    print_stdout(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
     if recognised is not None:
-        tell(f"found, not declared: {recognised.text}")
-    tell(data["diagnosis"])
+        print_stdout(f"found, not declared: {recognised.text}")
+    print_stdout(data["diagnosis"])
     if recognised is not None and not recognised.is_standard:
-        tell("x = T y, T =")
+        print_stdout("x = T y, T =")
         _print_matrix(recognised.T)
-    tell("A =")
+    print_stdout("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
-        tell(f"H_{k} = {formula(text)}")
+        print_stdout(f"H_{k} = {formula(text)}")
     if any(sign < 0 for sign in member.signs):
-        tell(f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}")
+        print_stdout(
+            f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}"
+        )
     if form is not None:
-        tell(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
-        tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
-        tell(f"h = {formula(form.h_text)}")
-        tell(f"D = {formula(form.D_text)}")
-        tell(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
+        print_stdout(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
+        print_stdout("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
+        print_stdout(f"h = {formula(form.h_text)}")
+        print_stdout(f"D = {formula(form.D_text)}")
+        print_stdout(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
         if form.parts:
             total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
-            tell(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
-            tell("the Kahan map conserves h/(1 + eps^2 D) at each of them")
+            print_stdout(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
+            print_stdout("the Kahan map conserves h/(1 + eps^2 D) at each of them")
         for part in form.parts:
             root, weight = formula(lib.format_number(part.root)), formula(lib.format_number(part.weight))
-            tell(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
+            print_stdout(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
         point = "x" if recognised is None or recognised.is_standard else "y"
-        tell(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
+        print_stdout(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
         _print_matrix(form.S)
 
 
@@ -245,13 +247,13 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     if as_json:
         print_json(data)
         return
-    tell(
+    print_stdout(
         f"dimension {found.dimension} (generic A: 4m = {found.expected}); "
         f"the linear system has {found.unknowns} unknowns and rank {found.rank}"
     )
-    tell(data["diagnosis"])
+    print_stdout(data["diagnosis"])
     for k, text in enumerate(data["basis"], start=1):
-        tell(f"{k}\t{formula(text)}")
+        print_stdout(f"{k}\t{formula(text)}")
 
 
 @command.command("associated")
@@ -325,13 +327,13 @@ def associated(
         )
         return
     named = ", ".join(f"({factor})" for factor in member.factors)
-    tell(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
+    print_stdout(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
-        tell(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
+        print_stdout(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
     for row in conjugate:
         signs, powers = "".join("+" if sign > 0 else "-" for sign in row["signs"]), ", ".join(row["B_in_powers_of_A"])
-        tell(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {formula(row['K'])}")
+        print_stdout(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {formula(row['K'])}")
 
 
 @command.command("tensor")
@@ -361,7 +363,7 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
     if not quiet:
         where = f"{output}: " if output else ""
         claimed = len(over_algebra.integrals) * int(chi.degree())
-        say(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
+        print_stderr(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
 
 
 def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:
@@ -384,4 +386,4 @@ def _print_matrix(matrix: Any) -> None:
     rows = [[formula(cell, 24) for cell in row] for row in lib.plain(matrix)]
     widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
     for row in rows:
-        tell("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
+        print_stdout("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))

@@ -8,7 +8,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.search import asked, print_search, require_one_form, search_options
+from kahanmaps_cli.runs.search import print_search, require_one_form, search_arguments, search_options
 from kahanmaps_cli.screen.progress import SearchProgress
 
 
@@ -35,7 +35,7 @@ def command(system: str | None, **options: Any) -> int:
     require_one_form(options)
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
-        settings = asked(options, "flow", "max_degree")
+        settings = search_arguments(options, "flow", "max_degree")
         if options["flow"] and options["as_toml"]:
             raise click.UsageError("--flow goes without --toml, which is about the map")
         found = lib.find_densities(file, **settings, progress=search)

@@ -10,18 +10,18 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import (
-    asked,
     heading,
     print_search,
     record,
     require_one_form,
     scope,
+    search_arguments,
     search_options,
     symbols_and_eps,
 )
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.terminal import formula, print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 
 
@@ -74,7 +74,7 @@ def command(system: str | None, **options: Any) -> int:
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
-        found = lib.find_integrals(file, **asked(options, "max_degree"), progress=search)
+        found = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
         line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
         return Cell(line, lambda: record("find-integrals", found, search), lambda: None, found.reason)
@@ -92,7 +92,7 @@ def command(system: str | None, **options: Any) -> int:
         return (_bases if options["sets"] else _darboux)(system, options)
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
-        find = partial(lib.find_integrals, file, **asked(options, "max_degree"), progress=search)
+        find = partial(lib.find_integrals, file, **search_arguments(options, "max_degree"), progress=search)
         if options["flow"]:
             stages = lib.budget_for("integrals", options["effort"]).share([1, 1])
             found = find(flow=True, effort=next(stages))
@@ -108,9 +108,9 @@ def command(system: str | None, **options: Any) -> int:
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for one in found.time_dependent:
             where = "" if found.flow else "of the n-th point: "
-            tell(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\t{where}depends on time")
+            print_stdout(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\t{where}depends on time")
         for status, text in () if beside is None else beside.lines(others=False):
-            tell(f"{status}\t{formula(text)}")
+            print_stdout(f"{status}\t{formula(text)}")
     return 3 if found.reason else 0
 
 
@@ -123,12 +123,12 @@ def _count(found: Any) -> str:
 def _darboux(system: str | None, options: dict[str, Any]) -> int:
     with SearchProgress(options) as search:
         file, degree = opt.load_system(system, options), options["darboux"]
-        found = lib.darboux_polynomials(file, degree, **asked(options, "flow"), progress=search)
+        found = lib.darboux_polynomials(file, degree, **search_arguments(options, "flow"), progress=search)
     if options["as_json"]:
         print_json(record("darboux-polynomials", found, search))
     else:
-        tell(f"Darboux polynomials: {found.file.name}{scope(found)}")
-        tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
+        print_stdout(f"Darboux polynomials: {found.file.name}{scope(found)}")
+        print_stdout("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
     return 3 if found.reason else 0
 
 
@@ -175,14 +175,14 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
         )
         return 3 if reason else 0
     step = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
-    tell(f"Hirota-Kimura bases: {file.name}{step}, measured on two orbits modulo each of two primes")
+    print_stdout(f"Hirota-Kimura bases: {file.name}{step}, measured on two orbits modulo each of two primes")
     for row in rows:
-        tell(f"dimension {row.dimension}\t{', '.join(row.functions)}")
+        print_stdout(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:
             names = [name for name, same in zip(row.functions, vector, strict=True) if not same]
-            tell(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
+            print_stdout(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
         if not row.agree:
-            tell("\tthe orbits that were compared do not agree: try another --seed")
+            print_stdout("\tthe orbits that were compared do not agree: try another --seed")
     for text in filter(None, (note, reason)):
-        tell(f"note\t{text}")
+        print_stdout(f"note\t{text}")
     return 3 if reason else 0

@@ -8,9 +8,9 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.search import asked, print_search, require_one_form, search_options
+from kahanmaps_cli.runs.search import print_search, require_one_form, search_arguments, search_options
 from kahanmaps_cli.screen.progress import SearchProgress
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 
 
 @click.command("find-poisson")
@@ -41,7 +41,7 @@ def command(system: str | None, **options: Any) -> int:
     require_one_form(options)
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
-        settings, denominator = asked(options), None
+        settings, denominator = search_arguments(options), None
         if options["denominator"] is not None:
             denominator = lib.parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
         found = lib.find_poisson(file, options["degree"], denominator=denominator, **settings, progress=search)
@@ -50,5 +50,5 @@ def command(system: str | None, **options: Any) -> int:
     )
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for integral in found.integrals:
-            tell(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
+            print_stdout(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
     return 0 if found.tensors else 3

@@ -12,7 +12,7 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.screen.progress import Progress, SearchProgress
 from kahanmaps_cli.screen.render import record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
 # Of the picture as well.
@@ -109,8 +109,8 @@ def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     each = ", ".join(lib.eps_told(value, file.map).removeprefix(", eps = ") for value in values)
     eps = f", eps = {each}" if file.map.has_eps else ""
-    tell(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
-    tell(str(found))
+    print_stdout(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
+    print_stdout(str(found))
 
 
 def _record(

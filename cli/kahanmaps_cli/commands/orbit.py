@@ -13,7 +13,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Arithmetic, PointText, Steps, Whole
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import Progress, TimeLeft, say
+from kahanmaps_cli.screen.progress import Progress, TimeLeft, print_stderr
 from kahanmaps_cli.screen.streams import is_read
 from kahanmaps_cli.signals import interruptible
 
@@ -132,7 +132,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     walk.integrals = functions
     said = walk.why
     if verbose and not quiet:
-        say(said)
+        print_stderr(said)
     on_terminal = output is None and sys.stdout.isatty()
     is_table = on_terminal and form == "text"
     to: Any = sys.stdout if output is None else output
@@ -154,11 +154,11 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     with interruptible(walk.interrupt), Progress(quiet or on_terminal) as progress:  # points themselves show it
         end = walk.write(to, form, file.name, told)
     if verbose and not quiet and walk.why != said:
-        say(walk.why)
+        print_stderr(walk.why)
     if output is not None and not quiet:
-        say(f"{output}: {end.text}")
+        print_stderr(f"{output}: {end.text}")
     elif end.status not in _STATUS and not (quiet or unread or is_table):  # whose last line says it
-        say(end.text)
+        print_stderr(end.text)
     return 3 if unread else _STATUS.get(end.status, 3)
 
 

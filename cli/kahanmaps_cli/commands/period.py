@@ -9,9 +9,9 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.params import Arithmetic, PointText
-from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json, record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
 _WALK = "To walk instead: kahanmaps orbit ... --steps N says when the start comes back"
@@ -79,9 +79,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         )
     if not quiet:
         if verbose:
-            say(normal_form.text)
+            print_stderr(normal_form.text)
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
-            say(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
+            print_stderr(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
     found = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
     message, status = found.text.splitlines()[0], _STATUS.get(found.status, 3)
     if as_json:
@@ -111,10 +111,10 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         )
         print_json(record)
         if status and not quiet:
-            say(f"{found.status}: {message}")
+            print_stderr(f"{found.status}: {message}")
     else:
-        tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {options['arithmetic']} arithmetic")
-        tell(str(found))
+        print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, {options['arithmetic']} arithmetic")
+        print_stdout(str(found))
     return status
 
 
@@ -154,14 +154,14 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
     if as_json:
         print_json(data)
         return 0
-    tell(f"psi_{levels.period}\t{data['psi']}" + " times gamma^(1/3)" * (levels.period % 3 == 0))
-    tell(f"period {levels.period} only\t{data['primitive']}")
-    tell(f"rational gamma\t{', '.join(data['gamma']) or 'none'}")
+    print_stdout(f"psi_{levels.period}\t{data['psi']}" + " times gamma^(1/3)" * (levels.period % 3 == 0))
+    print_stdout(f"period {levels.period} only\t{data['primitive']}")
+    print_stdout(f"rational gamma\t{', '.join(data['gamma']) or 'none'}")
     for plane in data.get("planes", ()):
-        tell(f"plane t = {plane['root']}\th = {plane['h']}, D = {plane['D']}")
+        print_stdout(f"plane t = {plane['root']}\th = {plane['h']}, D = {plane['D']}")
         for square in plane["squares"]:
             real = "" if square[0] != "-" else ", no real level"
-            tell(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
+            print_stdout(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
         if plane["disc"] == "0":  # 1 is no root of any psi_N
-            tell("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
+            print_stdout("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0

@@ -8,9 +8,9 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json, record_of
-from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.terminal import formula, print_stdout
 
 
 @click.command("singularities")
@@ -80,23 +80,25 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         name = file.map.denominator_name
         share = lib.eps_share(file.map)
-        tell(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
+        print_stdout(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
         if symbolic is not None:
             factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-            tell(f"factors of {name}\t{formula(factors, 200) or 'none'}")
+            print_stdout(f"factors of {name}\t{formula(factors, 200) or 'none'}")
         for run in runs:
             at = f"eps = {run.eps}: " if file.map.has_eps else ""
             text = str(run).replace("# ", f"\n# {at}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
-            tell("\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n")))
-        tell(f"\n# {runs[0].text if agree else verdict}")
+            print_stdout(
+                "\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n"))
+            )
+        print_stdout(f"\n# {runs[0].text if agree else verdict}")
     if verdict == lib.UNDECIDED and not quiet and not search.is_over:
         if any(run.stopped for run in runs):
             why = "the budget was spent: give more --effort"
         elif not agree:
-            why = "the two eps tell different things: try others with --eps"
+            why = "the two values of eps disagree: try others with --eps"
         else:
             why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
-        say(f"undecided: {why}")
+        print_stderr(f"undecided: {why}")
     return 3 if verdict == lib.UNDECIDED or search.is_over else 0
 
 

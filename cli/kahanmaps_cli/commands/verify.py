@@ -14,7 +14,7 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
-from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
+from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, on_terminal, print_raw, print_stdout, shorten, styled
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -115,9 +115,9 @@ def command(system: str | None, **options: Any) -> int:
             flag = "--beyond" if options["beyond"] else "--universal"
             raise click.UsageError(f"found {flag} and {clash[0]}, expected {flag} with --m only")
     elif system is not None and given:
-        raise click.UsageError("give a SYSTEM or say which member to draw (--m, --eigenvalues, ...), not both")
+        raise click.UsageError("give a SYSTEM or options of a random member (--m, --eigenvalues, ...), not both")
     if system is None and options["parameters"]:
-        raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
+        raise click.UsageError("found -p without SYSTEM, expected a SYSTEM: a random member has no parameters")
     with Progress(options["quiet"]) as progress:
         settings = lib.Settings(
             eps=opt.the_eps(options["eps"], options["time_step"], required=False),
@@ -140,9 +140,9 @@ def command(system: str | None, **options: Any) -> int:
             report = lib.verify(file, settings, what)
     as_json, verbose = options["as_json"], options["verbose"]
     if report.context.get("beyond") and not as_json:
-        echo(lib.table(report))
+        print_raw(lib.table(report))
     elif options["as_markdown"]:
-        echo(markdown(report))
+        print_raw(markdown(report))
     elif as_json or not on_terminal():
         return print_report(report, as_json, verbose, options["quiet"])
     else:
@@ -172,31 +172,31 @@ def markdown(report: lib.Report) -> str:
 
 
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
-    tell(headline(report), style="bold")
+    print_stdout(headline(report), style="bold")
     by_section = sections_of(report.findings)
     others = by_section.pop("", [])
     for name, findings in by_section.items():
         console().print(_table(name, findings, verbose, bool(report.context.get("controls"))))
     for finding in others:
-        tell(f"{finding.claim}: {finding.evidence.summary}")
+        print_stdout(f"{finding.claim}: {finding.evidence.summary}")
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
-            tell(_LEGEND[method])
+            print_stdout(_LEGEND[method])
     # On the evidence beside the one that decided.
     also = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
     bounds = [int(str(one.data["error_bound"])[3:]) for one in also if "error_bound" in one.data]
     if bounds:
         held = f"also: {len(bounds)} claims held at random points over GF(p)"
-        tell(f"{held}, each false with probability below 2^-{min(bounds)}")
+        print_stdout(f"{held}, each false with probability below 2^-{min(bounds)}")
     methods = Counter(e.method for f in report.findings for e in f.also if "error_bound" not in e.data)
     for method, count in methods.items():
-        tell(f"also: {count} claims: {method} (-v)")
+        print_stdout(f"also: {count} claims: {method} (-v)")
     for finding in report.findings:
         if str(finding.verdict) == "refuted" and not finding.control:
-            tell(f"refuted: {shorten(finding.claim, 200)}")
+            print_stdout(f"refuted: {shorten(finding.claim, 200)}")
     for note in report.notes:
-        tell(f"note: {note}")
-    tell(f"verdict\t{report.verdict}\t({_count(report)})", 9)
+        print_stdout(f"note: {note}")
+    print_stdout(f"verdict\t{report.verdict}\t({_count(report)})", 9)
 
 
 def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool) -> Table:

@@ -110,6 +110,3 @@ def primes_of(text: str | None) -> list[int] | None:
     if not all(piece.isascii() and piece.isdigit() and len(piece) < 10 for piece in pieces):
         raise click.UsageError(f"found --primes {text[:60]!r}, expected primes separated by commas")
     return [int(piece) for piece in pieces]
-
-
-scanned = run_scan

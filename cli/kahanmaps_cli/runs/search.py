@@ -120,6 +120,3 @@ def print_list(
         for sentence in found.undecided:
             print_stderr(f"undecided: {sentence}")
     return 0 if found.complete and not search.is_over else 3
-
-
-asked = search_arguments

@@ -165,6 +165,3 @@ def color_option() -> click.Option:
         is_eager=True,
         help="Color the output: auto (default; on a terminal), always or never.",
     )
-
-
-tell, echo, tell_entry = print_stdout, print_raw, print_entry
