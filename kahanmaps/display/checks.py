@@ -117,11 +117,11 @@ def report_html(report: Report) -> str:
         pieces.append(markup.table(["section", "claims"], rows))
         chosen = [f for f in chosen if str(f.verdict) != "proved" and not f.control and f.applies]
     if chosen:
-        rows = [
+        cells = [
             (verdict_html(f), _text(f.claim), because(f.evidence) if f.witness is None else _witness(f.witness))
             for f in chosen[:_MAX_CLAIMS]
         ]
-        pieces.append(markup.table(["verdict", "claim", "because"], rows))
+        pieces.append(markup.table(["verdict", "claim", "because"], cells))
     if len(chosen) > _MAX_CLAIMS:
         pieces.append(f"<p>… and {len(chosen) - _MAX_CLAIMS} more claims</p>")
     notes = [*filter(None, [ending_sentence(report)]), *report.notes[:5]]

@@ -140,7 +140,7 @@ def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_
             size = style.font_size / (4 if beside_name or kind.name == _MANY else 2)
             axes.plot(*columns, mark, color=color, markersize=size, zorder=10 - k)
             if kind.name in names:
-                shown = {
+                shown: dict[str, Any] = {
                     "marker": mark if kind.points else "",
                     "linestyle": LINES[k % len(LINES)] if kind.curves else "",
                 }

@@ -169,7 +169,8 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
 
 
 _ASPECT = 0.75
-_EULER, _LEVEL = "#BBBBBB", {"colors": "#999999", "linewidths": 0.5}
+_EULER = "#BBBBBB"
+_LEVEL: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
 _MAX_JOINED = 1_000_000  # points: ten seconds, half a gigabyte
 _MAX_INITIAL = 40  # orbits, up to which the initial points are marked: more marks would cover the picture
 _MAX_MARKED = 60  # points of an orbit, up to which all of them have the mark of their orbit
@@ -248,8 +249,8 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
                     axes.plot(*orbit.T, color=_EULER, zorder=1.5, **dashes)
                 else:
                     draw_points(axes, *orbit.T, color=_EULER, zorder=1.5, total=count)
-            look = dashes if lines else {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
-            handles["explicit Euler"] = Line2D([], [], color=_EULER, **look)
+            dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
+            handles["explicit Euler"] = Line2D([], [], color=_EULER, **(dashes if lines else dot))
         # Axes in space do not cut off what lies outside of them.
         shown = _inside(found.points, found.window) if in_space else found.points
         if found.values is None and shown.shape[1] <= len(COLORS):
