@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, and on the disk before anything relies on them."""
+"""Atomic and durable writing of files."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from typing import IO, Any
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
-    """A stream to a file beside `path`, which takes its place at the end of the block; if that raises, it goes.
+    """Open a temporary file that replaces `path` at the end of the block, or is removed if the block raises.
 
-    What stood there stays until then: whoever looks, at any moment and after any end, finds the old file or the new
-    one. A pipe or a device cannot be replaced: it gets everything at the end. Raises OSError that names `path`.
+    At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced: it gets
+    everything at the end. Raises OSError that names `path`.
     """
     with named(path):
         if os.path.exists(path) and not os.path.isfile(path):
-            with TemporaryFile() as held:
-                yield held
-                held.seek(0)
+            with TemporaryFile() as buffer:
+                yield buffer
+                buffer.seek(0)
                 with open(path, "wb") as stream:
-                    shutil.copyfileobj(held, stream)
+                    shutil.copyfileobj(buffer, stream)
             return
         target = resolved(path)
-        os.umask(umask := os.umask(0o022))  # there is no other way to ask for it
+        os.umask(umask := os.umask(0o022))  # the umask cannot be read without setting it
         mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~umask
         try:
             prefix = f".{target.name}"[:100] + "."
-            beside = NamedTemporaryFile(dir=target.parent, prefix=prefix, delete=False)  # noqa: SIM115
-        except OSError as error:  # about the file that was asked for, not about the one beside it
+            temporary = NamedTemporaryFile(dir=target.parent, prefix=prefix, delete=False)  # noqa: SIM115
+        except OSError as error:  # name the requested file, not the temporary one
             raise type(error)(error.errno, error.strerror, os.fspath(path)) from None
-        with beside as part:
+        with temporary as part:
             try:
                 yield part
                 os.chmod(part.name, mode)
@@ -46,7 +46,7 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
                 with suppress(OSError):
                     os.unlink(part.name)
                 raise
-        # The new name is on the disk, too; some file systems know no such thing, and have it anyway.
+        # Write the new directory entry to the disk too; some file systems do not support this.
         with suppress(OSError):
             descriptor = os.open(target.parent, os.O_RDONLY)
             try:
@@ -57,7 +57,7 @@ def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
 
 @contextmanager
 def open_append(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
-    """A stream of text to a file that whoever looks sees grow; it is on the disk at the end of the block.
+    """Open a text file that grows in place; it is on the disk at the end of the block.
 
     Raises OSError that names `path`.
     """
@@ -68,7 +68,7 @@ def open_append(path: str | os.PathLike[str]) -> Iterator[IO[str]]:
 
 @contextmanager
 def named(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Let an OSError in the block name the file that it is about: a full disk comes without a name."""
+    """Add the name of the file to an OSError in the block; that of a full disk has none."""
     try:
         yield
     except OSError as error:
@@ -77,24 +77,24 @@ def named(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file as `atomic_write` does. Raises OSError where it cannot be written."""
+    """Write a file atomically. Raises OSError where it cannot be written."""
     with atomic_write(path) as stream:
         stream.write(content)
 
 
 def sync(stream: IO[Any]) -> None:
-    """Have on the disk what was written, where it goes to one: not only with the operating system."""
+    """Flush a stream to the disk, where it is a regular file."""
     stream.flush()
     if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
         os.fsync(stream.fileno())
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
-    """The path without symbolic links; OSError where they lead round in a circle, or no file can have this name."""
+    """Resolve symbolic links; raise OSError where they form a cycle or no file can have this name."""
     try:
-        found = os.path.realpath(path)
+        target = os.path.realpath(path)
     except ValueError:  # a zero byte in it
         raise OSError(errno.EINVAL, os.strerror(errno.EINVAL), os.fspath(path)) from None
-    if os.path.islink(found):
+    if os.path.islink(target):
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))
-    return Path(found)
+    return Path(target)

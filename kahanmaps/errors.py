@@ -1,9 +1,9 @@
-"""The errors of kahanmaps: usage errors, told in a sentence.
+"""The exceptions of kahanmaps, and helpers for messages.
 
-An exception here means that somebody asked for something that cannot be done. What may well happen in the
-course of an orbit or a check (a singular point, a height budget) is not an exception but a status.
+An exception means that a request cannot be fulfilled. Events in the course of an orbit or a check, such as a singular
+point or an exhausted digit budget, are statuses, not exceptions.
 
-Each error is also a built-in kind, so that `except ValueError` in a user's script does what it says.
+Each exception is also a built-in one, so that `except ValueError` in a script works.
 """
 
 from __future__ import annotations
@@ -16,39 +16,39 @@ from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
 _MISTAKES_SHOWN = 50
-# The disk is full or broken, or the machine has no more of something.
-_OF_THE_MACHINE = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})
-# What the dynamic linker and the libraries say that are loaded where memory is short.
-_NO_ROOM = re.compile(r"failed to map segment|[Cc]annot allocate memory|[Nn]ot enough memory|Unable to allocate")
-_LONGEST_WORD, _LONGEST_LINE, _MOST_LINES = 300, 1000, 200  # of a message
+# The disk is full or broken, or another resource of the machine is exhausted.
+_MACHINE_ERRORS = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})
+# Messages of the dynamic linker and of libraries that are loaded with too little memory.
+_NO_MEMORY = re.compile(r"failed to map segment|[Cc]annot allocate memory|[Nn]ot enough memory|Unable to allocate")
+_MAX_WORD, _MAX_LINE, _MAX_LINES = 300, 1000, 200  # characters of a word and a line, lines of a message
 
 
 class KahanmapsError(Exception):
-    """The root of all errors that kahanmaps raises on purpose. Its message is `bounded`."""
+    """Base class of the exceptions of kahanmaps. The message is `bounded`."""
 
     def __str__(self) -> str:
         return bounded(super().__str__())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # An exception is restored by a call with its message, which is less than some of them take.
+        # By default an exception is unpickled by a call with its message only; some of these take more arguments.
         return _restore_error, (type(self), self.args), self.__dict__
 
 
 def _restore_error(kind: type[KahanmapsError], args: tuple[Any, ...]) -> KahanmapsError:
-    """The error that was pickled, without its attributes."""
+    """Restore a pickled exception, without its attributes."""
     return kind.__new__(kind, *args)
 
 
 class InputError(KahanmapsError, ValueError):
-    """A value that cannot be used: the message says what was found, what was expected, what to do."""
+    """An invalid value: the message says what was found, what was expected and what to do."""
 
 
 class InexactNumber(InputError, TypeError):
-    """A machine float met an exact function."""
+    """A floating-point number was passed to an exact function."""
 
 
 class ExpressionError(InputError):
-    """A piece of text that is not the number, polynomial or rational function it should be.
+    """Text that cannot be parsed as the expected number, polynomial or rational function.
 
     Attributes: `text` (as given), `column` (0-based position of the mistake, or None).
     """
@@ -61,11 +61,11 @@ class ExpressionError(InputError):
 
 
 class UnknownName(ExpressionError):
-    """An expression has a letter or word that stands for nothing."""
+    """An expression contains an unknown name."""
 
 
 class SystemFileError(InputError):
-    """A system file with mistakes: all of them at once, each with its key.
+    """A system file with mistakes, all reported together with their keys.
 
     Attributes: `where` (the file), `mistakes` (pairs of key path and sentence).
     """
@@ -82,7 +82,7 @@ class SystemFileError(InputError):
 
 
 class HypothesisError(InputError):
-    """The objects given do not belong to the commuting family (A not skew-Hamiltonian, H not in its space)."""
+    """The given objects do not belong to the commuting family (A not skew-Hamiltonian, or H not in its space)."""
 
 
 class BadPrime(InputError):
@@ -94,7 +94,7 @@ class BadPrime(InputError):
 
 
 class SingularStep(KahanmapsError, ZeroDivisionError):
-    """det(I - eps f'(x)) = 0: the Kahan map has no value here. Attributes: `point`, `eps`."""
+    """The Kahan map is undefined at a point: det(I - eps f'(x)) = 0. Attributes: `point`, `eps`."""
 
     def __init__(self, message: str, point: Any = None, eps: Any = None) -> None:
         self.point = point
@@ -107,22 +107,22 @@ class SingularMatrix(KahanmapsError, ZeroDivisionError):
 
 
 class PrecisionLost(KahanmapsError, ArithmeticError):
-    """Balls have grown too wide to decide whether a number is zero: more bits are needed."""
+    """Balls are too wide to decide whether a number is zero: a higher precision is needed."""
 
 
 def _caret(text: str, column: int, width: int = 72) -> str:
-    """The piece of `text` around `column`, and a caret below the character."""
+    """Return the part of `text` around `column`, with a caret under the character."""
     start = max(0, column - width // 2)
     end = min(len(text), start + width)
     before = "..." if start > 0 else ""
     after = "..." if end < len(text) else ""
-    # One printable cell a character, or the caret would point elsewhere; this also disarms escape sequences.
+    # One cell per character, so that the caret is aligned; this also removes escape sequences.
     piece = "".join(c if c.isprintable() else " " for c in text[start:end])
     return f"  {before}{piece}{after}\n  {' ' * (len(before) + column - start)}^"
 
 
 def show(value: Any, width: int = 60) -> str:
-    """A value as it might stand in a file, shortened, with nothing in it that a terminal would obey.
+    """Format a value as in a file, shortened and with control characters escaped.
 
     >>> show(True), show("two"), show({"a": 1})
     ('true', "'two'", "{'a': 1}")
@@ -130,14 +130,14 @@ def show(value: Any, width: int = 60) -> str:
     if isinstance(value, date | time):  # of which datetime is one
         return value.isoformat()
     try:
-        found = str(value).lower() if isinstance(value, bool) else repr(value)
+        text = str(value).lower() if isinstance(value, bool) else repr(value)
     except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
         return "a value too large to show"
-    return found if len(found) <= width else f"{found[: width - 20]}...{found[-15:]}"
+    return text if len(text) <= width else f"{text[: width - 20]}...{text[-15:]}"
 
 
 def quoted(text: str, width: int = 40) -> str:
-    """`text` in quotes, safe to print, cut where it is long.
+    """Return `text` in quotes, safe to print and shortened to `width`.
 
     >>> quoted("12345", 5), quoted("1" * 50, 5)
     ("'12345'", "'11111...'")
@@ -146,7 +146,7 @@ def quoted(text: str, width: int = 40) -> str:
 
 
 def printable(text: str) -> str:
-    """The text with nothing in it that a terminal would obey, but for ends of lines and tabs.
+    """Escape the control characters of a text except line ends and tabs.
 
     >>> len(printable(chr(27) + "[31m")) - len("[31m")
     4
@@ -155,37 +155,37 @@ def printable(text: str) -> str:
 
 
 def bounded(message: str) -> str:
-    """A message without the middle of words and lines that nobody would read to their end; their length is told.
+    """Shorten very long words and lines of a message, and give their lengths.
 
-    What somebody wrote is shortened where a message is made; this holds for what was forgotten.
+    User input is shortened where messages are made; this is the last resort.
 
     >>> len(bounded("there is no file " + "x" * 200_000))
     317
     """
     lines = message.split("\n")
     shown = [
-        _cut(re.sub(rf"\S{{{_LONGEST_WORD + 1},}}", lambda word: _cut(word[0], _LONGEST_WORD), line), _LONGEST_LINE)
-        for line in lines[:_MOST_LINES]
+        _cut(re.sub(rf"\S{{{_MAX_WORD + 1},}}", lambda word: _cut(word[0], _MAX_WORD), line), _MAX_LINE)
+        for line in lines[:_MAX_LINES]
     ]
-    if len(lines) > _MOST_LINES:
-        shown.append(f"... and {len(lines) - _MOST_LINES} more lines")
+    if len(lines) > _MAX_LINES:
+        shown.append(f"... and {len(lines) - _MAX_LINES} more lines")
     return "\n".join(shown)
 
 
-def _cut(text: str, most: int) -> str:
-    """At most `most` characters of a text, mostly from its beginning, and how many it has."""
-    if len(text) <= most:
+def _cut(text: str, max_length: int) -> str:
+    """Shorten a text to `max_length` characters, mostly from its beginning, with its length."""
+    if len(text) <= max_length:
         return text
     length = f" ({len(text)} characters)"
-    tail = (most - len(length)) // 4
-    return f"{text[: most - len(length) - tail - 3]}...{text[-tail:]}{length}"
+    tail = (max_length - len(length)) // 4
+    return f"{text[: max_length - len(length) - tail - 3]}...{text[-tail:]}{length}"
 
 
 @contextmanager
 def reading(name: object) -> Iterator[None]:
-    """Inside, data from outside are read: an error that nobody expected is told together with where they come from.
+    """Add the name of the source that is being read to an unexpected exception.
 
-    The file may be damaged in a way that no check has foreseen, so the error alone would blame the wrong one.
+    The source may be damaged in an unforeseen way, and the exception alone would suggest a bug.
     """
     try:
         yield
@@ -195,32 +195,32 @@ def reading(name: object) -> Iterator[None]:
 
 
 def note_source(error: BaseException, name: object) -> None:
-    """Note in an error that nobody expected where the data came from."""
+    """Add the source of the data to an unexpected exception."""
     if isinstance(error, Exception) and not isinstance(error, (KahanmapsError, OSError, MemoryError)):
         error.add_note(str(name))
 
 
 def is_out_of_memory(error: BaseException) -> bool:
-    """Whether an error means that there was not enough memory: also where a library could not be loaded for that."""
+    """Whether an exception means that memory is exhausted, including a library that could not be loaded for this."""
     if isinstance(error, MemoryError):
         return True
     if isinstance(error, OSError) and error.errno == ENOMEM:
         return True
-    return isinstance(error, (ImportError, OSError)) and _NO_ROOM.search(str(error)) is not None
+    return isinstance(error, (ImportError, OSError)) and _NO_MEMORY.search(str(error)) is not None
 
 
 def is_of_the_machine(error: OSError) -> bool:
-    """Whether nobody made a mistake: the same may well be possible later, or elsewhere."""
-    return error.errno in _OF_THE_MACHINE
+    """Whether the error is due to the state of the machine, and the same request may succeed later or elsewhere."""
+    return error.errno in _MACHINE_ERRORS
 
 
 def counted(number: int, word: str) -> str:
-    """1 step, 2 steps."""
+    """Return the number with the noun in singular or plural: 1 step, 2 steps."""
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
 def suggestion(value: Any, known: Sequence[str]) -> str:
-    """A hint at what was probably meant, or nothing.
+    """Return a hint at similar known names, or an empty text.
 
     >>> suggestion("alhpa", ["alpha", "beta"])
     '; did you mean alpha?'

@@ -1,4 +1,4 @@
-"""A hard stop by the clock: what is being done then is given up, and nothing else is ever decided by a clock."""
+"""A time limit by the wall clock, which abandons the running computation. No result depends on a clock otherwise."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from typing import Any
 
 from kahanmaps.errors import InputError
 
-_AGAIN = 1.0  # seconds
+_REPEAT_SECONDS = 1.0
 
 
 class TimeLimit(KeyboardInterrupt):
-    """The time of a `time_limit` is over. Like Ctrl-C, it ends what is being done wherever that is."""
+    """A `time_limit` has expired. Like Ctrl-C, it interrupts the computation at any place."""
 
 
 @contextmanager
 def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
-    """Raise TimeLimit in what is done within the block, once so many seconds are over; never for None.
+    """Raise TimeLimit within the block after so many seconds; None means no limit.
 
-    What had been completed before stays as it is; what was in flight is lost. The block is given a function that says
-    whether the time is over. Only in the main thread of a process, and not on Windows. Raises InputError elsewhere, and
-    for a time that is not positive.
+    Completed work is kept, and the running computation is lost. The block gets a function that tells whether the limit
+    has expired. Works in the main thread only, and not on Windows. Raises InputError elsewhere, and unless the time is
+    positive.
 
     >>> with time_limit(60) as is_over:
     ...     print(is_over())
@@ -45,19 +45,19 @@ def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
 
     stop.ends_a_time_limit = True  # type: ignore[attr-defined]
     outer, interval = signal.getitimer(signal.ITIMER_REAL)
-    before = signal.getsignal(signal.SIGALRM)
-    is_nested = outer > 0 and getattr(before, "ends_a_time_limit", False)
-    if is_nested and outer <= seconds:  # the limit around this one is over first
+    previous = signal.getsignal(signal.SIGALRM)
+    is_nested = outer > 0 and getattr(previous, "ends_a_time_limit", False)
+    if is_nested and outer <= seconds:  # the enclosing limit expires first
         yield lambda: False
         return
     signal.signal(signal.SIGALRM, stop)
     try:
-        # Again and again: what is raised within a callback of a compiler is lost.
-        signal.setitimer(signal.ITIMER_REAL, seconds, _AGAIN)
+        # Repeated: an exception raised within a callback of a compiler is lost.
+        signal.setitimer(signal.ITIMER_REAL, seconds, _REPEAT_SECONDS)
         yield lambda: bool(over)
     finally:
-        left, _ = signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
-        if outer:  # a timer of somebody else begins anew
-            taken = seconds + _AGAIN * len(over) - left
+        remaining, _ = signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+        if outer:  # restart the timer that was set before
+            taken = seconds + _REPEAT_SECONDS * len(over) - remaining
             signal.setitimer(signal.ITIMER_REAL, max(outer - taken * is_nested, 1e-6), interval)

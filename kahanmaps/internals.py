@@ -1,6 +1,6 @@
-"""The names of the library that the command line uses: each is imported when it is used, so that --help stays light.
+"""The names of the library that the command line uses, imported on first use so that --help is fast.
 
-Which names there are, and where they come from, is said in internals.pyi, which type checkers read as well.
+They are listed with their modules in internals.pyi, which type checkers read as well.
 """
 
 from lazy_loader import attach_stub

@@ -179,10 +179,10 @@ from .plots.drifts.drift import clipped_from as clipped_from
 from .plots.drifts.drift import plot_drift as plot_drift
 from .plots.drifts.drift import small_start as small_start
 from .plots.drifts.drift import survey_drift as survey_drift
-from .plots.drifts.drift_functions import asked_axis as asked_axis
-from .plots.drifts.drift_functions import asked_function as asked_function
-from .plots.drifts.drift_functions import asked_functions as asked_functions
 from .plots.drifts.drift_functions import known_functions as known_functions
+from .plots.drifts.drift_functions import requested_axis as requested_axis
+from .plots.drifts.drift_functions import requested_function as requested_function
+from .plots.drifts.drift_functions import requested_functions as requested_functions
 from .plots.figures import format_of as format_of
 from .plots.figures import picture_bytes as picture_bytes
 from .plots.figures import require_matplotlib as require_matplotlib

@@ -1,4 +1,4 @@
-"""The sources that docstrings, catalogue files and evidence cite, by key.
+"""The references cited in docstrings, catalogue files and evidence, by key.
 
 Definitions, propositions, lemmas and theorems of petrera-suris-2016 share one numbering: commutativity is Theorem
 9, the integrals Theorem 11, the Poisson structure Theorem 12. Displayed equations are cited by their label in the
@@ -200,7 +200,7 @@ SOURCES: dict[str, str] = {
 
 
 def source(key: str) -> str:
-    """The full reference that a key stands for.
+    """Return the full reference for a key.
 
     >>> source("kahan-1993")
     'W. Kahan. Unconventional numerical methods for trajectory calculations. Lecture notes, 1993'

@@ -1,7 +1,6 @@
-"""The program `kahanmaps`: Ctrl-C and SIGTERM end it with 130 and a word, from the first moment on to the last.
+"""The program `kahanmaps`: Ctrl-C and SIGTERM end it with status 130 and a message, at any time.
 
-Python itself prints a traceback where it is interrupted before it comes here. What is imported above `main` is there by
-then, or costs nothing: the handler is in place before anything is loaded.
+The handlers are installed before anything large is imported: an interrupt during imports would print a traceback.
 """
 
 import _signal  # type: ignore[import-not-found]  # the module `signal` loads enumerations first
@@ -15,34 +14,33 @@ def _end(signum: int, frame: object) -> None:
     try:
         os.write(2, b"interrupted\n")
     finally:
-        os._exit(_INTERRUPTED)  # nothing has begun that would have to be ended, or everything has been
+        os._exit(_INTERRUPTED)  # at this time nothing needs to be cleaned up
 
 
-# Bytes of addresses that each takes while it is loaded and works, measured, and half as much again.
-_ROOM = {"numpy": 300 << 20, "matplotlib": 200 << 20, "numba": 300 << 20, "llvmlite": 300 << 20}
+# Address space in bytes that each library needs to be loaded and to work: measured, times 1.5.
+_MIN_MEMORY = {"numpy": 300 << 20, "matplotlib": 200 << 20, "numba": 300 << 20, "llvmlite": 300 << 20}
 
 
-class _Room:
-    """A finder of modules that finds none, and raises MemoryError for libraries that would not have room to work in.
+class _MemoryCheck:
+    """A module finder that finds nothing, and raises MemoryError before a library is loaded without enough memory.
 
-    Without it OpenBLAS, below numpy, ends the process by itself, with the status 1 that says `refuted`. Nothing can be
-    done about it then, so room is looked for before, at the first part of a library.
+    Without it OpenBLAS, used by numpy, ends the process with status 1, which means `refuted` here.
     """
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        if name in _ROOM:
+        if name in _MIN_MEMORY:
             import mmap
 
             try:
-                mmap.mmap(-1, _ROOM[name]).close()
+                mmap.mmap(-1, _MIN_MEMORY[name]).close()
             except OSError as error:
-                raise MemoryError(f"{name} would have no room") from error
+                raise MemoryError(f"not enough memory to load {name}") from error
 
 
 def main() -> int:
     """Run the command line and return its exit status."""
     usual = {_signal.SIGINT: _signal.default_int_handler, _signal.SIGTERM: _signal.SIG_DFL}
-    ours = [number for number, action in usual.items() if _signal.getsignal(number) == action]  # none that is ignored
+    ours = [number for number, action in usual.items() if _signal.getsignal(number) == action]  # not ignored
     for number in ours:
         _signal.signal(number, _end)
     import atexit
@@ -53,17 +51,17 @@ def main() -> int:
 
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:  # ulimit -v
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        sys.meta_path.insert(0, _Room())
-    for number in ours:  # Python takes handlers away at its end, and the status is known by then
+        sys.meta_path.insert(0, _MemoryCheck())
+    for number in ours:  # at exit Python removes handlers, and the status is already known
         atexit.register(_signal.signal, number, _signal.SIG_IGN)
     try:
         for number in ours:
             handle(number, _signal.default_int_handler)
         status = run()
         if status == _INTERRUPTED:
-            os._exit(status)  # all has been ended and flushed; to take large libraries apart takes a second
+            os._exit(status)  # everything is flushed; unloading large libraries would take a second
         return status
-    except KeyboardInterrupt:  # just before `run` looks for it, or just after
+    except KeyboardInterrupt:  # outside the `try` of `run`
         _end(_signal.SIGINT, None)
         raise
     finally:

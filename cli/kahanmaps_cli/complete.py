@@ -1,7 +1,6 @@
-"""What a shell is offered while a command is being written: systems and files.
+"""Shell completion of systems and files.
 
-It has to be there at once, so nothing is loaded that computes, and it says nothing when something is wrong: a
-traceback in the middle of a command line helps nobody.
+It must be fast, so it imports nothing that computes; errors are silent, since a traceback would spoil the command line.
 """
 
 from __future__ import annotations
@@ -14,26 +13,26 @@ if TYPE_CHECKING:
 
 
 def complete_system(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Names of the catalogue, and system files."""
+    """Return matching names of the catalogue and system files."""
     from kahanmaps.documents.catalog import names
 
     return [*(name for name in names() if name.startswith(incomplete)), *complete_toml(context, parameter, incomplete)]
 
 
 def complete_toml(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """The TOML files that begin so, and the folders, which end with a slash."""
+    """Return matching TOML files, and folders with a final slash."""
     folder, slash, start = incomplete.rpartition("/")
     prefix = folder + slash
-    found = []
+    matches = []
     try:
         with os.scandir(os.path.expanduser(prefix) or ".") as entries:
             for entry in entries:
                 if not entry.name.startswith(start) or (entry.name.startswith(".") and not start):
                     continue
                 if entry.is_dir():
-                    found.append(f"{prefix}{entry.name}/")
+                    matches.append(f"{prefix}{entry.name}/")
                 elif entry.name.endswith(".toml"):
-                    found.append(prefix + entry.name)
+                    matches.append(prefix + entry.name)
     except OSError:  # there is no such folder
         return []
-    return sorted(found)
+    return sorted(matches)

@@ -1,4 +1,4 @@
-"""What a misspelt name may have meant: groups that suggest commands, and errors of click in the words of the others."""
+"""Groups that suggest commands for misspelt names, and click's errors in the wording of the other messages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kahanmaps.errors import quoted
 
 
 class SuggestingGroup(click.Group):
-    """A group that suggests commands where a name is none, and says what to use instead of a removed one."""
+    """A group that suggests similar commands for an unknown name, and the replacement of a removed command."""
 
     removed: ClassVar[dict[str, str]] = {}  # name of a command -> what to use instead
 
@@ -26,21 +26,21 @@ class SuggestingGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def hint(self, written: str, known: list[str]) -> str:
-        """A sentence about what may have been meant, after a blank; empty where nothing is like it."""
+        """Return ' Did you mean ...?', or an empty text where no command is similar."""
         begin = [name for name in known if len(written) > 2 and name.startswith(f"{written}-")]
         close = begin or close_to(written, known, 0.5)
         return f" Did you mean {' or '.join(close)}?" if close else ""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list of commands with their first sentences, which click would cut."""
-        found = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        rows = [(name, below.get_short_help_str(limit=1000)) for name, below in found if below and not below.hidden]
+        """Write the list of commands with their first sentences in full; click would cut them."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        rows = [(name, one.get_short_help_str(limit=1000)) for name, one in commands if one and not one.hidden]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
 
 
 def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
-    """Up to three of the known words that are like the one that was written, and nearly as much as the best of them."""
+    """Return up to three known words similar to the one written, nearly as similar as the best of them."""
     from difflib import SequenceMatcher, get_close_matches
 
     close = get_close_matches(written, known, n=3, cutoff=cutoff)
@@ -48,7 +48,7 @@ def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
     return [word for word, ratio in zip(close, ratios, strict=True) if ratio > ratios[0] - 0.15]
 
 
-# (command, option) -> what to use instead of an option that is there no longer
+# (command, option) -> what to use instead of a removed option
 REMOVED_OPTIONS = {
     **{
         ("report", name): "'kahanmaps batch show' shows the results of a batch, 'batch export' writes them for pandas"
@@ -65,8 +65,8 @@ REMOVED_OPTIONS = {
 }
 
 
-def in_our_words(error: click.ClickException) -> click.ClickException:
-    """The error with what was found and what was expected, and where a choice is misspelt with one that is like it."""
+def rephrased(error: click.ClickException) -> click.ClickException:
+    """Return an error of click in the form "found X, expected Y", with a suggestion for a misspelt choice."""
     if isinstance(error, click.NoSuchOption) and error.ctx is not None:
         command = error.ctx.command_path.removeprefix("kahanmaps ")
         instead = REMOVED_OPTIONS.get((command, error.option_name))
@@ -76,16 +76,16 @@ def in_our_words(error: click.ClickException) -> click.ClickException:
     if not isinstance(error, click.BadParameter) or error.param is None:
         return error
     if isinstance(error, click.MissingParameter):
-        is_told = isinstance(error.param.type, click.Choice) or not isinstance(error.param, click.Option)
+        is_described = isinstance(error.param.type, click.Choice) or not isinstance(error.param, click.Option)
         text = f"{error.format_message().removesuffix('.')}: {getattr(error.param, 'help', '')}"
-        return error if is_told else click.UsageError(text, error.ctx)
+        return error if is_described else click.UsageError(text, error.ctx)
     message = error.message
-    if found := re.fullmatch(r"'(.*)' is not a valid (integer|float)(?: range)?\.", message, re.DOTALL):
-        message = f"found {quoted(found[1])}, expected {'an integer' if found[2] == 'integer' else 'a number'}"
-    elif found := re.fullmatch(r"(\S+) is not in the range (.*)\.", message):
-        message = f"found {found[1][:40]}, expected {found[2].replace('<=x<=', ' to ').replace('x>=', 'at least ')}"
-    elif isinstance(error.param.type, click.Choice) and (found := re.match(r"'([^']*)' is not one of ", message)):
-        close = close_to(found[1].lower(), [str(choice) for choice in error.param.type.choices])
+    if match := re.fullmatch(r"'(.*)' is not a valid (integer|float)(?: range)?\.", message, re.DOTALL):
+        message = f"found {quoted(match[1])}, expected {'an integer' if match[2] == 'integer' else 'a number'}"
+    elif match := re.fullmatch(r"(\S+) is not in the range (.*)\.", message):
+        message = f"found {match[1][:40]}, expected {match[2].replace('<=x<=', ' to ').replace('x>=', 'at least ')}"
+    elif isinstance(error.param.type, click.Choice) and (match := re.match(r"'([^']*)' is not one of ", message)):
+        close = close_to(match[1].lower(), [str(choice) for choice in error.param.type.choices])
         message += f" Did you mean {' or '.join(close)}?" if close else ""
     if message == error.message:
         return error

@@ -1,4 +1,4 @@
-"""Options that several commands share: where the system comes from, eps, how to check, how to print."""
+"""Options that several commands share: the system, eps, effort, evidence and output."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.groups import close_to
 from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
-from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.progress import print_stderr
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -29,7 +29,7 @@ def stack(*decorators: Callable[[F], F]) -> Callable[[F], F]:
 
 
 class Renamed(click.Option):
-    """An option whose help shows its first name only: the others are old ones, which scripts may use."""
+    """An option with older names, which are accepted but not shown in the help."""
 
     old_names = True
 
@@ -47,21 +47,21 @@ class Renamed(click.Option):
 system_argument: Callable[[F], F] = click.argument("system", required=False, shell_complete=complete_system)
 
 
-def _one_pair_each(ctx: click.Context, param: click.Parameter, pairs: Sequence[tuple[str, str]]) -> Any:
-    """The pairs NAME=VALUE of all -p, of which one may hold several: -p a=1,b=2."""
-    found = []
+def _split_pairs(ctx: click.Context, param: click.Parameter, pairs: Sequence[tuple[str, str]]) -> Any:
+    """Split the values of all -p into pairs NAME=VALUE: one -p may set several parameters, as in -p a=1,b=2."""
+    split = []
     for name, value in pairs:
         head, *more = value.split(",")
         for piece in more:
             if "=" in piece:
-                found.append((name, head.strip()))
+                split.append((name, head.strip()))
                 name, head = (side.strip() for side in piece.split("=", 1))
             else:
                 head += f",{piece}"
-        found.append((name, head.strip()))
-    if not all(value and name.isprintable() for name, value in found):
+        split.append((name, head.strip()))
+    if not all(value and name.isprintable() for name, value in split):
         raise click.BadParameter("found a name without a value, expected NAME=VALUE", ctx, param)
-    return tuple(found)
+    return tuple(split)
 
 
 parameter_option: Callable[[F], F] = click.option(
@@ -71,25 +71,38 @@ parameter_option: Callable[[F], F] = click.option(
     type=NameValue(),
     multiple=True,
     metavar="NAME=VALUE",
-    callback=_one_pair_each,
-    help="Set parameters of the system: a=2/3 or a=1,b=2; a='root of t^2 - 2', a='sqrt(2)' for orbit, degrees and "
-    "checks.",
+    callback=_split_pairs,
+    help="Set parameters of the system, e.g. a=2/3 or a=1,b=2; orbit, degrees and the checks also accept algebraic "
+    "numbers: a='root of t^2 - 2', a='sqrt(2)'. Repeatable.",
 )
 
 inline_options: Callable[[F], F] = stack(
-    click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
+    click.option("--vars", "variables", metavar="X,Y,...", help="Variables of an inline system or map."),
     click.option(
-        "--rhs", multiple=True, metavar="EXPR", help="Inline system: a right-hand side, or \"x' = x*y; y' = -x\"."
+        "--rhs",
+        multiple=True,
+        metavar="EXPR",
+        help="Right-hand side of an inline system, repeated for each variable; or \"x' = x*y; y' = -x\".",
     ),
-    click.option("--image", multiple=True, metavar="EXPR", help="Inline map: a function for each variable."),
-    click.option("--inverse", multiple=True, metavar="EXPR", help="Inline map: a function of the inverse map."),
+    click.option(
+        "--image",
+        multiple=True,
+        metavar="EXPR",
+        help="Component of an inline map, repeated for each variable.",
+    ),
+    click.option(
+        "--inverse",
+        multiple=True,
+        metavar="EXPR",
+        help="Component of the inverse map, repeated.",
+    ),
     parameter_option,
 )
 
 system_options: Callable[[F], F] = stack(system_argument, inline_options)
 
-_EPS_HELP = "The paper's epsilon, exact; the time step is 2 eps."
-_TIME_STEP_HELP = "The time step h = 2 eps, instead of --eps."
+_EPS_HELP = "Half the time step (exact number): h = 2 eps."
+_TIME_STEP_HELP = "Time step h = 2 eps (exact number), instead of --eps."
 
 eps_options: Callable[[F], F] = stack(
     click.option("--eps", type=ExactNumber(), metavar="E", help=_EPS_HELP),
@@ -102,15 +115,15 @@ several_eps_options: Callable[[F], F] = stack(
 )
 
 json_option: Callable[[F], F] = click.option(
-    "--json", "as_json", is_flag=True, help="One JSON object on standard output."
+    "--json", "as_json", is_flag=True, help="Print one JSON object on standard output."
 )
 quiet_option: Callable[[F], F] = click.option(
-    "-q", "--quiet", is_flag=True, help="No progress or messages on standard error."
+    "-q", "--quiet", is_flag=True, help="Print no progress and no messages on standard error."
 )
 output_options: Callable[[F], F] = stack(json_option, quiet_option)
 
 seed_option: Callable[[F], F] = click.option(
-    "--seed", type=Whole(), metavar="S", default=0, show_default=True, help="Seed of everything drawn at random."
+    "--seed", type=Whole(), metavar="S", default=0, show_default=True, help="Random seed."
 )
 
 random_starts_options: Callable[[F], F] = stack(
@@ -118,34 +131,36 @@ random_starts_options: Callable[[F], F] = stack(
         "--starts",
         type=click.Path(),
         metavar="FILE",
-        help="One point a line (text, csv) or a row (.npy); - standard input.",
+        help="File of initial points, one per line (text, CSV) or row (.npy); - is standard input.",
     ),
-    click.option("--random", "count", type=Whole(1), metavar="N", help="Instead: N starts drawn at random."),
-    click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1)."),
-    click.option("--seed", type=Whole(), metavar="S", help="... with this seed (default 0)."),
+    click.option("--random", "count", type=Whole(1), metavar="N", help="Draw N random initial points instead."),
+    click.option(
+        "--box", type=ExactNumber(), metavar="R", help="With --random: draw coordinates from -R to R (default 1)."
+    ),
+    click.option("--seed", type=Whole(), metavar="S", help="With --random: random seed (default 0)."),
 )
 
 symbolic_option: Callable[[F], F] = click.option(
-    "--symbolic", metavar="NAMES", help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one)."
+    "--symbolic", metavar="NAMES", help="Keep these parameters symbolic in the formulas, e.g. a1,a2,eps."
 )
 
 backward_option: Callable[[F], F] = click.option(
-    "--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps)."
+    "--backward", is_flag=True, help="Iterate the inverse map, Phi(., -eps)."
 )
 
 
 def integral_option(help_text: str, flag: str = "--integral", into: str = "integrals") -> Callable[[F], F]:
-    """--integral [NAME=]EXPR, repeatable; pairs of a name, which may be empty, and an expression."""
+    """Return the option --integral [NAME=]EXPR: pairs of a name, which may be empty, and an expression."""
     return click.option(
         flag, into, type=NameValue(name_is_optional=True), multiple=True, metavar="[NAME=]EXPR", help=help_text
     )
 
 
 seconds_option: Callable[[F], F] = click.option(
-    "--seconds", type=Seconds(), metavar="T", help="Stop after T seconds, whatever is being done (default: never)."
+    "--seconds", type=Seconds(), metavar="T", help="Stop after T seconds of wall-clock time (default: no limit)."
 )
 
-# How long a search may be: by work, on which its answer depends, and by the clock, which may cut the answer short.
+# The work limit determines the result of a search; the limit by the clock may cut it short.
 effort_options: Callable[[F], F] = stack(
     click.option(
         "--effort",
@@ -153,23 +168,23 @@ effort_options: Callable[[F], F] = stack(
         metavar="E",
         default=1,
         show_default=True,
-        help="How much work: each more doubles it, each less halves it.",
+        help="Work limit of the search: each increment by 1 doubles it.",
     ),
     seconds_option,
 )
 
 
 def error_bits_option(help_text: str) -> Callable[[F], F]:
-    """--error-bits BITS."""
+    """Return the option --error-bits BITS."""
     return click.option("--error-bits", type=int, metavar="BITS", default=100, show_default=True, help=help_text)
 
 
 evidence_options: Callable[[F], F] = stack(
-    seed_option, error_bits_option("Random points until the probability of error is below 2^-BITS.")
+    seed_option, error_bits_option("Test random points until the error probability is below 2^-BITS.")
 )
 
 verbose_option: Callable[[F], F] = click.option(
-    "-v", "--verbose", is_flag=True, help="On a terminal: all evidence (a pipe always gets it)."
+    "-v", "--verbose", is_flag=True, help="Print all evidence on a terminal (always printed to a pipe)."
 )
 
 check_options: Callable[[F], F] = stack(
@@ -178,23 +193,28 @@ check_options: Callable[[F], F] = stack(
         "--start",
         type=PointText(True),
         metavar="X",
-        help="Start of the exact orbit that is tried (default: a random one); may contain t with -p 't = root of ...'.",
+        help="Initial point of the exact test orbit (default: random); may contain t with -p 't = root of ...'.",
     ),
-    click.option("--steps", type=int, metavar="N", help="Steps of that orbit (default 10)."),
+    click.option("--steps", type=int, metavar="N", help="Number of steps of the test orbit (default 10)."),
     evidence_options,
-    click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget of that orbit (default by dimension)."),
+    click.option(
+        "--max-digits",
+        type=Whole(1),
+        metavar="N",
+        help="Stop the test orbit when a number exceeds N digits (default: by dimension).",
+    ),
     verbose_option,
     output_options,
 )
 
 
 def given(options: Mapping[str, Any], *names: str, **others: str) -> dict[str, Any]:
-    """The values of these options, by their names, or after these by others: `given(options, "seed", terms="max")`."""
+    """Return the values of options as keyword arguments; `given(options, "seed", terms="max")` renames max to terms."""
     return {name: options[name] for name in names} | {other: options[name] for other, name in others.items()}
 
 
 def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
-    """eps from --eps or --time-step; None where neither is given and that is allowed."""
+    """Return eps from --eps or --time-step; None if neither is given and neither is `required`."""
     if eps is not None and time_step is not None:
         raise click.UsageError("give --eps or --time-step, not both (the time step is 2 eps)")
     if time_step is not None:
@@ -205,23 +225,23 @@ def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
 
 
 def eps_of(file: lib.SystemFile, options: Mapping[str, Any]) -> Any:
-    """eps from --eps or --time-step, which have to be given where the map depends on it; None where it does not."""
+    """Return eps from --eps or --time-step, required if the map depends on eps; None if it does not."""
     eps = the_eps(options["eps"], options["time_step"], required=file.map.has_eps)
     return eps if file.map.has_eps else None
 
 
 def are_equations(reference: str | None) -> bool:
-    """Whether what stands in the place of a SYSTEM are equations, and not the name of one."""
+    """Whether the argument SYSTEM consists of equations rather than a name."""
     return reference is not None and "=" in reference and not os.path.lexists(reference)
 
 
 def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
-    """Whether a system or map stands on the line itself."""
+    """Whether the command line itself contains the system or map."""
     return are_equations(reference) or any(options.get(name) for name in ("variables", "rhs", "image", "inverse"))
 
 
 def in_order(system: str | None, other: str | None, options: Mapping[str, Any]) -> tuple[str | None, str | None]:
-    """The first system, which an inline one is, and the second, which is the argument then."""
+    """Return the first and the second system; an inline system is the first, and SYSTEM then names the second."""
     if is_inline(options) and system is not None and other is None:
         system, other = None, system
     if system == other == "-":
@@ -232,38 +252,37 @@ def in_order(system: str | None, other: str | None, options: Mapping[str, Any]) 
 def load_pair(
     reference: str | None, other: str | None, options: Mapping[str, Any]
 ) -> tuple[lib.SystemFile, lib.SystemFile | None]:
-    """Two systems, the second one perhaps none: -p sets a parameter of both, or of the one that has it."""
+    """Load one or two systems; -p sets a parameter in each system that has it."""
     given = dict(options.get("parameters", ()))
     if other is None or not given:
         alone = {"quiet": options.get("quiet")}
         return load_system(reference, options), None if other is None else load_system(other, alone)
     if other == "-":  # which can be read once
-        raise click.UsageError("found -p with OTHER on standard input, expected a file: is the parameter one of both?")
+        raise click.UsageError("-p with OTHER on standard input is ambiguous: write OTHER to a file")
     named = [
         set(given) if are_equations(one) else set(_loaded(one, {}).document.get("parameters", ()))
         for one in (other, *([] if reference in (None, "-") else [reference]))
     ]
     of_first = [pair for pair in options["parameters"] if pair[0] not in named[0] or pair[0] in named[-1]]
-    if len(named) == 1:  # the first one is inline, and may have every parameter
+    if len(named) == 1:  # the first system is inline or on standard input: its parameters are unknown
         of_first = options["parameters"]
     of_second = [pair for pair in options["parameters"] if pair[0] in named[0]]
     both = [name for name, _ in of_second if (name, given[name]) in of_first]
     if both and not options.get("quiet"):
-        say(f"-p {', '.join(both)}: set in both systems")
+        print_stderr(f"-p {', '.join(both)}: set in both systems")
     second = {"parameters": of_second, "quiet": options.get("quiet")}
     return load_system(reference, {**options, "parameters": of_first}), load_system(other, second)
 
 
 def load_system(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile:
-    """The system that a command line names: a path, a catalogue name, `-` for standard input, equations, or options.
+    """Load the system of a command line: a path, a catalogue name, `-` for standard input, equations, or options.
 
-    Of the options those of `inline_options` are looked at, as far as they are there. What was made of equations beyond
-    their words is said, unless `quiet`.
+    Unless `quiet`, notes on how equations were interpreted are printed on standard error.
     """
     file = _loaded(reference, options)
     if not options.get("quiet"):
         for note in file.notes:
-            say(note)
+            print_stderr(note)
     return file
 
 
@@ -314,9 +333,9 @@ def _loaded(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile
 def load_with_start(
     options: dict[str, Any], load: Callable[[Mapping[str, Any]], Any], *references: str | None
 ) -> tuple[Any, Any]:
-    """What `load` makes of the options, a file or a pair of files, and the start, in which parameters may stand.
+    """Load one or two systems and the initial point, which may contain parameters.
 
-    An algebraic number that -p gives need not be a parameter of the system: then it is for the start alone.
+    An algebraic number given by -p that is no parameter of the system is used in the initial point only.
     """
     text = options["start"]
     if not isinstance(text, str):
@@ -328,7 +347,7 @@ def load_with_start(
         if one is not None and one != "-" and not are_equations(one):
             known |= set(_loaded(one, {}).document.get("parameters", ()))
     inline = " ".join([*map(str, filter(are_equations, references)), *options["rhs"], *options["image"]])
-    # What - holds is not known: it may have every parameter.
+    # The parameters of a system on standard input are not known yet.
     known |= {name for name in roots if "-" in references or re.search(rf"\b{name}\b", inline)}
     of_start = {name: root for name, root in roots.items() if root is not None and name not in known}
     made = load({**options, "parameters": [pair for pair in options["parameters"] if pair[0] not in of_start]})
@@ -341,7 +360,7 @@ def load_with_start(
 
 
 def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemFile:
-    """The system of that name or in that file; where there is no such file, those that are named like it are told."""
+    """Load a system by name or file; the error for a missing file suggests files with similar names."""
     try:
         return lib.load(reference, parameters)
     except lib.InputError as error:
@@ -359,12 +378,12 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
 
 
 def _list(texts: Sequence[str]) -> list[str]:
-    """The expressions of an option that may be repeated, or have several between semicolons."""
+    """Split the values of a repeatable option at semicolons."""
     return [part.strip() for text in texts for part in text.split(";")]
 
 
 def settings_from(options: dict[str, Any], progress: Callable[[str], None], start: Any) -> lib.Settings:
-    """The settings of a check from the values of `check_options`, and the start that these have."""
+    """Return the settings of a check from the values of `check_options` and its initial point."""
     steps = options["steps"]
     if isinstance(start, lib.AlgebraicPoint):
         start = start.over(start.root.number_field)

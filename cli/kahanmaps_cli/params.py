@@ -1,4 +1,4 @@
-"""Kinds of option values: exact numbers, points, times, names with values, kinds of arithmetic."""
+"""Types of option values: exact numbers, points, times, names with values, kinds of arithmetic."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps.errors import ExpressionError, InputError, quoted
-from kahanmaps_cli.screen.terminal import colour_option
+from kahanmaps_cli.screen.terminal import color_option
 
 if TYPE_CHECKING:
     OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
@@ -23,14 +23,14 @@ else:
 HELP_OPTIONS = ["-h", "--help"]
 _NAME = re.compile(r"(?<![0-9.A-Za-z_])[A-Za-z_]")
 _WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
-_WRITE = {"\u2212\u2013": "write the minus sign as -", ";": "the numbers of a point have commas between them"}
-_MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
+_HINTS = {"\u2212\u2013": "write the minus sign as -", ";": "separate the numbers of a point by commas"}
+_MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # of a step number, of any other integer
 
 
 class ParameterKind(OptionType):
-    """What `read` makes of the text of an option, with these settings; its InputError is the message.
+    """A type whose texts are converted by `read(text, *settings)`; an InputError of it becomes the message.
 
-    Values that are no texts are defaults, and left alone.
+    Non-string values are defaults and are returned unchanged.
     """
 
     def __init__(self, name: str, read: Callable[..., Any], *settings: Any) -> None:
@@ -48,24 +48,24 @@ class ParameterKind(OptionType):
 
 
 def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
-    """A number, or what `read` makes of the text; what else is often written in numbers has a hint."""
+    """Read a number or a point; the error has a hint on characters that are often used by mistake."""
     try:
         return (read or lib.parse_number)(text)
     except ExpressionError as error:
-        hints = [hint for characters, hint in _WRITE.items() if any(c in text for c in characters)]
+        hints = [hint for characters, hint in _HINTS.items() if any(c in text for c in characters)]
         raise ExpressionError("; ".join([error.message, *hints]), text, error.column) from None
 
 
 def _read_point(text: str, has_names: bool = False) -> Any:
     if has_names and _NAME.search(text):
-        return text  # what the names stand for is known when the system is
+        return text  # names are resolved when the system is loaded
     return _read_number(text, lib.parse_point)
 
 
 def _read_whole(text: str, least: int) -> int:
-    text = _spelt_out(text.strip())
+    text = _without_exponent(text.strip())
     digits = text.removeprefix("-").removeprefix("+")
-    # Longer ones are refused before they meet Python's own limit on digits.
+    # Python's own limit on digits would raise another error.
     if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
         raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
     return int(text)
@@ -73,9 +73,9 @@ def _read_whole(text: str, least: int) -> int:
 
 def _read_short_integer(text: str) -> int:
     text = text.strip()
-    if len(text) > _MOST_DIGITS:
-        raise InputError(f"found {quoted(text)}, expected an integer of at most {_MOST_DIGITS} digits")
-    return int(click.INT(_spelt_out(text)))
+    if len(text) > _MAX_DIGITS:
+        raise InputError(f"found {quoted(text)}, expected an integer of at most {_MAX_DIGITS} digits")
+    return int(click.INT(_without_exponent(text)))
 
 
 def _read_seconds(text: str) -> float:
@@ -90,7 +90,7 @@ def _read_seconds(text: str) -> float:
 
 def _read_pair(text: str, name_is_optional: bool) -> tuple[str, str]:
     left, equals, right = (piece.strip() for piece in text.partition("="))
-    if name_is_optional and "," in left:  # a formula without a name, with letters that are defined behind it
+    if name_is_optional and "," in left:  # a formula without a name, followed by definitions of letters
         return "", text.strip()
     if equals and left and right and left.isprintable():
         return left, right
@@ -103,9 +103,9 @@ def _read_pair(text: str, name_is_optional: bool) -> tuple[str, str]:
 def _read_steps(text: str) -> list[int]:
     steps = set()
     for piece in text.split(","):
-        piece = _spelt_out(piece.strip())
-        if not (piece.isascii() and piece.isdigit()) or len(piece) > _MOST_STEP_DIGITS:
-            expected = f"step numbers of at most {_MOST_STEP_DIGITS} digits, separated by commas"
+        piece = _without_exponent(piece.strip())
+        if not (piece.isascii() and piece.isdigit()) or len(piece) > _MAX_STEP_DIGITS:
+            expected = f"step numbers of at most {_MAX_STEP_DIGITS} digits, separated by commas"
             raise InputError(f"found {quoted(piece)}, expected {expected}")
         steps.add(int(piece))
     return sorted(steps)
@@ -127,7 +127,7 @@ Arithmetic = partial(
 Seconds = partial(ParameterKind, "seconds", _read_seconds)  # a time above 0
 Steps = partial(ParameterKind, "n1,n2,...", _read_steps)  # step numbers separated by commas
 Shard = partial(ParameterKind, "i/n", _read_shard)  # I/N: the I-th of N parts
-ShortInteger = partial(ParameterKind, "integer", _read_short_integer)  # what `type=int` means in our commands
+ShortInteger = partial(ParameterKind, "integer", _read_short_integer)  # replaces `type=int` in all commands
 
 
 def Whole(least: int = 0) -> ParameterKind:
@@ -136,25 +136,25 @@ def Whole(least: int = 0) -> ParameterKind:
 
 
 def NameValue(name_is_optional: bool = False) -> ParameterKind:
-    """NAME=VALUE; without a name the whole text is the value where `name_is_optional`."""
+    """NAME=VALUE; with `name_is_optional` a text without a name is the value."""
     return ParameterKind("name=value", _read_pair, name_is_optional)
 
 
-def _spelt_out(text: str) -> str:
-    """1e6 and 2.5e3 as integers without an exponent; any other text as it is.
+def _without_exponent(text: str) -> str:
+    """Write 1e6 and 2.5e3 as integers without an exponent; return any other text unchanged.
 
-    >>> _spelt_out("2.5e3"), _spelt_out("1e-1"), _spelt_out("2.5e0")
+    >>> _without_exponent("2.5e3"), _without_exponent("1e-1"), _without_exponent("2.5e0")
     ('2500', '1e-1', '2.5e0')
     """
     match = _WITH_EXPONENT.fullmatch(text)
     if match is None:
         return text
-    whole, part, exponent = match[1], match[2] or "", int(match[3])
-    return whole + part.ljust(exponent, "0") if len(part) <= exponent else text
+    integer, part, exponent = match[1], match[2] or "", int(match[3])
+    return integer + part.ljust(exponent, "0") if len(part) <= exponent else text
 
 
 def _require_once(command: click.Command, ctx: click.Context, args: list[str]) -> list[str]:
-    """The arguments, of which an option with one value may not be given twice: the first one would be lost."""
+    """Refuse an option with one value that is given twice: click would silently drop the first value."""
     _, _, order = command.make_parser(ctx).parse_args(args=list(args))
     for option in order:
         takes_one = isinstance(option, click.Option) and not (option.multiple or option.count or option.is_flag)
@@ -163,22 +163,22 @@ def _require_once(command: click.Command, ctx: click.Context, args: list[str]) -
     return args
 
 
-@cache  # a command is given its rules once
-def with_our_rules(command: click.Command) -> click.Command:
-    """The command, and those below it, with --color, integers of bounded length for `type=int`, and no option lost.
+@cache  # apply the rules to a command once
+def with_common_rules(command: click.Command) -> click.Command:
+    """Apply the rules of all commands to a command and its subcommands.
 
-    That is to say: none that takes one value is given more than once.
+    They have --color, integers of bounded length for `type=int`, and refuse an option with one value given twice.
     """
     parse_args = command.parse_args
-    # click has no other place for it
+    # click has no hook for it
     command.parse_args = lambda ctx, args: parse_args(ctx, _require_once(command, ctx, args))  # type: ignore[method-assign]
-    # click keeps the option for help as the first context has it, which need not be one below the group.
+    # click copies the help option from the context of its first use, which may not be that of the group.
     command.context_settings.setdefault("help_option_names", HELP_OPTIONS)
     for parameter in command.params:
         if parameter.type is click.INT:
             parameter.type = ShortInteger()
-    command.params.append(colour_option())
+    command.params.append(color_option())
     if isinstance(command, click.Group):
-        for below in command.commands.values():
-            with_our_rules(below)
+        for subcommand in command.commands.values():
+            with_common_rules(subcommand)
     return command

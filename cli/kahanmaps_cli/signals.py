@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM ask long work to end where its output is valid; pressed again and again they end it anywhere."""
+"""Interrupts: the first Ctrl-C or SIGTERM ends long work where its output is valid, the next ones end it at once."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ INTERRUPTED = 130  # the exit status
 
 
 def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
-    """Set a handler for one signal, and return the one before; the next signal ends the process, handled or not.
+    """Set a handler for one signal and return the previous one; a second signal ends the process at once.
 
-    Handlers written in Python wait for the call in hand, and one of FLINT with long numbers takes minutes. So the
-    disposition goes back to the default as the signal arrives, which is what signal() does in System V; the handler
-    may then set another. Where the C library has no such function, the next signal waits as well.
+    Python runs a handler only after the current call into C returns, and a call of FLINT with long numbers may take
+    minutes. So the handler is installed with System V semantics: the disposition is reset to the default when the
+    first signal arrives. Where the C library lacks sysv_signal, a second signal waits as well.
     """
-    before = signal.signal(number, handler)
+    previous = signal.signal(number, handler)
     C = ctypes.CDLL(None)
     if hasattr(C, "sysv_signal"):
         C.signal.restype = ctypes.c_void_p
         C.sysv_signal.argtypes = (ctypes.c_int, ctypes.c_void_p)
         C.sysv_signal(number, C.signal(number, None))
-    return before
+    return previous
 
 
 @contextmanager
 def interruptible(interrupt: Callable[[], None]) -> Iterator[None]:
-    """The first Ctrl-C or SIGTERM calls `interrupt`, which asks the work to end; the second one ends it at once."""
+    """Call `interrupt`, which requests the work to end, at the first Ctrl-C or SIGTERM; end at once at the second."""
 
     def handler(signum: int, frame: Any) -> None:
         handle(signum, signal.default_int_handler)

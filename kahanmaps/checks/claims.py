@@ -13,10 +13,10 @@ from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
 
-from kahanmaps.displayed import Displayed, Printed, WithoutTruthValue
+from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, WithoutTruthValue
 
 
-class Certainty(Displayed, WithoutTruthValue, StrEnum):
+class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
     """How much is known of a claim; its truth value is `holds`, and `bool` of it an error.
 
     Checks give one of the first four. EXPLAINED is what follows exactly from the patterns of singularities, which are
@@ -75,7 +75,7 @@ class Witness:
 
 
 @dataclass(frozen=True)
-class Finding(Displayed, WithoutTruthValue):
+class Finding(HtmlDisplay, WithoutTruthValue):
     """One claim with its verdict. A `control` is a claim that is expected to be refuted and proves the check alive."""
 
     claim: str
@@ -122,7 +122,7 @@ class Finding(Displayed, WithoutTruthValue):
 
 
 @dataclass(frozen=True)
-class Report(Printed):
+class Report(PrintableResult):
     """The findings of one check, and what is needed to do it again (`context`)."""
 
     check: str

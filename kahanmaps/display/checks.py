@@ -1,6 +1,6 @@
-"""How claims and their verdicts look: in lines of text, in a notebook and on a page, where no colour stands alone.
+"""Claims and verdicts as text and as HTML for notebooks and pages; no information is carried by color alone.
 
-The text of a report is what the commands write into a pipe and `print` shows: a word and a tab at the front.
+The text of a report is the output of a command in a pipe and of `print`: lines that start with a word and a tab.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from dataclasses import dataclass
 
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.display import markup
-from kahanmaps.displayed import html_form, shorten, text_form
+from kahanmaps.display_protocols import html_form, shorten, text_form
 from kahanmaps.errors import counted
 from kahanmaps.maps.convention import eps_words
 
-_CLAIMS = 30  # in a notebook
-_TEXT = 400
+_MAX_CLAIMS = 30  # in a notebook
+_MAX_TEXT = 400  # characters
 
 
 @dataclass(frozen=True)
 class DisplayLimits:
-    """How much of a claim is shown: characters of a sentence, a formula and a number, and how many of a list."""
+    """Limits of a displayed claim: characters of a sentence, a formula and a number, and entries of a list."""
 
     text: int
     formula: int
@@ -29,14 +29,14 @@ class DisplayLimits:
     entries: int
 
 
-_NOTEBOOK = DisplayLimits(_TEXT, 1_200, 60, 8)
+_NOTEBOOK = DisplayLimits(_MAX_TEXT, 1_200, 60, 8)
 
 
 html_form.register(Certainty, markup.verdict)
 
 
 def verdict_html(finding: Finding) -> str:
-    """The verdict of a finding; that of a control says that it is as expected."""
+    """Return the verdict of a finding; that of a control says whether it is as expected."""
     word = markup.verdict(finding.verdict)
     if finding.place.get("misprint"):
         return f"{word} as printed"
@@ -47,13 +47,13 @@ def verdict_html(finding: Finding) -> str:
 
 @html_form.register
 def finding_html(finding: Finding) -> str:
-    """A claim with its verdict, the evidence and the witness."""
+    """Return a claim with its verdict, evidence and witness."""
     rows = [("verdict", verdict_html(finding)), *evidence_rows(finding)]
-    return markup.titled(markup.shortened(finding.claim, _TEXT), markup.definitions(rows))
+    return markup.titled(markup.shortened(finding.claim, _MAX_TEXT), markup.definitions(rows))
 
 
 def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[tuple[str, str]]:
-    """What stands below a claim: formula, evidence, witness, source; each row a word and HTML."""
+    """Return the details of a claim as pairs of a word and HTML: formula, evidence, witness, source."""
     rows = []
     if finding.formula and finding.formula not in finding.claim:
         rows.append(("formula", f"<code>{_text(finding.formula, limits.formula)}</code>"))
@@ -68,24 +68,24 @@ def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[t
 
 
 def because(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:
-    """What decided a claim: a sentence, and the hypotheses that were verified."""
+    """Return the evidence of a claim as a sentence, with the verified hypotheses."""
     return _text(summary(evidence), limits.formula if evidence.data.get("hypotheses") else limits.text)
 
 
 def counts(findings: Iterable[Finding]) -> str:
-    """How many of the claims that count have which verdict, as text: 3 proved, 1 refuted."""
-    every = list(findings)
-    found = Counter(str(f.verdict) for f in every if f.applies and not f.control)
-    told = [f"{number} {verdict}" for verdict, number in found.items()]
-    controls = sum(f.control and not f.place.get("misprint") for f in every)
-    misprints = sum(bool(f.place.get("misprint")) for f in every)
-    told += [counted(controls, "control")] * bool(controls)
-    told += [f"{counted(misprints, 'misprint')}, refuted as printed"] * bool(misprints)
-    return ", ".join(told) or "no claims"
+    """Count the claims by verdict as text: 3 proved, 1 refuted."""
+    findings = list(findings)
+    verdicts = Counter(str(f.verdict) for f in findings if f.applies and not f.control)
+    parts = [f"{number} {verdict}" for verdict, number in verdicts.items()]
+    controls = sum(f.control and not f.place.get("misprint") for f in findings)
+    misprints = sum(bool(f.place.get("misprint")) for f in findings)
+    parts += [counted(controls, "control")] * bool(controls)
+    parts += [f"{counted(misprints, 'misprint')}, refuted as printed"] * bool(misprints)
+    return ", ".join(parts) or "no claims"
 
 
 def eps_sentence(report: Report) -> str:
-    """For which eps the report is, with the time step."""
+    """Return for which eps the report holds, with the time step."""
     context = report.context
     if "eps" not in context:
         return ""
@@ -94,45 +94,43 @@ def eps_sentence(report: Report) -> str:
 
 
 def ending_sentence(report: Report) -> str:
-    """That an orbit which was asked for ended early, and how; empty where none did."""
+    """Return that and why a requested orbit ended early; empty where none did."""
     if not report.ended_early:
         return ""
-    return (
-        f"The orbit that was asked for ended early: {report.context.get('orbit', {}).get('message', 'no reason told')}."
-    )
+    return f"The requested orbit ended early: {report.context.get('orbit', {}).get('message', 'no reason given')}."
 
 
 def systems_sentence(report: Report) -> str:
-    """The names of the systems that the report is about."""
+    """Return the names of the systems of the report."""
     return ", ".join(str(report.context[key]) for key in ("system", "other") if key in report.context)
 
 
 @html_form.register
 def report_html(report: Report) -> str:
-    """The findings of a check as a table; of many claims the number in each section, and those that are not proved."""
+    """Return the findings of a check as a table; of many claims, counts by section and those that are not proved."""
     title = f"{report.check}: {systems_sentence(report)}"
     pieces = [f"<p>{markup.verdict(report.verdict)} ({_text(counts(report.findings))})</p>"]
     chosen = list(report.findings)
-    if len(chosen) > _CLAIMS:
+    if len(chosen) > _MAX_CLAIMS:
         sections = sections_of(report.findings).items()
         rows = [(_text(title or "claims"), _text(counts(found))) for title, found in sections]
         pieces.append(markup.table(["section", "claims"], rows))
         chosen = [f for f in chosen if str(f.verdict) != "proved" and not f.control and f.applies]
     if chosen:
-        told = [
+        cells = [
             (verdict_html(f), _text(f.claim), because(f.evidence) if f.witness is None else _witness(f.witness))
-            for f in chosen[:_CLAIMS]
+            for f in chosen[:_MAX_CLAIMS]
         ]
-        pieces.append(markup.table(["verdict", "claim", "because"], told))
-    if len(chosen) > _CLAIMS:
-        pieces.append(f"<p>… and {len(chosen) - _CLAIMS} more claims</p>")
+        pieces.append(markup.table(["verdict", "claim", "because"], cells))
+    if len(chosen) > _MAX_CLAIMS:
+        pieces.append(f"<p>… and {len(chosen) - _MAX_CLAIMS} more claims</p>")
     notes = [*filter(None, [ending_sentence(report)]), *report.notes[:5]]
     pieces += [f"<p>{_text(note)}</p>" for note in notes]
     return markup.titled(markup.shortened(title, 200), "\n".join(pieces), eps_sentence(report))
 
 
 def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
-    """The findings of `verify` by the title of their section, in order; elsewhere all under an empty title."""
+    """Group the findings of `verify` by the titles of their sections; those of other checks have an empty title."""
     by_section: dict[str, list[Finding]] = {}
     for finding in findings:
         number, title = finding.place.get("section"), str(finding.place.get("section_title", ""))
@@ -148,7 +146,7 @@ def _witness(witness: Witness, limits: DisplayLimits = _NOTEBOOK) -> str:
     return "<br/>".join(_text(line.strip().removeprefix("witness: "), limits.formula) for line in lines)
 
 
-def _text(text: str, width: int = _TEXT) -> str:
+def _text(text: str, width: int = _MAX_TEXT) -> str:
     return markup.escape(markup.shortened(text, width))
 
 
@@ -157,17 +155,17 @@ def _text(text: str, width: int = _TEXT) -> str:
 
 @text_form.register
 def report_text(report: Report) -> str:
-    """All findings with their evidence, then the verdict."""
-    lines, told = [headline(report)], set[str]()
+    """Return all findings with their evidence, then the verdict."""
+    lines, printed = [headline(report)], set[str]()
     for finding in report.findings:
         lines.append(f"{verdict_text(finding)}\t{finding.claim}")
-        lines += [f"\t{line}" for line in details(finding, told)]
+        lines += [f"\t{line}" for line in details(finding, printed)]
     lines += [f"note\t{note}" for note in report.notes]
     return "\n".join([*lines, f"verdict\t{report.verdict}"])
 
 
 def headline(report: Report) -> str:
-    """The first line: what was checked, of which systems, with which values of parameters, for which eps."""
+    """Return the first line of a report: check, systems, values of parameters, eps."""
     context = report.context
     values = [
         ", ".join(
@@ -187,15 +185,15 @@ def headline(report: Report) -> str:
 
 
 def verdict_text(finding: Finding) -> str:
-    """The verdict in words, and that a control was refuted as it should be."""
+    """Return the verdict, with (as expected) for a control that is refuted."""
     verdict = str(finding.verdict)
     return f"{verdict} (as expected)" if finding.control and finding.is_as_expected else verdict
 
 
-def details(finding: Finding, told: set[str], width: int | None = None) -> list[str]:
-    """What stands below a claim; `told` are the hypotheses that the reader has seen already."""
+def details(finding: Finding, printed: set[str], width: int | None = None) -> list[str]:
+    """Return the lines below a claim; `printed` are the hypotheses that were printed before."""
     lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
-    lines.append(summary(finding.evidence, told))
+    lines.append(summary(finding.evidence, printed))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
     if finding.witness is not None:
         lines += witness_lines(finding.witness, width)
@@ -204,21 +202,21 @@ def details(finding: Finding, told: set[str], width: int | None = None) -> list[
     return [line if width is None else shorten(line, 1200) for line in lines]
 
 
-def summary(evidence: Evidence, told: set[str] | None = None) -> str:
-    """The sentence of the evidence; a hypothesis is spelt out once in a report, of which `told` remembers it."""
+def summary(evidence: Evidence, printed: set[str] | None = None) -> str:
+    """Return the evidence as a sentence; each hypothesis is printed once per report, and `printed` collects them."""
     hypotheses = evidence.data.get("hypotheses")
     if not hypotheses:
         return evidence.summary
-    new = [text for text in hypotheses if text not in (told or ())]
-    if told is not None:
-        told.update(new)
-    rest = len(hypotheses) - len(new)
-    above = f"{rest} hypotheses as above" if rest > 1 else "1 hypothesis as above" if rest else ""
-    return f"{evidence.data['theorem']} applies: {'; '.join(new + [above] * bool(above))}"
+    new = [text for text in hypotheses if text not in (printed or ())]
+    if printed is not None:
+        printed.update(new)
+    repeated = len(hypotheses) - len(new)
+    earlier = f"{repeated} hypotheses as above" if repeated > 1 else "1 hypothesis as above" if repeated else ""
+    return f"{evidence.data['theorem']} applies: {'; '.join(new + [earlier] * bool(earlier))}"
 
 
 def witness_lines(witness: Witness, width: int | None) -> list[str]:
-    """A witness, the numbers shortened to `width`."""
+    """Return the lines of a witness, with numbers shortened to `width`."""
 
     def numbers(values: tuple[str, ...]) -> str:
         return ", ".join(value if width is None else shorten(value, width) for value in values)

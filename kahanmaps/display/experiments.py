@@ -1,9 +1,9 @@
-"""How a database of results and its summary look in a notebook."""
+"""Databases of results and their summaries as HTML and Markdown."""
 
 from __future__ import annotations
 
 from kahanmaps.display import markup
-from kahanmaps.displayed import html_form
+from kahanmaps.display_protocols import html_form
 from kahanmaps.experiments.results.store import Store, StoreError
 from kahanmaps.experiments.results.summary import Summary
 
@@ -12,7 +12,7 @@ _ROWS = 40
 
 @html_form.register
 def store_html(store: Store) -> str:
-    """How far each experiment has come."""
+    """Return the progress of each experiment as a table."""
     try:
         status = store.status()
     except StoreError as error:  # closed
@@ -35,7 +35,7 @@ def store_html(store: Store) -> str:
 
 @html_form.register
 def summary_html(summary: Summary) -> str:
-    """The tables of a summary."""
+    """Return the tables of a summary as HTML."""
     pieces = []
     for table in summary.tables(6):
         rows = [[markup.escape(cell) for cell in row] for row in table.rows[:_ROWS]]
@@ -46,7 +46,7 @@ def summary_html(summary: Summary) -> str:
 
 
 def summary_markdown(summary: Summary) -> str:
-    """A summary as tables for a Markdown file."""
+    """Return the tables of a summary in Markdown."""
     tables = []
     for table in summary.tables(6):
         rule = ["---"] * table.words + ["---:"] * (len(table.columns) - table.words)

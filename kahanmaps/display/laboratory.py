@@ -19,7 +19,7 @@ from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.display import markup
 from kahanmaps.display.latex import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
-from kahanmaps.displayed import html_form, text_form
+from kahanmaps.display_protocols import html_form, text_form
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.cycles import Census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth

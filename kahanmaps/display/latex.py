@@ -1,13 +1,13 @@
-r"""Names, polynomials and rational functions as LaTeX for formulas, exactly; and such formulas in HTML.
+r"""Names, polynomials and rational functions as LaTeX, and as formulas in HTML.
 
     x1 -> x_1    x12 -> x_{12}    eps -> \varepsilon    alpha2 -> \alpha_2    al -> al    my_H -> \mathrm{my\_H}
     x1~ -> \tilde{x_1}
 
-The text belongs into math mode. Products are written with a space, so that a reader, and a program, can take the
-factors apart again. In HTML it stands between \( and \), which notebooks set; pages make MathML of it.
+The text is for math mode. Factors are separated by spaces, so that formulas can be parsed again. In HTML a formula is
+enclosed in \( and \), which notebooks typeset; pages convert it to MathML.
 
-Neither MathJax nor MathML breaks lines. So a long formula is a <span class="formula"> of several pieces, one for each
-term, between which the browser wraps; a long quotient is written with a slash.
+Neither MathJax nor MathML breaks lines. So a long formula is a <span class="formula"> with one piece for each term,
+between which the browser wraps; a long quotient is written with a slash.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import PLAIN, Notation, above_and_below, first_terms
 from kahanmaps.display.markup import escape
-from kahanmaps.displayed import latex_form
+from kahanmaps.display_protocols import latex_form
 from kahanmaps.errors import InputError, counted
 
 # TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.
@@ -40,10 +40,10 @@ _ESCAPES = {
 
 
 def latex_name(name: str) -> str:
-    r"""A name as LaTeX: final digits become an index, eps \varepsilon, Greek names Greek letters.
+    r"""Return a name as LaTeX: final digits become an index, and eps and Greek names Greek letters.
 
-    `name` is printable text; what is not letters followed by digits is set upright, with TeX's special characters
-    escaped. Different names give different text. Raises InputError for text that is empty or not printable.
+    A name other than letters followed by digits is set upright, with TeX's special characters escaped. Different names
+    give different text. Raises InputError for text that is empty or not printable.
 
     >>> print(latex_name("x1"), latex_name("eps"), latex_name("Gamma12"), latex_name("al"), latex_name("modified_H"))
     x_1 \varepsilon \Gamma_{12} al \mathrm{modified\_H}
@@ -65,7 +65,7 @@ def latex_name(name: str) -> str:
 
 
 def latex_number(value: fmpq) -> str:
-    r"""An exact number as LaTeX.
+    r"""Return an exact number as LaTeX.
 
     >>> print(latex_number(fmpq(-3, 2)), latex_number(fmpq(7)))
     -\frac{3}{2} 7
@@ -76,7 +76,7 @@ def latex_number(value: fmpq) -> str:
 
 @latex_form.register
 def latex_polynomial(polynomial: fmpq_mpoly) -> str:
-    r"""A polynomial over Q as LaTeX, exact: its terms in the order of its ring, as in plain text.
+    r"""Return a polynomial over Q as LaTeX, with its terms in the order of its ring.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_polynomial(parse_polynomial("x1^3/3 - eps^12*x1 + 1/2", ["x1", "eps"])))
@@ -87,8 +87,7 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
 
 @latex_form.register
 def latex_rational_function(function: RationalFunction) -> str:
-    r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction, in factors where they
-    are shorter.
+    r"""Return a rational function over Q as LaTeX, without nested fractions, factored where this is shorter.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
@@ -100,7 +99,7 @@ def latex_rational_function(function: RationalFunction) -> str:
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
-    r"""A polynomial as LaTeX; only its beginning and the number of its terms where it takes more characters, about.
+    r"""Return a polynomial as LaTeX, or its beginning and number of terms beyond about so many characters.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))
@@ -116,7 +115,7 @@ def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
 
 
 def latex_matrix(entries: fmpq_mat, most: int = 8) -> str:
-    r"""A matrix over Q; only its size where it has more than `most` rows or columns, or entries of many digits.
+    r"""Return a matrix over Q, or its size if it has more than `most` rows or columns, or long entries.
 
     >>> print(latex_matrix(fmpq_mat([[1, 0]])))
     \begin{pmatrix} 1 & 0 \end{pmatrix}
@@ -130,7 +129,7 @@ def latex_matrix(entries: fmpq_mat, most: int = 8) -> str:
 
 
 def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
-    r"""Equations left = right, both LaTeX, one below the other, for a notebook; at most so many, and then dots.
+    r"""Return at most `most` aligned equations left = right, then dots; both sides are LaTeX.
 
     >>> print(latex_aligned([("x", "1"), ("y", "2")]))
     $\displaystyle \begin{aligned} x &= 1 \\ y &= 2 \end{aligned}$
@@ -156,16 +155,16 @@ LATEX = Notation(
 )
 
 
-# A formula of at most so many characters of plain text is one piece: it has room on a telephone.
+# A formula of at most so many characters of plain text is one piece, which fits on a phone.
 _ONE_PIECE = 32
 _FLAT = replace(LATEX, enclosed="({})".format, fraction="({}) / ({})".format)
 
 
 def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters: int | None = None) -> str:
-    r"""A polynomial or a rational function as HTML that wraps between its terms, exact.
+    r"""Return a polynomial or a rational function as HTML that wraps between its terms.
 
-    `left` is the name of what it is: "I1" makes I_1 = ...; "x1'" is the derivative. Where more than about
-    `characters` characters would be shown, the rest is left out, and the number of terms is told.
+    `left` is the name on the left-hand side: "I1" gives I_1 = ..., and "x1'" is a derivative. A formula of more than
+    about `characters` characters is cut, with its number of terms.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(formula(parse_polynomial("x^2", ["x"]), "H"))
@@ -191,7 +190,7 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
 
 
 def typeset(latex: str, is_long: bool = True) -> str:
-    r"""LaTeX of a formula as HTML, one piece for each of its terms where it `is_long`.
+    r"""Return a formula in LaTeX as HTML, with one piece for each term where it `is_long`.
 
     >>> print(typeset(r"\frac{x + 1}{2} - y = 0"))
     <span class="formula">\(\frac{x + 1}{2}\) \({}- y = 0\)</span>
@@ -209,12 +208,12 @@ def typeset(latex: str, is_long: bool = True) -> str:
 
 
 def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: int | None = None) -> str:
-    """The equations x' = f(x), one below the other, as HTML; long ones wrap, and are cut after `characters` each."""
+    """Return the equations x' = f(x) as HTML on separate lines, which wrap and are cut after `characters` each."""
     lines = (formula(f, f"{name}'", characters) for name, f in zip(variables, rhs, strict=True))
     return "<br/>\n".join(lines)
 
 
 def matrix(entries: fmpq_mat, left: str = "", most: int = 8) -> str:
-    """A matrix over Q as HTML, exact; only its size where it has more than `most` rows or columns, or long entries."""
+    """Return a matrix over Q as HTML, or its size if it has more than `most` rows or columns, or long entries."""
     text = latex_matrix(entries, most)
     return typeset(f"{latex_name(left)} = {text}" if left else text, False)

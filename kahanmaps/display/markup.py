@@ -1,7 +1,7 @@
-"""The few pieces of HTML that notebooks and the report share; well-formed XML, always the same bytes.
+"""HTML elements shared by notebooks and reports, as well-formed XML with reproducible bytes.
 
-Nothing here sets a background or a font: what is shown takes the colours of the page around it, light or dark. Words
-such as *proved* carry a mark beside their colour, so that they can be told apart without seeing the colour.
+They set neither background nor font, so that they fit into light and dark pages. Words such as *proved* have a symbol
+besides their color, so that the color is not needed to tell them apart.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from kahanmaps.errors import printable
 from kahanmaps.maps.convention import eps_words
 
-# A mark, and a colour to be mixed with that of the text: with a contrast above 4.5 : 1 on white and on near black.
+# A symbol, and a color to be mixed with that of the text; the contrast is above 4.5 : 1 on white and on near black.
 WORDS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
@@ -25,12 +25,12 @@ WORDS = {
     "refuted": ("✗", "#e0353f"),
     "undecided": ("?", "#b8860b"),
 }
-_LEFT = 'style="text-align: left"'  # Jupyter sets tables as if they were all numbers
+_LEFT = 'style="text-align: left"'  # Jupyter aligns all cells on the right
 _SHORTENED = 60  # characters of a number or a name
 
 
 def escape(text: object) -> str:
-    """Text as HTML that shows it and nothing else; what XML does not allow, control characters above all, is spelt out.
+    """Escape text for HTML; characters that XML forbids, such as control characters, are written as escapes.
 
     >>> escape('<b title="x">&')
     '&lt;b title=&quot;x&quot;&gt;&amp;'
@@ -41,7 +41,7 @@ def escape(text: object) -> str:
 
 
 def markdown(text: object) -> str:
-    """Text as Markdown that shows it and nothing else, on one line.
+    """Escape text for Markdown, on one line.
 
     >>> markdown("<b>2*x*y|[a](b)</b>")
     '&lt;b>2\\\\*x\\\\*y\\\\|\\\\[a\\\\](b)&lt;/b>'
@@ -51,7 +51,7 @@ def markdown(text: object) -> str:
 
 
 def code(text: object) -> str:
-    """Text as a span of code in Markdown, fenced by more backticks than it has in a row.
+    """Return text as a code span in Markdown, enclosed in more backticks than it contains in a row.
 
     >>> code("x < y"), code("`a`")
     ('`x < y`', '`` `a` ``')
@@ -63,20 +63,20 @@ def code(text: object) -> str:
 
 
 def shortened(text: object, width: int = _SHORTENED) -> str:
-    """The text with its middle left out where it is longer than `width`, and its length told; not yet escaped.
+    """Shorten a text that is longer than `width` to its two ends and its length, without escaping it.
 
     >>> shortened("1" * 100, 20)
     '11111111…11111111 (100 characters)'
     """
-    whole = str(text)
-    if len(whole) <= width:
-        return whole
+    full = str(text)
+    if len(full) <= width:
+        return full
     keep = max(4, (width - 4) // 2)
-    return f"{whole[:keep]}…{whole[-keep:]} ({len(whole)} characters)"
+    return f"{full[:keep]}…{full[-keep:]} ({len(full)} characters)"
 
 
 def eps_phrase(record: Mapping[str, Any]) -> str:
-    """For which eps a record speaks, with the time step, as text with short numbers.
+    """Return the eps of a record and the time step as text with shortened numbers.
 
     >>> eps_phrase({"eps": "1/10", "time_step": "1/5"})
     'eps = 1/10 (time step 2 eps = 1/5)'
@@ -86,28 +86,28 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
-    """A table. `head` and `caption` are text, the cells of `rows` are HTML already; the last of a short row is wide.
+    """Return a table; `head` and `caption` are text, cells are HTML. The last cell of a short row spans the others.
 
     >>> print(table(["n"], [["<b>3</b>"]]))
     <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
     <tr><td style="text-align: left"><b>3</b></td></tr>
     </tbody></table>
     """
-    above = f"<caption>{escape(caption)}</caption>" if caption else ""
+    title = f"<caption>{escape(caption)}</caption>" if caption else ""
     names = "".join(f'<th scope="col" {_LEFT}>{escape(name)}</th>' for name in head)
     names = f"<thead><tr>{names}</tr></thead>" if names else ""
-    held = [list(row) for row in rows]
-    width = max(map(len, (head, *held)))
+    body = [list(row) for row in rows]
+    width = max(map(len, (head, *body)))
     lines = []
-    for *cells, last in held:
+    for *cells, last in body:
         wide = f' colspan="{width - len(cells)}"' if len(cells) + 1 < width else ""
         line = "".join(f"<td {_LEFT}>{cell}</td>" for cell in cells)
         lines.append(f"<tr>{line}<td{wide} {_LEFT}>{last}</td></tr>")
-    return "\n".join([f"<table>{above}{names}<tbody>", *lines, "</tbody></table>"])
+    return "\n".join([f"<table>{title}{names}<tbody>", *lines, "</tbody></table>"])
 
 
 def definitions(rows: Iterable[tuple[str, str]]) -> str:
-    """A table of two columns: a word, which is text, and what it stands for, which is HTML already."""
+    """Return a table of two columns: a word as text, and its value as HTML."""
     lines = [
         f'<tr><th scope="row" style="text-align: left; vertical-align: top">{escape(word)}</th>'
         f"<td {_LEFT}>{what}</td></tr>"
@@ -117,12 +117,12 @@ def definitions(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def listed(entries: Iterable[str]) -> str:
-    """A list whose entries are HTML already."""
+    """Return a list of entries that are HTML."""
     return "\n".join(["<ul>", *(f"<li>{entry}</li>" for entry in entries), "</ul>"])
 
 
 def verdict(word: object) -> str:
-    """A word such as *proved*, with its mark and its colour; other words as they are.
+    """Return a word such as *proved* with its symbol and color; other words unchanged.
 
     >>> verdict("note")
     '<span class="verdict">note</span>'
@@ -130,12 +130,12 @@ def verdict(word: object) -> str:
     text = str(word)
     if text not in WORDS:
         return f'<span class="verdict">{escape(text)}</span>'
-    mark, colour = WORDS[text]
-    style = f"color: color-mix(in srgb, currentColor 35%, {colour}); white-space: nowrap"
+    mark, color = WORDS[text]
+    style = f"color: color-mix(in srgb, currentColor 35%, {color}); white-space: nowrap"
     return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
 
 
 def titled(title: str, inside: str, more: str = "") -> str:
-    """A piece of a notebook: a title, which is text, perhaps with more beside it, and HTML below."""
+    """Return a block of HTML with a title and an optional remark, both text."""
     beside = f" — {escape(more)}" if more else ""
     return f"<div><p><strong>{escape(title)}</strong>{beside}</p>\n{inside}\n</div>"

@@ -1,4 +1,4 @@
-"""How systems, members, maps and orbits look in a notebook, bounded in size whatever they are.
+"""Systems, members, maps and orbits as HTML and LaTeX for notebooks, bounded in size.
 
 Nothing is computed that was not computed before.
 """
@@ -22,7 +22,7 @@ from kahanmaps.display.latex import (
     latex_polynomial,
     matrix,
 )
-from kahanmaps.displayed import html_form, latex_form, text_form
+from kahanmaps.display_protocols import html_form, latex_form, text_form
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import counted
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
@@ -42,7 +42,7 @@ _EQUATIONS = 12
 
 @latex_form.register
 def system_latex(system: QuadraticSystem) -> str:
-    """The equations x' = f(x), for a notebook."""
+    """Return the equations x' = f(x)."""
     names = [rf"\dot{{{latex_name(name)}}}" for name in system.variables]
     rows = [(x, latex_cut(f, CHARACTERS)) for x, f in zip(names, system.rhs[: _EQUATIONS + 1], strict=False)]
     rows += [(x, "") for x in names[len(rows) :]]  # only counted
@@ -51,27 +51,27 @@ def system_latex(system: QuadraticSystem) -> str:
 
 @latex_form.register
 def hamiltonian_latex(hamiltonian: CubicHamiltonian) -> str:
-    """H, and the equations x' = J grad H, for a notebook."""
+    """Return H and the equations x' = J grad H."""
     J = r"\begin{pmatrix} 0 & I \\ -I & 0 \end{pmatrix}" if hamiltonian.is_standard else latex_matrix(hamiltonian.J)
     return latex_aligned([("H", latex_cut(hamiltonian.H, CHARACTERS)), (r"\dot{x}", rf"J \nabla H, \quad J = {J}")])
 
 
 def map_html(map_: MapFamily) -> str:
-    """The equations of a vector field, or those of another map."""
+    """Return the equations of the vector field of a Kahan map, or those of another map."""
     if isinstance(map_, KahanFamily):
         return equations_html(map_.system)
     return "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(map_).split("\n"))
 
 
 def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS, most: int = _EQUATIONS) -> str:
-    """The equations as HTML, at most `most` of them, each cut after about so many characters."""
+    """Return at most `most` equations as HTML, each cut after about so many characters."""
     shown = equations(system.variables[:most], system.rhs[:most], characters)
     return shown if system.dim <= most else f"{shown}<br/>\n… ({system.dim} equations)"
 
 
 @html_form.register
 def file_html(file: SystemFile) -> str:
-    """A system file: its equations, parameters and claims."""
+    """Return the equations, parameters and claims of a system file."""
     rows = [("equations", map_html(file.map))]
     if file.parameters:
         values = (f"{name} = {markup.shortened(format_number(v))}" for name, v in list(file.parameters.items())[:20])
@@ -92,7 +92,7 @@ def file_html(file: SystemFile) -> str:
 
 @html_form.register
 def member_html(member: FamilyMember) -> str:
-    """A member: A, H, chi, the associated system that its signs pick."""
+    """Return A, H, chi and the signs of a member."""
     factors = " ".join(
         f"({factor})" + f"^{factor.multiplicity}" * (factor.multiplicity > 1) for factor in member.factors
     )
@@ -108,7 +108,7 @@ def member_html(member: FamilyMember) -> str:
 
 @html_form.register
 def associated_html(system: AssociatedSystem) -> str:
-    """An associated system: its signs, K, B and the equations."""
+    """Return B, K and the equations of an associated system."""
     powers = [
         f"{markup.shortened(format_number(c), 20)} {('I', 'A')[k] if k < 2 else f'A^{k}'}"
         for k, c in enumerate(system.coefficients[:12])
@@ -124,7 +124,7 @@ def associated_html(system: AssociatedSystem) -> str:
 
 @html_form.register
 def normal_form_html(form: NormalForm) -> str:
-    """A normal form: chi, h, D and the planes over Q."""
+    """Return chi, h, D and the planes over Q of a normal form."""
     texts = {"chi(t)": form.chi_text, "h(X, Y)": form.h_text, "D(X, Y)": form.D_text}
     rows = [(name, markup.escape(markup.shortened(text, _TEXT))) for name, text in texts.items()]
     rows.append(("S", matrix(form.S)))
@@ -138,12 +138,12 @@ def normal_form_html(form: NormalForm) -> str:
 
 _EQUATIONS = 8
 _COORDINATES = 8
-_LARGEST_SHOWN = 2_000  # digits: the text of a longer number is not even made
+_MAX_DIGITS = 2_000  # longer numbers are not converted to text
 
 
 @latex_form.register
 def map_latex(kahan: KahanMap) -> str:
-    """The equation that defines the map, for its system and its eps."""
+    """Return the equation that defines a Kahan map."""
     system, field = kahan.system, kahan.field
     rows = []
     for name, f in zip(system.variables[:_EQUATIONS], system.rhs, strict=False):
@@ -165,7 +165,7 @@ def map_latex(kahan: KahanMap) -> str:
 
 @latex_form.register
 def birational_latex(map_: MapFamily) -> str:
-    """The equations between a point and its image; of a Kahan map the differential equation that it belongs to."""
+    """Return the equations between a point and its image; for a Kahan map, its differential equation."""
     if isinstance(map_, KahanFamily):
         return system_latex(map_.system)
     if isinstance(map_, ComposedMap) and not map_.is_small:
@@ -176,7 +176,7 @@ def birational_latex(map_: MapFamily) -> str:
 
 
 def _polarised(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
-    """The right-hand side Q(x, x~) + B (x + x~)/2 + c of one component, which is 2 f((x + x~)/2) - f(x)/2 - f(x~)/2."""
+    """Return the component Q(x, x~) + B (x + x~)/2 + c of the polarization, 2 f((x + x~)/2) - f(x)/2 - f(x~)/2."""
     shown = first_terms(polynomial, CHARACTERS // 2)
     context = ring((*variables, *(f"{name}~" for name in variables)))
     x, y = context.gens()[: len(variables)], context.gens()[len(variables) :]
@@ -190,13 +190,13 @@ def _polarised(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
 
 
 def _plain(text: object) -> str:
-    """Text of a number or a field for \\text{...}."""
+    """Return a number or field as the argument of \\text{...}."""
     return str(text).replace("_", r"\_")
 
 
 @html_form.register
 def orbit_html(orbit: Orbit) -> str:
-    """The first points and the last one that were computed, and how the orbit ended."""
+    """Return the first points, the last computed point, and how the orbit ended."""
     variables = orbit.map.variables
     shown, last = list(orbit.first), orbit.last
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
@@ -222,8 +222,8 @@ def orbit_html(orbit: Orbit) -> str:
 
 
 def _cells(point: OrbitPoint, count: int) -> list[str]:
-    """One row: the step, the first coordinates of `count`, and the number of digits."""
-    is_long = point.digits > _LARGEST_SHOWN
+    """Return a row: the step, the first of `count` coordinates, and the number of digits."""
+    is_long = point.digits > _MAX_DIGITS
     texts = [t if len(t) <= 24 else f"{t[:10]}…{t[-10:]}" for t in (["(long)"] * count if is_long else point.text)]
     cells = texts[:_COORDINATES] + ["…"] * (count > _COORDINATES)
     return [str(point.step), *(markup.escape(text) for text in cells), str(point.digits or "")]
@@ -231,7 +231,7 @@ def _cells(point: OrbitPoint, count: int) -> list[str]:
 
 @html_form.register
 def period_html(found: OrbitPeriod) -> str:
-    """The period, and that of every plane."""
+    """Return the period of an orbit and those in its planes."""
     sentence, *planes = found.text.split("\n")
     inside = markup.listed(markup.escape(markup.shortened(line, 200)) for line in planes[:20])
     return markup.titled(markup.shortened(sentence, 200), inside)
@@ -239,7 +239,7 @@ def period_html(found: OrbitPeriod) -> str:
 
 @text_form.register
 def period_text(found: OrbitPeriod) -> str:
-    """The period, that in each plane, and whether the orbit meets a pole."""
+    """Return the period, those in the planes, and whether the orbit meets a pole."""
     lines = [f"period\t{_period_word(found)}"]
     for plane in found.planes:
         cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]

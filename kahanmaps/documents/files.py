@@ -21,7 +21,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.atomic_files import write_atomically
-from kahanmaps.displayed import Displayed, shorten
+from kahanmaps.display_protocols import HtmlDisplay, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
 from kahanmaps.documents.iterates import iterates_in, with_iterates
@@ -46,7 +46,7 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 
 @dataclass(frozen=True, eq=False)
-class SystemFile(Displayed):
+class SystemFile(HtmlDisplay):
     """A system with everything that its file says of it.
 
     `map` is the map that is meant, of a differential equation its Kahan map; `hamiltonian` and `member` are there when

@@ -1,7 +1,7 @@
-"""One experiment of a batch, many tasks of one kind, none of which is made before it is asked for; and how it is read.
+"""Experiments of a batch: many tasks of one kind, created lazily; and how they are read from a spec.
 
-`SpecDocument` knows the shape of a spec: which keys there are and what kind of value each has. `ExperimentReader` says
-what one table [experiments.NAME] means, which depends on its task, or tells the document every mistake in it.
+`SpecDocument` checks the shape of a spec: its keys and the types of their values. `ExperimentReader` reads one table
+[experiments.NAME], whose meaning depends on its task, and reports every mistake to the document.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, ta
 from kahanmaps.experiments.results.records import Task, TaskLimits, canonical
 from kahanmaps.experiments.results.system_spec import ENDINGS, family_spec, find_file, spec_of
 
-PARAMETERS = "parameters."  # what the name of a value begins with that is a parameter of the system
+PARAMETERS = "parameters."  # prefix of the name of a value that is a parameter of the system
 DEFAULT_LIMITS = TaskLimits(time=3600.0, memory=4 * 10**9)
 TIME_STEP = "time_step"
 _EPS2 = "eps2"
 _FAMILY_WORD = "family"
-_FILES_AT_MOST = 10_000
+_MAX_FILES = 10_000
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
 
@@ -54,8 +54,8 @@ def _read_digits(value: Any) -> None:
         raise ValueError(f"found {show(value)}, expected a whole number of digits, at least 1")
 
 
-# A shape is a function that raises ValueError; or a type, what is expected in words, and the shape of what is in a list
-# or under every name of a table, or those under its only names.
+# A shape is a function that raises ValueError; or a tuple of a type, a description, and the shape of the items of a
+# list or table, or a dict of shapes for the only keys of a table.
 _ON_ERROR = (str, "refuse, or skip for systems that cannot be read")
 _LIMITS = (
     dict,
@@ -83,7 +83,7 @@ _OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
 
 def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
-    """What is wrong with the shape: where, the key as people write it, and a sentence.
+    """Return the mistakes in the shape as triples of a path, the key as text, and a sentence.
 
     >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
     [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
@@ -93,7 +93,7 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
 
 
 def _mistakes(value: Any, shape: Any, place: Place) -> Iterator[tuple[Place, str]]:
-    """The places in a value that have not their shape, and what is wrong there."""
+    """Yield the paths in a value that do not have the expected shape, with a sentence."""
     if callable(shape):
         try:
             shape(value)
@@ -122,15 +122,15 @@ def _mistakes(value: Any, shape: Any, place: Place) -> Iterator[tuple[Place, str
 
 
 def key_of(place: Place) -> str:
-    """A place as people write it, lists counted from 1: experiments.a.zip[1]."""
+    """Return a path as text, with lists counted from 1: experiments.a.zip[1]."""
     return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
 
 
 class SpecDocument:
-    """A whole spec; paths of systems in it are relative to `folder`.
+    """A spec; paths of systems in it are relative to `folder`.
 
-    `mistakes` are pairs of key and sentence, those of the shape first. `documents` are of the systems found on the way.
-    With `skip_bad` systems that cannot be read are left out of all experiments, as with on_error = "skip".
+    `mistakes` are pairs of a key and a sentence, those of the shape first. `documents` are those of the systems that
+    were read. With `skip_bad` systems that cannot be read are skipped in all experiments, as with on_error = "skip".
     """
 
     def __init__(self, document: Mapping[str, Any], folder: Path, skip_bad: bool = False) -> None:
@@ -145,13 +145,13 @@ class SpecDocument:
             self.mistake(key, sentence)
 
     def mistake(self, key: str, sentence: str) -> None:
-        """Tell that something is wrong."""
-        # Keys and words come from the file: nothing in them may reach a terminal as an escape sequence.
+        """Report a mistake."""
+        # Keys and values come from the file: escape sequences must not reach a terminal.
         printable = ["".join(c if c.isprintable() or c == "\n" else "_" for c in text) for text in (key, sentence)]
         self.mistakes.append((printable[0].replace("\n", "_")[:120], printable[1]))
 
     def sound(self, *path: str | int) -> Any:
-        """The value at a place, None where it is missing or has not the right shape."""
+        """Return the value at a path, None where it is missing or has a wrong shape."""
         if any(bad == path[: len(bad)] for bad in self._misshapen):
             return None
         value: Any = self.document
@@ -164,7 +164,7 @@ class SpecDocument:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One experiment: a kind of task, what is the same for all its tasks (`fixed`), and the grid of what is not."""
+    """An experiment: a kind of task, the values that all its tasks share (`fixed`), and the grid of those that vary."""
 
     name: str
     kind: TaskKind
@@ -181,14 +181,14 @@ class Experiment:
 
     @property
     def product(self) -> str:
-        """That number as a product: 4 m x 10,000 seed x 3 eps."""
+        """The number of its tasks as a product: 4 m x 10,000 seed x 3 eps."""
         return " x ".join(f"{len(self.grid.axes[group[0]]):,} {'+'.join(group)}" for group in self.grid.groups)
 
     @cached_property
     def definition(self) -> str:
-        """What its tasks follow from, as canonical text: experiments with the same definition have the same tasks.
+        """The definition as canonical text: experiments with equal definitions have equal tasks.
 
-        The first task has all that is the same in all of them, defaults too, which may change from version to version.
+        The first task contains all shared values, including defaults, which may change between versions.
         """
         axes: dict[str, Any] = {}
         for name, values in self.grid.axes.items():
@@ -197,7 +197,7 @@ class Experiment:
                 continue
             read, axes[name] = values.option.read, []
             for piece in values.pieces:
-                if isinstance(piece, RationalRange):  # as its ends, not spelt out
+                if isinstance(piece, RationalRange):  # by its ends
                     axes[name].append({"from": read(piece[0]), "to": read(piece[-1]), "count": len(piece)})
                 else:
                     axes[name].append(list(piece))
@@ -206,25 +206,25 @@ class Experiment:
 
     def __getitem__(self, index: int) -> Task:
         values = {**self.fixed, **self.grid[index]}
-        recipe = values.pop("system", None)
-        if recipe is not None and "family" in recipe:
-            recipe = family_spec(values)
-        elif recipe is not None:
+        system_spec = values.pop("system", None)
+        if system_spec is not None and "family" in system_spec:
+            system_spec = family_spec(values)
+        elif system_spec is not None:
             given = {n.removeprefix(PARAMETERS): value for n, value in values.items() if n.startswith(PARAMETERS)}
-            recipe = {**recipe, "parameters": {**recipe["parameters"], **given}}
+            system_spec = {**system_spec, "parameters": {**system_spec["parameters"], **given}}
         options = {name: values.get(name, self.kind.defaults.get(name)) for name in self.kind.options}
-        return Task(self.kind.name, recipe, options)
+        return Task(self.kind.name, system_spec, options)
 
     def tasks(self) -> Iterator[Task]:
-        """Its tasks in order, one at a time."""
+        """Yield its tasks in order."""
         return (self[index] for index in range(self.size))
 
 
 class ExperimentReader:
-    """Reads the table of this name, once.
+    """Reads the table of an experiment, once.
 
-    `files` are the systems of the key system; `is_family` says
-    that members are drawn at random instead. `kind` is None where the task is not known.
+    `files` are the systems of the key system; `is_family` means random members instead. `kind` is None where the task
+    is unknown.
     """
 
     def __init__(self, spec: SpecDocument, name: str) -> None:
@@ -237,8 +237,8 @@ class ExperimentReader:
         self.is_family = False
 
     def read(self) -> Experiment | None:
-        """The experiment, or None after telling what is wrong with it."""
-        told_before = len(self.spec.mistakes)
+        """Return the experiment, or None after reporting its mistakes."""
+        reported_before = len(self.spec.mistakes)
         on_error = self.sound("on_error") or self.spec.sound("on_error") or "refuse"
         if on_error not in ("refuse", "skip"):
             self.mistake("on_error", f'found {show(on_error)}, expected "refuse" or "skip"')
@@ -261,7 +261,7 @@ class ExperimentReader:
         zips = self._read_zips(axes)
         limits = self._read_limits(kind, fixed)
         self._require(kind)
-        if len(self.spec.mistakes) > told_before:
+        if len(self.spec.mistakes) > reported_before:
             return None
         constant = {key: values[0] for key, values in fixed.items()}
         grid_axes: dict[str, Sequence[Any]] = dict(axes)
@@ -273,22 +273,22 @@ class ExperimentReader:
 
     @contextmanager
     def _at(self, key: str) -> Iterator[None]:
-        """What is wrong inside is told with this key."""
+        """Report an InputError in the block with this key."""
         try:
             yield
         except InputError as error:
             self.mistake(key, str(error))
 
     def mistake(self, key: str, sentence: str) -> None:
-        """Tell that something is wrong; `key` begins in this table."""
+        """Report a mistake; `key` is relative to this table."""
         self.spec.mistake(f"experiments.{self.name}.{key}", sentence)
 
     def sound(self, *path: str | int) -> Any:
-        """The value at a place in this table, None where it is missing or has not the right shape."""
+        """Return the value at a path in this table, None where it is missing or has a wrong shape."""
         return self.spec.sound("experiments", self.name, *path)
 
     def entries(self, part: str) -> list[tuple[str, str, Any]]:
-        """What the table of options or of axes says: canonical names of options, places, values."""
+        """Return the entries of the table of options or axes: canonical names, keys, values."""
         entries: list[tuple[str, str, Any]] = []
         for key, raw in (self.sound(part) or {}).items():
             if key == "parameters" and isinstance(raw, dict):
@@ -298,11 +298,11 @@ class ExperimentReader:
         return entries
 
     def given(self) -> dict[str, str]:
-        """The options that the spec gives, right or wrong, and where."""
+        """Return the keys of the options in the spec, valid or not, by canonical names."""
         return {name: place for part in ("axes", "options") for name, place, _ in self.entries(part)}
 
     def _read_values(self, kind: TaskKind, part: str) -> dict[str, AxisValues]:
-        """The values in one of the tables, by canonical name; what is wrong is told and left out."""
+        """Return the valid values of one of the tables by canonical names, and report the others."""
         found: dict[str, AxisValues] = {}
         for name, place, raw in self.entries(part):
             with self._at(place):
@@ -319,7 +319,7 @@ class ExperimentReader:
         return found
 
     def _option(self, kind: TaskKind, name: str, written: str) -> Option:
-        """The option of this name, or the parameter of the systems. Raises InputError where there is none."""
+        """Return the option or parameter of this name. Raises InputError where there is none."""
         if name.startswith(PARAMETERS) and self.has_parameters:
             key = name.removeprefix(PARAMETERS)
             for file in self.files:
@@ -329,21 +329,19 @@ class ExperimentReader:
                     raise InputError(f"{file.name} has no such parameter, its parameters are: {known}{hint}")
             return exact(name, "a parameter of the system")
         options = dict(kind.options)
-        if self.is_family or (self.has_parameters and not self.files):  # what cannot be found may have meant a member
+        if self.is_family or (self.has_parameters and not self.files):  # perhaps a member was meant
             options |= FAMILY | {"seed": VOCABULARY["seed"]}
         if name in options:
             return options[name]
-        if name == "seconds":  # which it was called up to 0.2, and on which answers depended
-            instead = (
-                f"{EFFORT} = 1, where each more doubles the work" if EFFORT in options else 'limits = {time = "60 s"}'
-            )
-            raise InputError(f"{kind.name} has no such option any more, expected {instead}")
+        if name == "seconds":  # its name up to 0.2, when results depended on the clock
+            instead = f"{EFFORT} = 1 (one more doubles the work)" if EFFORT in options else 'limits = {time = "60 s"}'
+            raise InputError(f"{kind.name} no longer has this option, expected {instead}")
         names = [*options, *([TIME_STEP] if "eps" in options else [])]
         expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
         raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")
 
     def _read_one(self, place: str, option: Option, raw: Any) -> AxisValues | None:
-        """The values of one option; None where what is wrong is told already."""
+        """Return the values of one option; None where a mistake was reported."""
         if option.name == OTHER:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):
@@ -360,7 +358,7 @@ class ExperimentReader:
         return values
 
     def _written_zips(self) -> list[list[str] | None]:
-        """Canonical names of the axes of each zip, None where one has not the right shape, which is told already."""
+        """Return the canonical names of the axes of each zip, None for one of a wrong shape, which was reported."""
         zips: list[list[str] | None] = []
         for number, written in enumerate(self.sound("zip") or []):
             sound = self.sound("zip", number) is not None
@@ -378,7 +376,7 @@ class ExperimentReader:
                 continue
             unknown = [name for name in names if name not in axes]
             for name in unknown:
-                if name not in given:  # otherwise something else is wrong with it, and told
+                if name not in given:  # else another mistake was reported
                     self.mistake(place, f"{name} is not an axis{suggestion(name, list(axes))}")
             twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
             if len(names) < 2:
@@ -391,15 +389,16 @@ class ExperimentReader:
                 zips.append(tuple(names))
                 lengths = {name: len(axes[name]) for name in names}
                 if len(set(lengths.values())) > 1:
-                    told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-                    self.mistake(place, f"{told} values, expected as many in each: a zip takes them together")
+                    counts = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+                    self.mistake(place, f"{counts} values, expected equal numbers: the axes of a zip run together")
                 elif any(has_repeats(axes[name]) for name in names):
                     rows: dict[tuple[str, ...], int] = {}
                     for k in range(1, 1 + lengths[names[0]]):
                         row = tuple(repr(axes[name][k - 1]) for name in names)
                         if rows.setdefault(row, k) != k:
-                            told = f"found the same values in places {rows[row]} and {k}: expected them once"
-                            self.mistake(place, told)
+                            self.mistake(
+                                place, f"found equal values at positions {rows[row]} and {k}, expected them once"
+                            )
                             break
         return zips
 
@@ -410,7 +409,7 @@ class ExperimentReader:
         )
         place = self.given().get("max_digits")
         if "digits" in own and self.sound("limits", "digits") is None:
-            pass  # told already, with the shape
+            pass  # reported with the shape
         elif "max_digits" not in kind.options:
             if "digits" in own:
                 self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
@@ -426,7 +425,7 @@ class ExperimentReader:
 
     def _require(self, kind: TaskKind) -> None:
         if any(self.sound(part) is None and part in self.raw for part in ("options", "axes")):
-            return  # what is missing may be in the table that has not the right shape
+            return  # a missing option may be in the table of a wrong shape
         given = self.given()
         needs_eps = not self.files or any(file.map.has_eps for file in self.files)
         for name in kind.required:
@@ -448,11 +447,11 @@ class ExperimentReader:
 
     @property
     def has_parameters(self) -> bool:
-        """Whether the system is a file, or may be: what it is is not known where its place is wrong."""
+        """Whether the system is a file, or may be one where its value is wrong."""
         return self.kind is not None and self.kind.needs is not None and not self.is_family
 
     def _read_systems(self) -> list[dict[str, Any]]:
-        """The recipes of the systems, none where the task needs none; what is wrong is told and left out."""
+        """Return the specs of the valid systems, none where the task needs none, and report the others."""
         raw = self.sound("system")
         if raw is None:
             if self.kind is not None and self.kind.needs is not None and self.raw.get("system") is None:
@@ -461,7 +460,7 @@ class ExperimentReader:
                 )
             return []
         if self.kind is not None and self.kind.needs is None:
-            self.mistake("system", f"found {show(raw)}, expected none: {self.kind.name} is about no particular system")
+            self.mistake("system", f"found {show(raw)}, expected none: {self.kind.name} needs no system")
             return []
         references = raw if isinstance(raw, list) else [raw]
         if not references:
@@ -469,12 +468,12 @@ class ExperimentReader:
         if _FAMILY_WORD in references:
             self.is_family = True
             if len(references) > 1:
-                self.mistake("system", 'found "family" among others, expected it alone: make another experiment')
+                self.mistake("system", 'found "family" among others, expected it alone: add another experiment')
             return [{"family": {}}]
         return self._read_files("system", references)
 
     def _read_files(self, key: str, references: Sequence[str]) -> list[dict[str, Any]]:
-        """The recipes of the files that the value of a key names."""
+        """Return the specs of the files named by the value of a key."""
         system_specs: dict[str, dict[str, Any]] = {}
         names: dict[str, str] = {}  # of the files with these documents
         for number, reference in enumerate(references, start=1):
@@ -483,34 +482,34 @@ class ExperimentReader:
                 for name in self._names(reference):
                     try:
                         file = find_file(name, self.spec.folder)
-                        recipe = spec_of(file, self.spec.documents)
+                        system_spec = spec_of(file, self.spec.documents)
                         if self._skips and key == "system":
                             self._require_kind(file)
-                    except InputError as error:  # the other files are read as well: all mistakes are told together
+                    except InputError as error:  # go on, to report all mistakes together
                         if self._skips and key == "system":
                             self.skipped.append((name, str(error)))
                         else:
                             self.mistake(place, f"{error}{suggestion(name, [_FAMILY_WORD])}")
                         continue
-                    if recipe["document"] in system_specs:
-                        same = f"{name} says the same as {names[recipe['document']]}"
+                    if system_spec["document"] in system_specs:
+                        same = f"{name} says the same as {names[system_spec['document']]}"
                         sentence = f"found {file.name} twice, expected every system once: {same}"
                         if self._skips and key == "system":
                             self.skipped.append((name, sentence))
                             continue
                         self.mistake(place, sentence)
-                    system_specs[recipe["document"]], names[recipe["document"]] = recipe, name
+                    system_specs[system_spec["document"]], names[system_spec["document"]] = system_spec, name
                     if key == "system":
                         self.files.append(file)
                         with self._at(place):
                             self._require_kind(file)
         if self.skipped and not system_specs:
             name, reason = self.skipped[0]
-            self.mistake(key, f"found no system that can be used, expected one at least; {name} is skipped: {reason}")
+            self.mistake(key, f"found no usable system, expected at least one; {name} is skipped: {reason}")
         return list(system_specs.values())
 
     def _names(self, reference: str) -> list[str]:
-        """The reference itself, or the files that match a pattern such as members/*.toml."""
+        """Return the reference itself, or the files that match a pattern such as members/*.toml."""
         if not any(mark in reference for mark in "*?["):
             return [reference]
         if Path(reference).is_absolute() or not reference.endswith(ENDINGS):
@@ -521,13 +520,13 @@ class ExperimentReader:
         try:
             paths = sorted(self.spec.folder.glob(reference))
         except (ValueError, NotImplementedError) as error:
-            raise InputError(f"found {show(reference)}, which is no pattern: {error}") from error
-        if not paths or len(paths) > _FILES_AT_MOST:
-            raise InputError(f"found {len(paths)} files like {show(reference)}, expected 1 to {_FILES_AT_MOST}")
+            raise InputError(f"found the invalid pattern {show(reference)}: {error}") from error
+        if not paths or len(paths) > _MAX_FILES:
+            raise InputError(f"found {len(paths)} files like {show(reference)}, expected 1 to {_MAX_FILES}")
         return [str(path.relative_to(self.spec.folder)) for path in paths]
 
     def _require_kind(self, file: SystemFile) -> None:
-        """Raises InputError where the task is about members of the family and the file has none."""
+        """Raise InputError where the task needs a member of the family and the file has none."""
         if self.kind is None or file.member is not None or self.kind.needs not in (MEMBER, MEMBER_OR_OTHER):
             return
         if self.kind.needs == MEMBER_OR_OTHER and OTHER in self.given():

@@ -1,6 +1,6 @@
 """Values and their combinations: lists, exact ranges "1/10..1/2 step 1/10", products and zips, all lazy.
 
-A grid of ten thousand million points costs nothing until somebody walks it; its size is known beforehand.
+The size of a grid is known without iterating over it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from kahanmaps.errors import InputError, show
 from kahanmaps.experiments.options import Option
 
 _RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
-_MOST = 2**62  # values of an axis: Python's `len` ends there
-_TOO_MANY = "more values than anybody can want"
+_MAX_VALUES = 2**62  # of an axis: the limit of Python's `len`
+_TOO_MANY = "too many values"
 
 Place = tuple[int, ...]
 Mistake = tuple[Place, str]
@@ -43,7 +43,7 @@ class RationalRange(Sequence[fmpq]):
             raise InputError(
                 f"found a range without values, from {show(first)} to {show(last)} in steps of {show(step)}{hint}"
             )
-        if count >= _MOST:
+        if count >= _MAX_VALUES:
             raise InputError(f"found a range from {show(first)} to {show(last)} in steps of {show(step)}: {_TOO_MANY}")
         self._scale = lcm(int(first.q), int(last.q), int(step.q))
         start, stop, scaled = (int((self._scale * part).p) for part in (first, last, step))
@@ -122,7 +122,7 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
             pieces.append((value,))
         except InputError as error:
             mistakes.append((place, str(error)))
-    if not mistakes and sum(map(len, pieces)) > _MOST:
+    if not mistakes and sum(map(len, pieces)) > _MAX_VALUES:
         mistakes.append(((), f"found {_TOO_MANY}"))
     return (None if mistakes else AxisValues(option, pieces)), mistakes
 

@@ -19,7 +19,7 @@ from kahanmaps.checks.claims import Certainty, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import Result, Whole, analysis, fields, task
+from kahanmaps.experiments.registry import FullResult, Result, analysis, fields, task
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
@@ -39,7 +39,7 @@ _ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are 
     "degrees", "growth.degrees:degree_growth", of="map", eps=None, terms=None, max_degree=20_000, effort=1, seed=0
 )
 def degrees(found: DegreeGrowth) -> Result:
-    """The degrees of the iterates: the kind of growth, the dynamical degree, a recurrence."""
+    """Compute degrees of the iterates: growth, dynamical degree, recurrence."""
     return {
         "status": found.ended,
         **_growth(found),
@@ -60,8 +60,8 @@ def scan_parameters(
     primes: list[int] | None = None,
     effort: int = 1,
     seed: int = 0,
-) -> Whole:
-    """The conditions on parameters under which degrees are smaller, with the growth there; the others have values."""
+) -> FullResult:
+    """Find the conditions on parameters under which degrees are smaller, and the growth there."""
     from kahanmaps.laboratory.scan.result import growth_on
     from kahanmaps.laboratory.scan.scan import scan
 
@@ -82,7 +82,7 @@ def scan_parameters(
     "find-integrals", "preserve.integrals:find_integrals", eps=None, symbolic=None, max_degree=None, effort=1, seed=0
 )
 def integrals(found: IntegralSearch) -> Result:
-    """Integrals in closed form with their verdict, and how many there are at least, by theorems and by orbits."""
+    """Search for rational integrals, and find their number by theorems and by orbits."""
     return {
         "verdict": _weakest(verdict for _, verdict in found.formulas),
         "status": _state_of_integrals(found),
@@ -99,7 +99,7 @@ def integrals(found: IntegralSearch) -> Result:
     "find-density", "preserve.densities:find_densities", eps=None, symbolic=None, max_degree=None, effort=1, seed=0
 )
 def density(found: DensitySearch) -> Result:
-    """The densities phi of least degree, or a product of powers, for which the measure dx/phi is invariant."""
+    """Search for invariant volume forms dx/phi with phi of least degree or a product of powers."""
     return {
         "verdict": _weakest(one.verdict for one in found.densities),
         "status": _state_of_densities(found),
@@ -122,7 +122,7 @@ def density(found: DensitySearch) -> Result:
     seed=0,
 )
 def poisson(found: PoissonSearch) -> Result:
-    """The Poisson tensors with polynomial entries: how many, their ranks, Casimirs among the integrals."""
+    """Search for Poisson tensors with polynomial entries: number, ranks, Casimirs among the integrals."""
     return {
         "verdict": _weakest(one.verdict for one in found.tensors),
         "status": "found" if found.tensors else "none" if found.reason.startswith("no tensor") else "open",
@@ -138,7 +138,7 @@ def poisson(found: PoissonSearch) -> Result:
 
 @analysis("find-symmetry", "symmetry.symmetries:linear_symmetries", of="system", effort=1)
 def symmetry(found: Symmetries) -> Result:
-    """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""
+    """Find affine symmetries and reversing symmetries for every eps: number and generators."""
     return {
         "verdict": str(Certainty.PROVED if found.complete else Certainty.UNDECIDED),
         "status": "complete" if found.complete else "undecided",
@@ -162,7 +162,7 @@ def symmetry(found: Symmetries) -> Result:
     error_bits=DEFAULT_ERROR_BITS,
 )
 def commuting(found: CommutingSystems) -> Result:
-    """The quadratic systems whose Kahan map commutes with this one at the same eps, for every eps."""
+    """Find the quadratic systems whose Kahan maps commute with this one for every eps."""
     return {
         "verdict": str(found.verdict),
         "status": "complete" if found.complete else "undecided",
@@ -179,7 +179,7 @@ def commuting(found: CommutingSystems) -> Result:
 
 @analysis("analyze", "analysis:analyze", eps=None, symbolic=None, effort=1, seed=0)
 def all_analyses(found: Analysis) -> Result:
-    """All analyses at once: integrability in a word, integrals, growth, densities, symmetries, commuting systems."""
+    """Run all analyses: integrability, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.system_normal_form import SystemNormalForm
 
     final, confined = found.conclusion, {run.verdict for run in found.singularities}
@@ -219,7 +219,7 @@ def confinement(
     seed: int = 0,
     report: bool = False,
 ) -> Result:
-    """Are singularities confined? The hypersurfaces that the map contracts; without eps two values are compared."""
+    """Trace the exceptional hypersurfaces: are singularities confined? Without eps, two values are compared."""
     from kahanmaps.laboratory.singular.outcomes import NOT_CONTRACTED, UNDECIDED
     from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 
@@ -260,7 +260,7 @@ def cycles(
     seed: int = 0,
     report: bool = False,
 ) -> Result:
-    """The lengths of the cycles of the map over a finite field."""
+    """Count the lengths of the cycles over a finite field."""
     from kahanmaps.laboratory.cycles import DEFAULT_STEPS, cycle_census, default_eps
 
     if steps is not None and samples is None:
@@ -294,7 +294,7 @@ def lyapunov(
     transient: int | None = None,
     seed: int = 0,
 ) -> Result:
-    """Lyapunov exponents of float orbits from random starts, by the exact tangent map, per unit of time."""
+    """Estimate Lyapunov exponents of floating-point orbits, by the exact tangent map, per unit of time."""
     from kahanmaps.maps.floats.doubles import to_floats
     from kahanmaps.maps.floats.ensemble import starts_in_box
     from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
@@ -340,7 +340,7 @@ def _weakest(verdicts: Iterable[Certainty]) -> str | None:
 
 
 def _growth(found: DegreeGrowth) -> Result:
-    """What groups systems by their complexity."""
+    """Return the entries on the growth of degrees."""
     recurrence, rate = found.recurrence, found.dynamical_degree
     return {
         "growth": str(found.growth),
@@ -367,5 +367,5 @@ def _hypersurfaces(run: SingularityRun) -> list[Result]:
 
 
 def _number(value: Any) -> float | None:
-    """A float of numpy as one that JSON has."""
+    """Return a float of numpy as a number of JSON."""
     return float(value) if isfinite(value) else None

@@ -1,7 +1,7 @@
-"""What a task can be asked with: the options of all tasks, one meaning for each name, read exactly.
+"""The options of all tasks: each name has one meaning, and values are exact.
 
-An option reads what a spec says into canonical plain data (exact numbers as text, so that 0.1 and 1/10 are the same
-task), and makes of it, in the child that does the task, what the library wants.
+An option converts the value in a spec to canonical plain data (exact numbers as text, so that 0.1 and 1/10 give one
+task), and this, in the worker process, to an argument of the library.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from kahanmaps.algebra.work import LEAST_EFFORT, MOST_EFFORT
 from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.family.random_members import MAX_M, parse_chi
 
-_LARGEST = 2**63 - 1
+_MAX_INTEGER = 2**63 - 1
 _PRIME_BITS = 192
 _TIME_UNITS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
 _MEMORY_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
-_MOST_SECONDS, _MOST_BYTES = 10**9, 10**18  # what system calls take
+_MAX_SECONDS, _MAX_BYTES = 10**9, 10**18  # limits of system calls
 _NONE = "none"
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
@@ -33,10 +33,10 @@ _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
 
 @dataclass(frozen=True)
 class Option:
-    """An option of tasks: its name, what it is, `read` for what a spec says, `make` for what the library wants.
+    """An option of tasks with its name and help.
 
-    `read` gives plain data, or raises InputError; None always stands for "not given". `numbers` says whether ranges
-    "a..b step c" may be written.
+    `read` converts the value in a spec to plain data or raises InputError, `make` converts plain data to an argument of
+    the library; None means "not given". `numbers` tells whether ranges "a..b step c" are allowed.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Option:
 
 
 def exact(name: str, help: str, *, zero: bool = True) -> Option:
-    """A rational number: canonical is its text in lowest terms."""
+    """Return an option whose value is a rational number; its canonical form is text in lowest terms."""
 
     def read(value: Any) -> str:
         number = number_of(value)
@@ -58,17 +58,17 @@ def exact(name: str, help: str, *, zero: bool = True) -> Option:
     return Option(name, help, read, parse_number, numbers=True)
 
 
-def whole(name: str, help: str, least: int = 0, most: int = _LARGEST) -> Option:
-    """A whole number from `least` to `most`."""
+def integer(name: str, help: str, least: int = 0, most: int = _MAX_INTEGER) -> Option:
+    """Return an option whose value is an integer from `least` to `most`."""
 
     def read(value: Any) -> int:
-        return _whole(value, f"a whole number from {least} to {most}", range(least, most + 1))
+        return _integer(value, f"an integer from {least} to {most}", range(least, most + 1))
 
     return Option(name, help, read, int, numbers=True)
 
 
 def flag(name: str, help: str) -> Option:
-    """true or false."""
+    """Return an option whose value is true or false."""
 
     def read(value: Any) -> bool:
         if not isinstance(value, bool):
@@ -79,7 +79,7 @@ def flag(name: str, help: str) -> Option:
 
 
 def choice(name: str, help: str, words: Sequence[str]) -> Option:
-    """One of some words."""
+    """Return an option whose value is one of some words."""
 
     def read(value: Any) -> str:
         if value not in words:
@@ -90,7 +90,7 @@ def choice(name: str, help: str, words: Sequence[str]) -> Option:
 
 
 def point(name: str, help: str, most: int | None = None) -> Option:
-    """Numbers separated by commas, in one text: a list would be several values."""
+    """Return an option whose value is a text of numbers separated by commas; a list would mean several values."""
 
     def read(value: Any) -> str:
         numbers = parse_point(_text(value, 'numbers separated by commas in one text, e.g. "1/2,-1/3"'))
@@ -101,15 +101,15 @@ def point(name: str, help: str, most: int | None = None) -> Option:
     return Option(name, help, read, parse_point)
 
 
-def whole_numbers(name: str, help: str, expected: str, allowed: Sequence[int], ordered: bool = False) -> Option:
-    """Whole numbers separated by commas, in one text; a single one may stand without quotes.
+def integers(name: str, help: str, expected: str, allowed: Sequence[int], ordered: bool = False) -> Option:
+    """Return an option whose value is a text of integers separated by commas, or a single integer.
 
-    Without `ordered` they are a set: canonical is then in increasing order, every number once.
+    Unless `ordered` they form a set, whose canonical form is increasing and without repetitions.
     """
 
     def read(value: Any) -> str:
         given = parse_point(value) if isinstance(value, str) else (value,)
-        numbers = [_whole(number, f"{expected}, separated by commas in one text", allowed) for number in given]
+        numbers = [_integer(number, f"{expected}, separated by commas in one text", allowed) for number in given]
         return ",".join(map(str, numbers if ordered else sorted(set(numbers))))
 
     return Option(name, help, read, lambda value: tuple(int(number) for number in value.split(",")))
@@ -128,14 +128,14 @@ def _read_arithmetic(value: Any) -> str:
 
 def _read_prime(value: Any) -> str:
     expected = f"a prime of at most {_PRIME_BITS} bits"
-    number = _whole(value, expected, range(2, 1 << _PRIME_BITS))
+    number = _integer(value, expected, range(2, 1 << _PRIME_BITS))
     GF(number)
-    return str(number)  # not an integer: JSON and databases may hold no long ones
+    return str(number)  # as text: JSON and databases may not hold long integers
 
 
 def _read_names(value: Any) -> str:
     if "eps" in (found := _read_names_or_eps(value)).split(","):
-        raise InputError("found eps, expected names of parameters: without a value of eps it is in all formulas")
+        raise InputError("found eps, expected names of parameters: eps is symbolic whenever it has no value")
     return found
 
 
@@ -161,7 +161,7 @@ def _text(value: Any, expected: str) -> str:
     return value
 
 
-def _whole(value: Any, expected: str, allowed: Sequence[int]) -> int:
+def _integer(value: Any, expected: str, allowed: Sequence[int]) -> int:
     number = number_of(value)
     if number.q != 1 or int(number.p) not in allowed:
         raise InputError(f"found {show(number)}, expected {expected}")
@@ -169,31 +169,31 @@ def _whole(value: Any, expected: str, allowed: Sequence[int]) -> int:
 
 
 def number_of(value: Any) -> fmpq:
-    """The exact number that a value of a spec spells. Raises InputError for tables, lists, dates and flags."""
+    """Return the exact number given by a value of a spec. Raises InputError for tables, lists, dates and flags."""
     if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
         raise InputError(f"found {show(value)}, expected a number")
     return rational(value)
 
 
 def read_time(value: Any) -> float | None:
-    """Seconds, from a number or a text such as "90 s", "5 min", "2 h"; "none" for no limit.
+    """Return seconds from a number or a text such as "90 s", "5 min", "2 h"; None for "none".
 
     >>> read_time("1.5 min"), read_time("none")
     (90.0, None)
     """
     expected = "seconds, or a text like 90 s, 5 min, 2 h, none"
-    found = _with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MOST_SECONDS)
+    found = _with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MAX_SECONDS)
     return None if found is None else float(found)
 
 
 def read_memory(value: Any) -> int | None:
-    """Bytes, from a number or a text such as "500 MB", "2 GiB"; "none" for no limit.
+    """Return bytes from a number or a text such as "500 MB", "2 GiB"; None for "none".
 
     >>> read_memory("1.5 GB")
     1500000000
     """
     expected = "bytes, or a text like 500 MB, 2 GB, 1 GiB, none"
-    found = _with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MOST_BYTES)
+    found = _with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MAX_BYTES)
     return None if found is None else int(found)
 
 
@@ -212,65 +212,70 @@ def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fract
 
 
 EFFORT = "effort"
-OTHER = "other"  # read by the spec, which knows where files are; canonical is a recipe like that of the system
+OTHER = "other"  # read by the spec, which resolves paths; its canonical form is a system spec
 
 VOCABULARY = {
     option.name: option
     for option in (
-        exact("eps", "the paper's epsilon; the time step is 2 eps", zero=False),
-        exact("eps2", "another eps for the second map", zero=False),
+        exact("eps", "half the time step (exact number): h = 2 eps", zero=False),
+        exact("eps2", "half the time step of the second map", zero=False),
         Option(OTHER, "a second system: a file or a name of the catalogue", str, str),
-        point("start", "where the orbit starts (default: drawn from the seed)"),
-        whole("steps", "steps of the orbit", most=10**9),
-        whole("orbits", "how many orbits", 1, 10**6),
-        exact("box", "coordinates of random starts are drawn from -R to R"),
-        whole("every", "take every so many steps only", 1, 10**9),
-        whole_numbers("at", "iterates to reach directly", "whole numbers from 0 to 10^18", range(10**18 + 1)),
-        whole("seed", "seed of everything drawn at random"),
-        whole("error_bits", "random points until the probability of error is below 2^-BITS", 1, 10_000),
-        whole("max_digits", "digit budget of exact orbits", least=1),
-        choice("method", "how an exact orbit is computed", ("generic", "normal-form", "doubling")),
+        point("start", "initial point of the orbit (default: random)"),
+        integer("steps", "number of steps of the orbit", most=10**9),
+        integer("orbits", "number of orbits", 1, 10**6),
+        exact("box", "bound R for the coordinates of random initial points, from -R to R"),
+        integer("every", "use every N-th step only", 1, 10**9),
+        integers("at", "iterates to compute directly", "integers from 0 to 10^18", range(10**18 + 1)),
+        integer("seed", "random seed"),
+        integer("error_bits", "test random points until the error probability is below 2^-BITS", 1, 10_000),
+        integer("max_digits", "digit budget of exact orbits", least=1),
+        choice("method", "method of exact orbits", ("generic", "normal-form", "doubling")),
         Option("arithmetic", "exact, float, mod:P or ball:BITS", _read_arithmetic, str),
-        Option("prime", "the prime of modular arithmetic", _read_prime, int),
-        whole_numbers(
+        Option("prime", "prime of modular arithmetic", _read_prime, int),
+        integers(
             "sections",
-            "sections of the paper, 1 to 9, 10: beyond the paper",
-            "whole numbers from 1 to 10",
+            "sections of the paper, 1 to 9; 10 is beyond the paper",
+            "integers from 1 to 10",
             range(1, 11),
         ),
-        whole("order", "order in eps^2 of the series of the integrals", 1, 20),
-        whole("ball_bits", "also over complex balls of so many bits", 32, 100_000),
-        flag("controls", "run every claim on input that breaks one hypothesis"),
-        flag("report", "keep the whole report, as --json prints it"),
-        whole("m", "half the dimension", 1, 16),
-        whole(EFFORT, "how much work: each more doubles it, each less halves it", LEAST_EFFORT, MOST_EFFORT),
-        whole("terms", "measure so many degrees (default: until a recurrence is certain)", 1, 10_000),
-        whole("max_degree", "the largest degree that is tried", most=10**6),
-        Option("symbolic", "parameters that formulas contain, e.g. a1,a2", _read_names, lambda text: text.split(",")),
+        integer("order", "order in eps^2 of the series of the integrals", 1, 20),
+        integer("ball_bits", "also compute over complex balls of so many bits", 32, 100_000),
+        flag("controls", "also check every claim on input that violates one hypothesis"),
+        flag("report", "store the full report, as printed by --json"),
+        integer("m", "half the dimension", 1, 16),
+        integer(EFFORT, "work limit of the search: each increment by 1 doubles it", LEAST_EFFORT, MOST_EFFORT),
+        integer("terms", "compute so many degrees (default: until a recurrence is certain)", 1, 10_000),
+        integer("max_degree", "largest degree to try", most=10**6),
+        Option(
+            "symbolic",
+            "parameters that stay symbolic in formulas, e.g. a1,a2",
+            _read_names,
+            lambda text: text.split(","),
+        ),
         Option("over", "parameters that vary, e.g. a1,a2", _read_names_or_eps, lambda text: text.split(",")),
-        choice("by", "what a scan looks for: smaller degrees", ("degrees",)),
-        whole_numbers(
-            "primes", "modulo which members are tried, three at least", "primes from 5 on", range(5, 1 << 13)
+        choice("by", "criterion of a scan: smaller degrees", ("degrees",)),
+        integers(
+            "primes", "primes modulo which members are tried, at least three", "primes from 5 on", range(5, 1 << 13)
         ),
         choice("shape", "linear: g = B f with a constant B; quadratic: any g", ("linear", "quadratic")),
-        whole("samples", "follow so many random points instead of all", 1, 100_000),
-        whole("transient", "steps before those that count (default: a tenth)", most=10**9),
+        integer("samples", "follow so many random points instead of all points", 1, 100_000),
+        integer("transient", "initial steps to discard (default: a tenth)", most=10**9),
     )
 }
 
 DRAWS = ("eigenvalues", "generic")
-# What a random member of the family is drawn with; the seed is the one of VOCABULARY.
+# Options of a random member of the family; its seed is that of VOCABULARY.
 FAMILY = {
     option.name: option
     for option in (
         VOCABULARY["m"],
         choice("draw", "eigenvalues (the default): distinct integers; generic: a random integer chi", DRAWS),
         point("eigenvalues", "the eigenvalues of A", MAX_M),
-        Option("chi", "chi itself, a polynomial in t", _read_chi, parse_chi),
-        whole("size", "bound for the integer coefficients drawn (default 2, or 1 for generic and chi)", 1, 10**6),
-        whole_numbers(
+        Option("chi", "the polynomial chi in t", _read_chi, parse_chi),
+        integer("size", "bound for the random integer coefficients (default 2, or 1 for generic and chi)", 1, 10**6),
+        integers(
             "signs",
-            "which associated system: 1 or -1 for each factor of chi",
+            "signs of the associated system: 1 or -1 for each factor of chi",
             "1 or -1",
             (1, -1),
             ordered=True,

@@ -1,19 +1,19 @@
-"""The tasks a batch can do: functions that register themselves, and whose signature says what they can be asked.
+"""The tasks of batches: functions that are registered by a decorator, with options given by their signatures.
 
     @task("family-space", needs=MEMBER)
     def family_space(system: SystemFile) -> Result:
         '''The space of cubics that belong to A.'''
 
-The names of the parameters are names of `options.VOCABULARY`; a default makes an option optional, and `system`, if
-it is there, is the system. A result is plain data; "verdict" in it becomes the verdict of the record. What a function
-of the laboratory finds, with these options and these defaults, is a task that only says what is kept of it:
+The parameters are names of `options.VOCABULARY`, optional if they have a default; `system`, if present, is the system.
+A result is plain data; its "verdict" becomes the verdict of the record. A task of the laboratory only summarizes the
+result of a function, which is called with these options and defaults:
 
     @analysis("find-density", "preserve.densities:find_densities", eps=None, effort=1, seed=0)
     def density(found: DensitySearch) -> Result:
         '''The densities phi for which the measure dx/phi is invariant.'''
 
-Tasks of one's own live in modules named in the environment variable KAHANMAPS_TASKS (separated by commas), which every
-child imports.
+Tasks of users are in modules named in the environment variable KAHANMAPS_TASKS (separated by commas), which each
+worker process imports.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ ENVIRONMENT = "KAHANMAPS_TASKS"
 LIBRARY = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks"))
 REPORT = "report"
 Result = dict[str, Any]
-Whole = tuple[Result, Any]  # a result and what it is of, of which `to_json` says all
-Function = Callable[..., Result | Whole]
+FullResult = tuple[Result, Any]  # a result, and the object whose `to_json` gives the full report
+Function = Callable[..., Result | FullResult]
 Summary = Callable[[Any], Result]
-ARGUMENTS = {"symbolic": "symbols", "terms": "max_terms"}  # options that the laboratory calls otherwise
+ARGUMENTS = {"symbolic": "symbols", "terms": "max_terms"}  # options with another name in the laboratory
 
-# What a task needs its system to be.
+# The kind of system that a task needs.
 SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
 
 
 @dataclass(frozen=True)
 class TaskKind:
-    """A kind of task: its name, what it does in a sentence, its options with their defaults, what it needs."""
+    """A kind of task: name, summary, function, options with defaults, and the kind of system it needs."""
 
     name: str
     summary: str
@@ -59,25 +59,25 @@ class TaskKind:
         return tuple(name for name in self.options if name not in self.defaults)
 
     def perform(self, system: Any, options: Mapping[str, Any]) -> Result:
-        """Do it: `options` are canonical, `other` a system already made."""
+        """Perform the task; `options` are canonical, and `other` is a system."""
         options = dict(options)
-        is_whole = self.reports and options.pop(REPORT, False)
+        is_full = self.reports and options.pop(REPORT, False)
         made = {
             name: value if value is None or name == OTHER else self.options[name].make(value)
             for name, value in options.items()
         }
-        if "eps" in self.required and made.get("eps") is None:  # left out for maps that do not depend on it
+        if "eps" in self.required and made.get("eps") is None:  # omitted for maps that do not depend on eps
             made["eps"] = self.options["eps"].make("1")
         result = self.function(**made) if self.needs is None else self.function(system, **made)
         if isinstance(result, tuple):
-            result, found = result
-            result |= {REPORT: found.to_json()} if is_whole else {}
+            result, reported = result
+            result |= {REPORT: reported.to_json()} if is_full else {}
         return result
 
 
-def fields(found: Any, *names: str) -> Result:
-    """These attributes of what was found, by their names."""
-    return {name: getattr(found, name) for name in names}
+def fields(result: Any, *names: str) -> Result:
+    """Return attributes of a result by their names."""
+    return {name: getattr(result, name) for name in names}
 
 
 _KINDS: dict[str, TaskKind] = {}
@@ -86,10 +86,10 @@ _KINDS: dict[str, TaskKind] = {}
 def task(
     name: str, needs: str = SYSTEM, *, options: Mapping[str, Any] | None = None, reports: bool = False
 ) -> Callable[[Function], Function]:
-    """Register a function as a kind of task. Raises TypeError for a parameter that is no known option.
+    """Register a function as a kind of task. Raises TypeError for an unknown parameter.
 
-    `options` with their defaults stand for the signature of a function that takes any: its system, and these by name.
-    One that `reports` returns what it found beside the result: it is kept as "report" where that option asks for it.
+    `options` with their defaults replace the signature of a function with arbitrary keywords. A function that `reports`
+    returns a pair of a result and its full report, which the option "report" stores.
     """
 
     def register(function: Function) -> Function:
@@ -102,8 +102,10 @@ def task(
         unknown = [key for key in names if key not in VOCABULARY]
         if unknown:
             raise TypeError(f"task {name}: {unknown[0]} is not an option{suggestion(unknown[0], list(VOCABULARY))}")
-        if name in _KINDS and _KINDS[name].function.__code__ != function.__code__:  # equal: imported a second time
-            raise TypeError(f"there are two tasks of the name {name}")
+        if (
+            name in _KINDS and _KINDS[name].function.__code__ != function.__code__
+        ):  # equal if the module is imported twice
+            raise TypeError(f"there are two tasks with the name {name}")
         if reports:
             names, defaults[REPORT] = [*names, REPORT], False
         known = {key: VOCABULARY[key] for key in names}
@@ -117,19 +119,19 @@ def task(
 def analysis(
     name: str, function: str, of: str = "", renamed: Mapping[str, str] = ARGUMENTS, **defaults: Any
 ) -> Callable[[Summary], Summary]:
-    """Register what a function of the laboratory ("module:name", loaded when it is called) finds, as a kind of task.
+    """Register a function of the laboratory ("module:name", imported when it is called) as a kind of task.
 
-    It is given the file of the system, or this attribute of it, and the options, some `renamed`. Their `defaults` stand
-    here, not in the library, since they belong to the keys of tasks.
+    Its arguments are the system file, or the attribute `of` of it, and the options, some `renamed`. Their `defaults`
+    are given here and not in the library, since they enter the keys of tasks.
     """
 
     def register(summarize: Summary) -> Summary:
-        def perform(system: Any, **options: Any) -> Whole:
+        def perform(system: Any, **options: Any) -> FullResult:
             module, _, attribute = function.partition(":")
-            asked = getattr(system, of) if of else system
+            argument = getattr(system, of) if of else system
             given = {renamed.get(key, key): value for key, value in options.items() if value is not None}
-            found = getattr(import_module(f"kahanmaps.laboratory.{module}"), attribute)(asked, **given)
-            return summarize(found), found
+            result = getattr(import_module(f"kahanmaps.laboratory.{module}"), attribute)(argument, **given)
+            return summarize(result), result
 
         perform.__doc__, perform.__module__ = summarize.__doc__, summarize.__module__
         task(name, options=defaults, reports=True)(perform)
@@ -145,9 +147,9 @@ def task_kinds() -> Mapping[str, TaskKind]:
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):
         try:
             import_module(module)
-        except Exception as error:  # it is somebody's module: whatever it raises
-            told = f"{type(error).__name__}: {error}"
-            raise InputError(f"{ENVIRONMENT} names the module {module}, which cannot be imported: {told}") from error
+        except Exception as error:  # a module of a user may raise anything
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(f"{ENVIRONMENT} names the module {module}, which cannot be imported: {reason}") from error
     return _KINDS
 
 

@@ -36,7 +36,7 @@ from kahanmaps.experiments.experiment import Experiment, ExperimentReader, SpecD
 MAX_BYTES = 4_000_000
 MAX_TASKS = 1_000_000
 EXPERIMENT_NAME = r"[A-Za-z0-9_.+-]{1,80}"
-_LARGEST_TOLD = 3
+_MAX_LISTED = 3
 
 
 class SpecError(SystemFileError):
@@ -102,9 +102,9 @@ def parse_spec(
     spec = Spec(document.sound("name") or "", tuple(experiments), document.documents)
     if spec.size > max_tasks:
         largest = sorted(experiments, key=lambda experiment: -experiment.size)
-        told = ", ".join(f"{experiment.name} has {experiment.product}" for experiment in largest[:_LARGEST_TOLD])
-        more = f" and {len(largest) - _LARGEST_TOLD} more" if len(largest) > _LARGEST_TOLD else ""
-        sentence = f"found {spec.size:,} tasks, expected at most {max_tasks:,} (--max-tasks allows more): {told}{more}"
+        sizes = ", ".join(f"{experiment.name} has {experiment.product}" for experiment in largest[:_MAX_LISTED])
+        more = f" and {len(largest) - _MAX_LISTED} more" if len(largest) > _MAX_LISTED else ""
+        sentence = f"found {spec.size:,} tasks, expected at most {max_tasks:,} (--max-tasks allows more): {sizes}{more}"
         document.mistake("experiments", sentence)
     if document.mistakes:
         raise SpecError(where, document.mistakes)

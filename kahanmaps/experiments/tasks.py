@@ -1,7 +1,7 @@
-"""The tasks that the library has. One function is one task; `registry.task` says what its signature means.
+"""The tasks of checks, the paper, members and orbits, one function each.
 
-Results are small: counts, verdicts, numbers, and what a refutation needs to be believed. `report = true` keeps all that
-`--json` would print.
+Results are small: counts, verdicts, numbers, and the witnesses of refutations. `report = true` stores the full report,
+as printed by `--json`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.checks.table import CHECKS, Check
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, SYSTEM, Result, Whole, fields, task
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, SYSTEM, FullResult, Result, fields, task
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.heights import height_growth
@@ -31,19 +31,19 @@ from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, OrbitPoint
 from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import orbit as find_orbit
 
-_WORTH_COMPILING = 5_000_000  # orbits times steps
-_LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash
+_MIN_COMPILED = 5_000_000  # orbits times steps
+_MAX_POINT = 400  # characters of a last point; of a longer one only the hash is stored
 
 
 _CHECKED = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
 def _checked(check: Check) -> None:
-    """The task of a check, with the usual settings; of one system, or of a pair at two time steps."""
+    """Register the task of a check of one system, or of a pair at two time steps."""
 
-    def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> Whole:
-        is_asked = options["start"] is not None or options["steps"] != Settings.steps
-        settings = Settings(**options, orbit_is_asked=is_asked)
+    def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
+        is_requested = options["start"] is not None or options["steps"] != Settings.steps
+        settings = Settings(**options, orbit_is_asked=is_requested)
         return _of_report(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
 
     perform.__doc__ = check.for_batch or check.question
@@ -65,8 +65,8 @@ def verify_member(
     controls: bool = False,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-) -> Whole:
-    """Every statement of the paper, for one member of the family."""
+) -> FullResult:
+    """Check every statement of the paper for a member of the family."""
     from kahanmaps.paper.verify import VerifyOptions, verify
 
     settings = Settings(eps=eps, seed=seed, error_bits=error_bits)
@@ -81,8 +81,8 @@ def verify_in_general(
     controls: bool = False,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
-) -> Whole:
-    """Every statement of the paper, for the member in general."""
+) -> FullResult:
+    """Check every statement of the paper for the generic member."""
     from kahanmaps.paper.verify import VerifyOptions, verify
 
     settings = Settings(seed=seed, error_bits=error_bits)
@@ -91,7 +91,7 @@ def verify_in_general(
 
 @task("family-space", needs=MEMBER)
 def family_space(system: SystemFile) -> Result:
-    """The space of cubics that belong to A, and how many associated systems there are."""
+    """Compute the space of cubics that belong to A and the number of associated systems."""
     member = system.member
     if member is None:
         raise InputError(f"{system.name} is of kind [{system.kind}], expected one of kind [family]")
@@ -117,12 +117,12 @@ def orbit(
     max_digits: int = DEFAULT_MAX_DIGITS,
     seed: int = 0,
 ) -> Result:
-    """A summary of an orbit: how it ended, its period, how long its numbers are, its last point."""
+    """Compute an orbit: how it ended, its period, digits and last point."""
     point = _drawn(system, seed) if start is None else start
     numbers = Arithmetic.parse(arithmetic)
     if numbers.kind == "float" and at is not None:
         raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
-    normal_form: SystemNormalForm | NoNormalForm = NoNormalForm("as asked for")
+    normal_form: SystemNormalForm | NoNormalForm = NoNormalForm("as requested")
     if method != "generic" and system.is_quadratic:
         normal_form = _float_normal_form(system, method) if numbers.kind == "float" else system.normal_form
     walk = find_orbit(
@@ -137,7 +137,7 @@ def orbit(
         normal_form=normal_form,
     )
     reached = deque(walk, 1)
-    if not reached:  # of iterates reached directly there may be none
+    if not reached:  # perhaps none of the requested iterates was reached
         first = walk.orbit.start
         exact = numbers.kind == "exact"
         reached.append(OrbitPoint(0, numbers.field, IntegerPoint.from_rationals(first) if exact else first))
@@ -153,9 +153,9 @@ def orbit(
     if numbers.kind != "float":
         result["period"] = end.period
     text = ",".join(last.text)
-    if len(text) <= _LONGEST_POINT:
+    if len(text) <= _MAX_POINT:
         result["last"] = text
-    result["last_sha256"] = sha256(text.encode()).hexdigest()  # tells whether two computations agree
+    result["last_sha256"] = sha256(text.encode()).hexdigest()  # to compare two computations
     if numbers.kind == "exact":
         result["digits"] = last.digits
     return result
@@ -171,7 +171,7 @@ def ensemble(
     method: str | None = None,
     seed: int = 0,
 ) -> Result:
-    """Float orbits from random starts: how many are completed, how far the integrals of the planes drift."""
+    """Compute floating-point orbits from random initial points; count how many complete, and measure drift."""
     from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
     from kahanmaps.maps.floats.fast import to_floats
 
@@ -179,8 +179,8 @@ def ensemble(
     normal_form = _float_normal_form(system, method)
     chosen = choose_method(method, "float", normal_form, None)
     form = normal_form.form if chosen.name == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
-    # The kernel makes no difference to the numbers, and compiling one takes longer than a short task.
-    kernel = "numpy" if orbits * steps < _WORTH_COMPILING else None
+    # Both kernels give the same numbers, but compiling one takes longer than a short task.
+    kernel = "numpy" if orbits * steps < _MIN_COMPILED else None
     run = FloatEnsemble(system.map, eps, starts, form=form, kernel=kernel, threads=1)
     run.advance(steps)
     words, counts = run.status.tolist(), Counter(run.status.tolist())
@@ -203,24 +203,24 @@ def heights(
     max_digits: int = DEFAULT_MAX_DIGITS,
     seed: int = 0,
 ) -> Result:
-    """How fast the numbers of an orbit grow: the kind of growth, and its constant."""
+    """Measure the growth of the heights along an orbit: its kind and constant."""
     point = _drawn(system, seed) if start is None else start
     growth = height_growth(
         system.map.at(eps), point, steps, normal_form=system.normal_form, every=every, max_digits=max_digits
     )
-    found = growth.to_json()
+    record = growth.to_json()
     return {
         "start": format_point(point),
-        "growth": found.pop("kind"),
-        "reached": found.pop("steps"),
-        "ending": found.pop("message"),
-        **{name: value for name, value in found.items() if name != "every"},
+        "growth": record.pop("kind"),
+        "reached": record.pop("steps"),
+        "ending": record.pop("message"),
+        **{name: value for name, value in record.items() if name != "every"},
     }
 
 
 @task("period")
 def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = None, seed: int = 0) -> Result:
-    """The exact period of an orbit of a member of the family, modulo a prime or over the rationals."""
+    """Compute the exact period of an orbit of a member of the family, modulo a prime or over Q."""
     normal_form = system.normal_form
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"no period of {system.name} can be computed: {normal_form.reason}")
@@ -236,12 +236,12 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 
 def _drawn(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
-    """A start for the system: one of the seed alone could lie on a curve on which the system is made to be special."""
+    """Return a random initial point that depends on the system too: a fixed one may be special for some systems."""
     return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
 
 
-def _of_report(report: Report) -> Whole:
-    """The verdict, how many claims have which, and every claim that does not hold, with its witness."""
+def _of_report(report: Report) -> FullResult:
+    """Return the verdict, the counts of verdicts, and the refuted or undecided claims with their witnesses."""
     counted = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in counted)
     controls = [finding for finding in report.findings if finding.control]
@@ -259,7 +259,7 @@ def _of_report(report: Report) -> Whole:
 
 
 def _float_normal_form(system: SystemFile, method: str | None) -> SystemNormalForm | NoNormalForm:
-    normal_form = NoNormalForm("as asked for") if method == "generic" else system.normal_form
+    normal_form = NoNormalForm("as requested") if method == "generic" else system.normal_form
     if isinstance(normal_form, SystemNormalForm) and normal_form.T is not None:
-        return NoNormalForm("in machine numbers only J = [[0, I], [-I, 0]] has one")
+        return NoNormalForm("floating-point normal forms exist for J = [[0, I], [-I, 0]] only")
     return normal_form

@@ -18,7 +18,7 @@ from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.algebra.printing import format_polynomial, format_univariate
 from kahanmaps.algebra.roots import MAX_DEGREE, Root
-from kahanmaps.displayed import Displayed
+from kahanmaps.display_protocols import HtmlDisplay
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.cubics import chain
 from kahanmaps.family.skew_hamiltonian import Factor, chi, evaluate_at_matrix, factors_of_chi, require_skew_hamiltonian
@@ -27,7 +27,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 @dataclass(frozen=True, eq=False)
-class AssociatedSystem(Displayed):
+class AssociatedSystem(HtmlDisplay):
     """f_s = B^T f_0: the signs, the matrix B with its coefficients as a polynomial in A, and the cubic K."""
 
     signs: tuple[int, ...]
@@ -88,7 +88,7 @@ class ConjugateAssociate:
 
 
 @dataclass(frozen=True, eq=False)
-class FamilyMember(Displayed):
+class FamilyMember(HtmlDisplay):
     """A skew-Hamiltonian A, a cubic H of its space, and signs that pick one associated system (all + : f_0 itself).
 
     Raises HypothesisError where A is not skew-Hamiltonian or H not in its space.

@@ -28,7 +28,7 @@ from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.printing import format_number, format_polynomial
-from kahanmaps.displayed import Displayed
+from kahanmaps.display_protocols import HtmlDisplay
 from kahanmaps.errors import HypothesisError, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import third_derivatives
@@ -77,7 +77,7 @@ class PlanarPart:
 
 
 @dataclass(frozen=True, eq=False)
-class NormalForm(Displayed):
+class NormalForm(HtmlDisplay):
     """x' = J grad H(x) as one planar system over K = Q[t]/chi: x = S z, and H(x) = l(h(X, Y)); see the module.
 
     Made by `normal_form`. That it is the system, exactly, is verified at construction.

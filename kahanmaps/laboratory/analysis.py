@@ -20,7 +20,7 @@ from typing import Any
 from kahanmaps.algebra.printing import attributes, format_polynomial
 from kahanmaps.algebra.work import SPENT, Budget, units_at
 from kahanmaps.checks.claims import Certainty
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.laboratory.analyses.part import Part, Run
@@ -39,7 +39,7 @@ _MOST_UNITS = 150e6
 
 
 @dataclass
-class Analysis(Findings, Printed):
+class Analysis(Findings, PrintableResult):
     """What `analyze` found, and statements about it."""
 
     parts: tuple[Part, ...] = ANALYSES

@@ -20,7 +20,7 @@ from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, integer, rational
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.printing import all_fields
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps.convention import resolve_eps
@@ -37,7 +37,7 @@ DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3",
 
 
 @dataclass(frozen=True)
-class Census(Printed):
+class Census(PrintableResult):
     """What becomes of the points of P^n over GF(p) under a map at one eps (half the time step); exact counts.
 
     `lengths` is the number of cycles by length if all points were looked at (`complete`), else the number of sampled

@@ -23,7 +23,7 @@ Rows = list[tuple[str, str]]
 def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
     """The document as text: a display for each of the parts (of `convert.PARTS`), in LaTeX with amsmath.
 
-    Raises InputError where the closed form of the map is asked for and too large.
+    Raises InputError where the closed form of the map is requested and too large.
     """
     lines = [f"% {line}" for line in formulas.header(command)]
     lines += [r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks"]
@@ -118,7 +118,7 @@ def _matrix(matrix: fmpq_mat) -> str:
 def _label(name: str) -> str:
     r"""The name of an integral, any printable text: as text where TeX's marks for it are none of math mode.
 
-    Letters that are not ASCII are told by their numbers, for not every TeX has them.
+    Letters that are not ASCII are written as numbers, since not every TeX has them.
 
     >>> print(_label("F1"), _label("a_b"), _label("H~ é"))
     F_1 \mathrm{a\_b} \text{H\textasciitilde{} [U+00E9]}

@@ -33,7 +33,7 @@ from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring
 from kahanmaps.algebra.printing import format_polynomial, format_rational_function
 from kahanmaps.algebra.roots import Root
-from kahanmaps.displayed import DisplayedAsFormula
+from kahanmaps.display_protocols import LatexDisplay
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.equation import Equation, equation_of
 from kahanmaps.maps.inverse import Rows, inverse_rows, why_not_birational
@@ -319,7 +319,7 @@ def det_of(name: str) -> str:
     return f"det({name})" if " " in name else f"det {name}"
 
 
-class MapFamily(DisplayedAsFormula, ABC):
+class MapFamily(LatexDisplay, ABC):
     """A birational map over Q in named variables, which may depend on eps and on symbols: numbers without a value."""
 
     variables: tuple[str, ...]

@@ -24,7 +24,7 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.displayed import DisplayedAsFormula
+from kahanmaps.display_protocols import LatexDisplay
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.equation import Equation
@@ -49,7 +49,7 @@ SystemLike: TypeAlias = (
 )
 
 
-class KahanMap(DisplayedAsFormula, ElementaryMap):
+class KahanMap(LatexDisplay, ElementaryMap):
     """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.

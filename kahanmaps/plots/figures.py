@@ -17,14 +17,16 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
+from kahanmaps.algebra.parsing import is_name, parse_rational_function
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.atomic_files import write_atomically
-from kahanmaps.display.latex import latex_name
+from kahanmaps.display.latex import LATEX, latex_name
 from kahanmaps.errors import InputError
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, Style
 from kahanmaps.version import __version__
@@ -34,15 +36,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FORMATS = ("pdf", "svg", "png")
-# More points than this are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
-RASTERISE_ABOVE = 20_000
-_LETTER = 0.5  # the width of a letter on average, in its height
+# More points are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
+MAX_VECTOR_POINTS = 20_000
+LETTER_WIDTH = 0.5  # mean width of a letter, in units of its height
 _MAX_DIGITS = 40  # of a number in a label
-_BAND_COLOUR, _BAND_SHARE = "#e8e8e8", 0.09  # where a logarithmic axis shows zeros; of its height
+_MAX_FORMULA = 60  # characters of an expression that is typeset
+_BAND_COLOR, _BAND_SHARE = "#e8e8e8", 0.09  # of the band for zeros on a logarithmic axis; part of the height
 _MAX_TICKS = 6
-_HANDLE = 5.0  # of a legend, the line or mark with the space around it, in heights of a letter
-# Where programs show the version, the command and the system; dates are left out, so that the same picture is the same
-# file.
+_HANDLE_WIDTH = 5.0  # of a line or mark in a legend with the space around it, in heights of a letter
+_ON_ONE_LINE = replace(
+    LATEX,
+    enclosed="({})".format,
+    fraction=lambda numerator, denominator: f"{_in_brackets(numerator)} / {_in_brackets(denominator)}",
+)
+# The keys of the metadata for version, command and system; without dates, so that equal pictures are equal files.
 _METADATA: dict[str, tuple[tuple[str, str, str], dict[str, Any]]] = {
     "pdf": (("Creator", "Subject", "Keywords"), {"CreationDate": None}),
     "svg": (("Creator", "Description", "Source"), {"Date": None}),
@@ -51,7 +58,7 @@ _METADATA: dict[str, tuple[tuple[str, str, str], dict[str, Any]]] = {
 
 
 def require_matplotlib() -> None:
-    """Raise InputError with the remedy where matplotlib is missing."""
+    """Raise InputError that says how to install matplotlib where it is missing."""
     try:
         import matplotlib.figure  # noqa: F401 (whether it is there)
     except ModuleNotFoundError as error:
@@ -60,7 +67,7 @@ def require_matplotlib() -> None:
 
 @contextmanager
 def drawing(style: Style) -> Iterator[None]:
-    """Inside, matplotlib has its own defaults and those of the style; afterwards whatever it had before.
+    """Use matplotlib's own defaults and those of the style within the context; restore the user's settings afterwards.
 
     Raises InputError where matplotlib is missing.
     """
@@ -69,51 +76,101 @@ def drawing(style: Style) -> Iterator[None]:
     import matplotlib.style
 
     with mpl.rc_context():
-        mpl.rcdefaults()  # nothing of a user's matplotlibrc gets through
+        mpl.rcdefaults()  # ignore the user's matplotlibrc
         with as_file(files("kahanmaps.plots") / "pictures.mplstyle") as path:
             mpl.style.use([path, style.settings()])
         yield
 
 
 def new_figure(style: Style, aspect: float = 0.75) -> Figure:
-    """An empty figure in the size of the style; `aspect` is height over width where the style has no height."""
+    """Return an empty figure in the size of the style; `aspect` is height over width where the style has no height."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=style.inches(aspect), layout="compressed")
 
 
-def label_of(name: str) -> str:
-    r"""A variable, parameter or other name as a label of a picture.
+def label_of(text: str) -> str:
+    r"""Return a name, an expression or an equation as a label, typeset in matplotlib's mathtext where possible.
 
-    >>> label_of("x1"), label_of("eps"), label_of("p_a$")
-    ('$x_1$', '$\\varepsilon$', 'p_a\\$')
+    The final digits of a name become its index. After an underscore comes the index of a letter (p_a), or a symbol
+    after a word (modified_H). Text that is long or cannot be parsed as a formula is returned as plain text.
+
+    >>> label_of("x1"), label_of("eps"), label_of("p_a"), label_of("modified_H"), label_of("p_a$")
+    ('$x_1$', '$\\varepsilon$', '$p_{a}$', 'modified $H$', 'p_a\\$')
+    >>> label_of("(1 - F1)/eps^2"), label_of("b1^2 - b2/3 = 0")
+    ('$-(F_1 - 1) / \\varepsilon^2$', '$b_1^2 - \\frac{1}{3} b_2 = 0$')
     """
-    latex = latex_name(name)
-    if latex.startswith(r"\mathrm"):  # matplotlib reads less than TeX: such names stay text
-        return name.replace("$", r"\$")
-    return f"${latex}$"
+    if " = " in text:
+        sides = [label_of(side) for side in text.split(" = ")]
+        if all(side.startswith("$") and side.count("$") == 2 for side in sides):
+            return "$" + " = ".join(side.strip("$") for side in sides) + "$"
+        return plain(text)
+    if not is_name(text):
+        return _label_of_expression(text)
+    latex = latex_name(text)
+    if "mathrm" not in latex:
+        return f"${latex}$"
+    first, *others = text.split("_")
+    symbols = [latex_name(part) if part else r"\mathrm" for part in (first, *others)]
+    if not others or any("mathrm" in symbol for symbol in symbols):
+        return plain(text)
+    if _is_word(first):
+        parts = [
+            part if _is_word(part) else f"${symbol}$" for part, symbol in zip((first, *others), symbols, strict=True)
+        ]
+        return " ".join(parts)
+    indices = [
+        rf"\mathrm{{{part}}}" if _is_word(part) else symbol for part, symbol in zip(others, symbols[1:], strict=True)
+    ]
+    return f"${symbols[0]}_{{{','.join(indices)}}}$"
+
+
+def _is_word(text: str) -> bool:
+    """Whether letters are a word, as in modified_H: not a symbol, such as x, al, or the name of a Greek letter."""
+    return len(text) > 2 and text.isalpha() and latex_name(text) == text
+
+
+def _label_of_expression(text: str) -> str:
+    if re.fullmatch(r"-?\d+(/\d+)?", text):
+        return f"${text}$"
+    names = sorted(set(re.findall(r"[A-Za-z_]\w*~*", text)))
+    try:
+        function = parse_rational_function(text, names) if len(text) <= _MAX_FORMULA and names else None
+    except InputError:
+        function = None
+    if function is None:
+        return plain(text)
+    latex = _ON_ONE_LINE.rational(function)
+    # matplotlib reads less than TeX, and stacked fractions in a line of text are too small to read.
+    return plain(text) if "mathrm" in latex else f"${latex}$"
+
+
+def _in_brackets(text: str) -> str:
+    return f"({text})" if " + " in text or " - " in text or " " in text else text
 
 
 def plain(text: str) -> str:
-    """Text of a user in which no dollar sign starts a formula."""
+    """Escape dollar signs in a text, so that none starts a formula."""
     return text.replace("$", r"\$")
 
 
-def wrapped(text: str, width: float, size: float, most: int = 3) -> str:
-    """Plain text in lines of about `width` points, in letters of `size` points; `most` of them, dots for the rest.
+def wrapped(text: str, width: float, size: float, max_lines: int = 3) -> str:
+    """Break plain text into at most `max_lines` lines of about `width` points for letters of `size` points.
+
+    A line that is too long ends in dots.
 
     >>> wrapped("relative error of a_very_very_long_name", width=80, size=8)
     'relative error of\\na_very_very_long_...'
     """
-    letters = max(8, int(width / (_LETTER * size)))
+    letters = max(8, int(width / (LETTER_WIDTH * size)))
     lines = textwrap.wrap(text, letters, break_long_words=False, break_on_hyphens=False)
-    if len(lines) > most:
-        lines = [*lines[: most - 1], " ".join(lines[most - 1 :])]
+    if len(lines) > max_lines:
+        lines = [*lines[: max_lines - 1], " ".join(lines[max_lines - 1 :])]
     return "\n".join(line if len(line) <= letters else line[: letters - 3] + "..." for line in lines)
 
 
 def label_number(value: Any) -> str:
-    """An exact number as text for a label, its middle left out where it is long.
+    """Return an exact number as text for a label, with dots in place of the middle of a long one.
 
     >>> from flint import fmpq
     >>> label_number(fmpq(3, 10)), len(label_number(fmpq(10) ** 99))
@@ -124,92 +181,102 @@ def label_number(value: Any) -> str:
 
 
 def write_title(figure: Figure, text: str, style: Style) -> None:
-    """Set a title above all panels, in lines that fit the figure."""
+    """Put a title above all panels, broken into lines that fit the figure."""
     size = style.font_size + 1
     with drawing(style):
         figure.suptitle(plain(wrapped(text, 72 * figure.get_size_inches()[0], size)), fontsize=size)
 
 
-def legend_columns(labels: Sequence[str], style: Style, most: int = 4) -> int:
-    """How many columns of these labels fit into the width of the style.
+def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) -> int:
+    """Return how many columns of these labels fit into the width of the style, at most `max_columns`.
 
     >>> legend_columns(["RK4", "implicit midpoint"], Style(width=8.6)), legend_columns(["x" * 50] * 2, Style(width=8.6))
     (2, 1)
     """
-    width = max(map(_letters, labels), default=0) * _LETTER + _HANDLE
-    return max(1, min(most, len(labels), int(_room(style) / width)))
+    width = max(map(letter_count, labels), default=0) * LETTER_WIDTH + _HANDLE_WIDTH
+    return max(1, min(max_columns, len(labels), int(_letters_across(style) / width)))
 
 
-def shortened_name(name: str, rest: str, style: Style) -> str:
-    """A name, cut to what a legend of the width of the style has room for together with the rest of its label.
+def shortened_name(name: str, suffix: str, style: Style) -> str:
+    """Cut a name so that name and suffix fit into one line of a legend in the width of the style.
 
     >>> shortened_name("f", ": linear growth", Style())
     'f'
     >>> shortened_name("x' = x*y - 2, y' = -x*y + 1", ": linear growth", Style(width=7))
     "x' = x*y - 2, y' ..."
     """
-    letters = max(8, int((_room(style) - _HANDLE) / _LETTER) - _letters(rest))
+    letters = max(8, int((_letters_across(style) - _HANDLE_WIDTH) / LETTER_WIDTH) - letter_count(suffix))
     return name if len(name) <= letters else name[: letters - 3] + "..."
 
 
-def _letters(label: str) -> int:
-    """How many letters a label has, about, without what only says how formulas are set."""
+def letter_count(label: str) -> int:
+    """Return about how many letters a label has when it is typeset: without the commands of mathtext."""
     return len(re.sub(r"\\[A-Za-z]+|[${}^_]", "", label))
 
 
-def _room(style: Style) -> float:
+def _letters_across(style: Style) -> float:
     """The width of a picture in heights of a letter of its legend."""
     return style.width / CENTIMETRES_PER_INCH * 72 / style.small
 
 
 def legend_above(
-    figure: Figure, handles: Sequence[Any], labels: Sequence[str], style: Style, title: str | None = None, most: int = 4
+    figure: Figure,
+    handles: Sequence[Any],
+    labels: Sequence[str],
+    style: Style,
+    title: str | None = None,
+    max_columns: int = 4,
 ) -> None:
-    """Put a legend above the axes, where no data are, at most `most` columns wide; the layout makes room for it."""
+    """Put a legend of at most `max_columns` columns above the axes; the layout makes room for it."""
     figure.legend(
         list(handles),
         list(labels),
         loc="outside upper left",
-        ncols=legend_columns(labels, style, most),
+        ncols=legend_columns(labels, style, max_columns),
         title=title,
         title_fontsize="small",
         alignment="left",
     )
 
 
-def legend_height(labels: Sequence[str], style: Style, title: bool = False, most: int = 4) -> float:
-    """How high the legend is, over the width of the figure."""
-    lines = -(-len(labels) // legend_columns(labels, style, most)) + title
+def legend_height(labels: Sequence[str], style: Style, title: bool = False, max_columns: int = 4) -> float:
+    """Return the height of a legend over the width of the figure."""
+    lines = -(-len(labels) // legend_columns(labels, style, max_columns)) + title
     return 1.45 * lines * style.font_size / (style.width / CENTIMETRES_PER_INCH * 72)
 
 
-def points(axes: Axes, *coordinates: Any, of: int | None = None, **how: Any) -> Any:
-    """Points as dots, smaller where they are many and stored as an image above RASTERISE_ABOVE; `how` goes to plot.
+def draw_points(axes: Axes, *coordinates: Any, total: int | None = None, **keywords: Any) -> Any:
+    """Draw points as dots, smaller ones where there are many, and as an image above MAX_VECTOR_POINTS.
 
-    `of` is how many there are in the whole picture, where they are drawn in several parts.
+    `total` is the number of points in the picture where they are drawn in several calls; `keywords` go to `plot`.
     """
-    count = len(coordinates[0]) if of is None else of
+    count = len(coordinates[0]) if total is None else total
     return axes.plot(
         *coordinates,
-        **{"marker": "o", "linestyle": "none", "markeredgewidth": 0, "markersize": dot_size(count), **how},
-        rasterized=count > RASTERISE_ABOVE,
+        **{"marker": "o", "linestyle": "none", "markeredgewidth": 0, "markersize": dot_size(count), **keywords},
+        rasterized=count > MAX_VECTOR_POINTS,
     )[0]
 
 
-def beside(axes: Axes, text: str, at: Any, offset: tuple[float, float], halo: float = 0.0, **how: Any) -> None:
-    """A text beside a point, `offset` points away from it, with `halo` points of white around its letters."""
+def write_beside(
+    axes: Axes, text: str, at: Any, offset: tuple[float, float], halo: float = 0.0, **keywords: Any
+) -> None:
+    """Write a text beside a point, `offset` points away, with `halo` points of white around its letters.
+
+    `keywords` go to `annotate`.
+    """
     if halo:
         from matplotlib.patheffects import withStroke
 
-        how["path_effects"] = [withStroke(linewidth=halo, foreground="white")]
-    axes.annotate(text, at, xytext=offset, textcoords="offset points", **how)
+        keywords["path_effects"] = [withStroke(linewidth=halo, foreground="white")]
+    axes.annotate(text, at, xytext=offset, textcoords="offset points", **keywords)
 
 
 def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: bool) -> float | None:
-    """Make the vertical axis logarithmic for positive values from `least` to `largest`; return the height for zeros.
+    """Make the vertical axis logarithmic for values from `least` to `largest`; return the height of zeros.
 
-    An exact zero has its place at that height, in a grey band at the bottom that is marked 0. None where there are no
-    zeros: then there is no band.
+    Exact zeros are drawn in a gray band at the bottom that is marked 0. Without zeros there is no band, and the answer
+    is None.
     """
     axes.set_yscale("log")
     low, high = math.log10(least), math.log10(largest)
@@ -220,66 +287,67 @@ def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: boo
         return None
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    below = low - _BAND_SHARE / (1 - _BAND_SHARE) * (high - low)
-    zero = 10 ** ((below + low) / 2)
-    axes.set_ylim(10**below, 10**high)
-    axes.axhspan(10**below, 10**low, color=_BAND_COLOUR, linewidth=0, zorder=0)
+    bottom = low - _BAND_SHARE / (1 - _BAND_SHARE) * (high - low)
+    zero = 10 ** ((bottom + low) / 2)
+    axes.set_ylim(10**bottom, 10**high)
+    axes.axhspan(10**bottom, 10**low, color=_BAND_COLOR, linewidth=0, zorder=0)
     powers = range(math.ceil(low), math.floor(high) + 1)
-    every = max(1, -(-len(powers) // _MAX_TICKS))
+    stride = max(1, -(-len(powers) // _MAX_TICKS))
     # Ticks of powers stop above the band, where the scale means nothing.
-    axes.yaxis.set_major_locator(FixedLocator([10.0**k for k in powers[::every]]))
+    axes.yaxis.set_major_locator(FixedLocator([10.0**k for k in powers[::stride]]))
     axes.yaxis.set_minor_locator(NullLocator())
-    where = ("axes fraction", "data")
-    beside(axes, "0", (0, zero), (-3, 0), xycoords=where, ha="right", va="center", fontsize="small")
+    write_beside(
+        axes, "0", (0, zero), (-3, 0), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize="small"
+    )
     return zero
 
 
 def dot_size(count: int) -> float:
-    """The diameter of dots, in points, where there are `count` of them."""
+    """Return the diameter in points of each of `count` dots."""
     return 2.4 if count <= 500 else 1.4 if count <= 5_000 else 0.7 if count <= 50_000 else 0.35
 
 
-def format_of(path: str, asked: str | None) -> str:
-    """pdf, svg or png: what is asked for, or by the ending of the path. Raises InputError for anything else."""
-    found = asked or Path(path).suffix.removeprefix(".").lower()
-    if found not in FORMATS:
-        what = f"the ending .{found}" if found else "no ending"
-        raise InputError(f"{path}: found {what}, expected .pdf, .svg or .png (or --format)")
-    return found
+def format_of(path: str, requested: str | None) -> str:
+    """Return the format requested, or else that of the path's extension: pdf, svg or png. Raises InputError."""
+    extension = requested or Path(path).suffix.removeprefix(".").lower()
+    if extension not in FORMATS:
+        given = f"the extension .{extension}" if extension else "no extension"
+        raise InputError(f"{path}: found {given}, expected .pdf, .svg or .png, or the option --format")
+    return extension
 
 
 def picture_bytes(figure: Figure, kind: str, style: Style, command: str = "", system: str = "") -> bytes:
-    """The figure as a PDF, SVG or PNG file; the command that makes it and the system (as TOML) are in its metadata.
+    """Return the figure as the bytes of a PDF, SVG or PNG file, with the command and the system (TOML) in its metadata.
 
-    The same figure gives the same bytes, with the same version of matplotlib: no dates, no random names. Raises
-    InputError for more dots than fit into memory.
+    Equal figures give equal bytes with one version of matplotlib: there are no dates and no random ids. Raises
+    InputError for a picture of too many pixels.
     """
     style.require_pixels(*figure.get_size_inches())
     keys, no_dates = _METADATA[kind]
     texts = zip(keys, (f"kahanmaps {__version__}", command, system), strict=True)
-    held = io.BytesIO()
+    buffer = io.BytesIO()
     with drawing(style):
-        figure.savefig(held, format=kind, metadata={**{key: text for key, text in texts if text}, **no_dates})
-    return held.getvalue()
+        figure.savefig(buffer, format=kind, metadata={**{key: text for key, text in texts if text}, **no_dates})
+    return buffer.getvalue()
 
 
 def write_picture(figure: Figure, path: str, kind: str, style: Style) -> None:
-    """Write the figure to a file, whole or not at all."""
+    """Write the figure to a file atomically."""
     write_atomically(Path(path), picture_bytes(figure, kind, style))
 
 
 def svg_text(figure: Figure, name: str, style: Style, alt: str) -> str:
-    """The figure as an <svg> element for a page.
+    """Return the figure as an <svg> element for a page.
 
-    `name` makes its ids different from those of other pictures on the page, `alt` says in words what it shows. It is as
-    wide as there is room for, and no wider than the style says.
+    `name` is a prefix that makes its ids unique on the page, `alt` its text alternative. It takes the available width,
+    at most that of the style.
     """
     text = picture_bytes(figure, "svg", style).decode()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
     text = re.sub(r'(\bid=")([^"]+)"', rf'\1{name}-\2"', text)
     text = re.sub(r'((?:xlink:)?href="#|url\(#)', rf"\1{name}-", text)
-    head, rest = text.split(">", 1)
+    head, body = text.split(">", 1)
     head = re.sub(r'\s(width|height)="[^"]*"', "", head)
     head += f' class="picture" role="img" style="width:100%;max-width:{style.width:g}cm;height:auto"'
-    return f"{head}>\n <title>{escape(alt)}</title>{rest}"
+    return f"{head}>\n <title>{escape(alt)}</title>{body}"

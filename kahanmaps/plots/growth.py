@@ -32,14 +32,14 @@ from kahanmaps.plots.figures import (
     plain,
     shortened_name,
 )
-from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
+from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SCALES = ("linear", "log", "loglog")
-_MAX_SYSTEMS = len(COLOURS)
+_MAX_SYSTEMS = len(COLORS)
 _MAX_FORMULA = 24  # letters
 _MARKS = 30  # of one orbit
 _ASPECT = 0.62  # of the axes
@@ -72,7 +72,7 @@ def plot_degrees(
     values = [d for growth in growths.values() for d in growth.degrees]
     positive = [d for d in values if d]
     with drawing(style):
-        figure = new_figure(style, _ASPECT + legend_height(labels, style, title=True, most=1))
+        figure = new_figure(style, _ASPECT + legend_height(labels, style, title=True, max_columns=1))
         axes = figure.subplots()
         _step_axis(axes, scale, max(len(growth.degrees) for growth in growths.values()))
         zero = 0.0
@@ -82,7 +82,7 @@ def plot_degrees(
             has_zeros = len(positive) < len(values)
             zero = log_scale_with_zero(axes, min(positive), max(positive), has_zeros) or 1.0
         for k, (label, growth) in enumerate(zip(labels, growths.values(), strict=True)):
-            look: dict[str, Any] = {"color": COLOURS[k]}
+            look: dict[str, Any] = {"color": COLORS[k]}
             line: dict[str, Any] = {"linestyle": LINES[0] if growth.recurrence is not None else ":", "linewidth": 0.8}
             steps = np.arange(1 if scale == "loglog" else 0, len(growth.degrees))
             heights = np.array([float(growth.degrees[n] or zero) for n in steps])
@@ -105,7 +105,7 @@ def plot_degrees(
         title = r"$\lambda$: dynamical degree"
         if any(growth.eps is not None for growth in growths.values()):
             title += r"; the time step is $2\varepsilon$"
-        legend_above(figure, *axes.get_legend_handles_labels(), style, title, most=1)
+        legend_above(figure, *axes.get_legend_handles_labels(), style, title, max_columns=1)
     return figure
 
 
@@ -139,7 +139,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
 def plot_heights(
     survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Heights of exact orbits against the step, with the growth that was fitted, a colour for each eps.
+    """Heights of exact orbits against the step, with the growth that was fitted, a color for each eps.
 
     Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2, c n (each with its lower
     terms) or a factor in each step; orbits whose growth is bounded, logarithmic or undecided have none. `scale` is
@@ -151,22 +151,24 @@ def plot_heights(
     if not curves:
         raise InputError("found no orbit, expected at least one")
     every_eps = list(dict.fromkeys(curve.eps for curve in curves))
-    if len(every_eps) > len(COLOURS):
-        raise InputError(f"found {len(every_eps)} values of eps, expected at most {len(COLOURS)} in one picture")
+    if len(every_eps) > len(COLORS):
+        raise InputError(f"found {len(every_eps)} values of eps, expected at most {len(COLORS)} in one picture")
     kinds = {curve.kind for curve in curves}
     longest = max(curve.steps[-1] for curve in curves)
     grows = kinds & {Growth.QUADRATIC, Growth.LINEAR} and longest >= 8
     scale = _scale(scale, "log" if Growth.EXPONENTIAL in kinds else "loglog" if grows else "linear")
     style = style or Style()
     with drawing(style):
-        figure = new_figure(style, _ASPECT + legend_height([label_number(eps) for eps in every_eps], style, most=1))
+        figure = new_figure(
+            style, _ASPECT + legend_height([label_number(eps) for eps in every_eps], style, max_columns=1)
+        )
         axes = figure.subplots()
         _step_axis(axes, scale, longest)
         axes.set_yscale("linear" if scale == "linear" else "log")
         for k, eps in enumerate(every_eps):
             some, from_one = [curve for curve in curves if curve.eps == eps], scale == "loglog"
             size = 3.2 if len(some) <= 3 and max(len(curve.steps) for curve in some) <= 80 else 2
-            line: dict[str, Any] = {"color": COLOURS[k], "linestyle": LINES[k], "linewidth": 0.7}
+            line: dict[str, Any] = {"color": COLORS[k], "linestyle": LINES[k], "linewidth": 0.7}
             # Hollow marks, through which the line of the fit is seen.
             mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
             for curve in some:
@@ -176,13 +178,13 @@ def plot_heights(
                     spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
                     rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
                 points = curve.steps[rows], curve.bits[rows]
-                axes.plot(*points, color=COLOURS[k], linestyle="none", markersize=size, **mark)
+                axes.plot(*points, color=COLORS[k], linestyle="none", markersize=size, **mark)
                 if (fit := fit_of(curve)) is not None:
                     last = curve.steps[-1]
                     n = np.geomspace(1, max(1, last), 200) if from_one else np.linspace(0, last, 200)
                     axes.plot(n, fit(n), zorder=1.5, **line)
             # The legend: eps, the time step, and what kinds of growth were found.
-            label = rf"$\varepsilon = {label_number(eps)}$, $2\varepsilon = {label_number(2 * eps)}$"
+            label = rf"$\varepsilon = {label_number(eps)}$ (time step {label_number(2 * eps)})"
             label = label if some[0].has_eps else "heights"
             several = list(dict.fromkeys(curve.kind for curve in some))
             constants = [c for c in (curve.constant for curve in some) if c is not None]
@@ -191,7 +193,7 @@ def plot_heights(
                 label += ": " + ", ".join(f"{sum(curve.kind is kind for curve in some)} {kind}" for kind in several)
             elif several[0] in (Growth.QUADRATIC, Growth.LINEAR) and constants:
                 power = "n^2" if several[0] is Growth.QUADRATIC else "n"
-                label += rf": $c\,{power}$, $c$ = {_range_of(constants)}"
+                label += rf": $h_n \sim c\,{power}$, $c$ = {_range_of(constants)}"
             else:
                 is_known = several[0] is Growth.EXPONENTIAL and ratios
                 label += f": exponential, factor {_range_of(ratios)}" if is_known else f": {several[0]}"
@@ -200,7 +202,7 @@ def plot_heights(
             axes.set_ylim(bottom=0)
         axes.set_xlabel("step $n$")
         axes.set_ylabel("height $h_n$ (bits)")
-        legend_above(figure, *axes.get_legend_handles_labels(), style, most=1)
+        legend_above(figure, *axes.get_legend_handles_labels(), style, max_columns=1)
     return figure
 
 
@@ -209,10 +211,10 @@ def _range_of(values: Sequence[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _scale(asked: str | None, default: str) -> str:
-    if asked is not None and asked not in SCALES:
-        raise InputError(f"found the scale {asked[:40]!r}, expected {', '.join(SCALES[:-1])} or {SCALES[-1]}")
-    return asked or default
+def _scale(requested: str | None, default: str) -> str:
+    if requested is not None and requested not in SCALES:
+        raise InputError(f"found the scale {requested[:40]!r}, expected {', '.join(SCALES[:-1])} or {SCALES[-1]}")
+    return requested or default
 
 
 def _step_axis(axes: Axes, scale: str, longest: int) -> None:
@@ -255,18 +257,18 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
         if not (1 <= len(degrees) <= _MAX_TERMS and any(degrees)):
             raise InputError("no degrees, or all of them 0")
         patterns = enclosure = None
-        if (told := record.get("singularities")) is not None:
-            known = told.get("generating_function") or {}
+        if (data := record.get("singularities")) is not None:
+            known = data.get("generating_function") or {}
             series = tuple(tuple(int(c) for c in known[part]) for part in ("numerator", "denominator") if known)
             if series and not (max(map(len, series)) <= _MAX_TERMS and series[1][:1] == (1,)):
                 raise InputError("no generating function with a short denominator that begins with 1")
-            lengths = tuple(int(length) for length in told["lengths"])
-            searched = None if told["searched"] is None else int(told["searched"])
-            patterns = Patterns(lengths, searched, told["some_confined"], str(told["running"]), series)
-        if (told := record.get("enclosure")) is not None:
+            lengths = tuple(int(length) for length in data["lengths"])
+            searched = None if data["searched"] is None else int(data["searched"])
+            patterns = Patterns(lengths, searched, data["some_confined"], str(data["running"]), series)
+        if (data := record.get("enclosure")) is not None:
             names = ("steps", "degree_below", "degree_above", "prime", "eps_residue")
             enclosure = DynamicalDegreeBounds(
-                str(told["lower"]), str(told["upper"]), *(int(told[name]) for name in names)
+                str(data["lower"]), str(data["upper"]), *(int(data[name]) for name in names)
             )
         growth = DegreeGrowth(
             degrees,

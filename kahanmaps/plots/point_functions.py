@@ -68,11 +68,9 @@ class PointFunction:
 
     @property
     def label(self) -> str:
-        """The name for a picture, as a formula where it is short."""
-        if is_name(self.name):
+        """The name for a picture, typeset where it is a short formula."""
+        if is_name(self.name) or not self.function.denominator.is_one():
             return label_of(self.name)
-        if not self.function.denominator.is_one():  # fractions in a line of text are too small to read
-            return plain(self.name)
         formula = latex_polynomial(self.function.numerator)
         return f"${formula}$" if len(formula) <= _SHORT and "mathrm" not in formula else plain(self.name)
 

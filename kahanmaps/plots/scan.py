@@ -15,11 +15,19 @@ from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.scan.conditions import beside
 from kahanmaps.laboratory.scan.result import Component, Scan, growth_on
 from kahanmaps.plots.curves.level_sets import level_curves
-from kahanmaps.plots.figures import beside as write
-from kahanmaps.plots.figures import drawing, label_of, legend_above, legend_height, new_figure
+from kahanmaps.plots.figures import (
+    LETTER_WIDTH,
+    drawing,
+    label_of,
+    legend_above,
+    legend_height,
+    letter_count,
+    new_figure,
+    write_beside,
+)
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.plots.portraits.windows import Window, window_of
-from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
+from kahanmaps.plots.portraits.windows import Window, inside, window_of
+from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +35,7 @@ if TYPE_CHECKING:
 
 _ASPECT = 0.8
 _MANY = f"{Growth.EXPONENTIAL} growth"  # drawn thin, and none of it is named
-_LETTERS, _LETTER = 0.8, 0.5  # the size of conditions, of that of other text; the width of a letter, of its size
+_CONDITION_SIZE = 0.8  # of the letters of conditions, in units of that of other text
 _PLACES, _DOTS = 12, 300  # parts of a curve, at whose ends its condition may stand, and to tell what it crosses
 _INNER = 0.85  # of the width and height of the picture, the axes
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
@@ -36,7 +44,7 @@ _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 def plot_scan(
     found: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
 ) -> Figure:
-    """Curves and points of the plane of two parameters, a colour for each kind of growth, with their conditions.
+    """Curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
 
     `window` is (low, high) of each parameter; by default it holds most of the points with rational parameters. With
     `modulo`, one of the primes modulo which all members were tried, the slow ones among these, those on no component
@@ -104,7 +112,7 @@ def plot_scan(
 
 @dataclass(frozen=True)
 class _Kind:
-    """What has one colour: points, pieces of curves, and conditions at the places where they are written."""
+    """What has one color: points, pieces of curves, and conditions at the places where they are written."""
 
     name: str
     points: Sequence[tuple[float, ...]]
@@ -114,22 +122,29 @@ class _Kind:
 
 def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_name: str) -> Figure:
     from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
 
-    names = [kind.name for kind in kinds]
+    names = [kind.name for kind in kinds if kind.curves or any(inside(np.array(kind.points, dtype=float), window))]
     with drawing(style):
         figure = new_figure(style, _ASPECT + legend_height(names, style))
         axes = figure.subplots()
         handles = []
         for k, kind in enumerate(kinds):
-            colour, mark = COLOURS[k % len(COLOURS)], MARKS[k % len(MARKS)]
+            color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
             width = 0.5 if kind.name == _MANY else 1.2
             axes.add_collection(
-                LineCollection(kind.curves, colors=colour, linestyles=[LINES[k % len(LINES)]], linewidths=width),
+                LineCollection(kind.curves, colors=color, linestyles=[LINES[k % len(LINES)]], linewidths=width),
                 autolim=False,
             )
             columns = np.array(kind.points, dtype=float).reshape(-1, 2).T
             size = style.font_size / (4 if beside_name or kind.name == _MANY else 2)
-            handles += axes.plot(*columns, mark, color=colour, markersize=size, zorder=10 - k)
+            axes.plot(*columns, mark, color=color, markersize=size, zorder=10 - k)
+            if kind.name in names:
+                shown: dict[str, Any] = {
+                    "marker": mark if kind.points else "",
+                    "linestyle": LINES[k % len(LINES)] if kind.curves else "",
+                }
+                handles.append(Line2D([], [], color=color, markersize=size, linewidth=width, **shown))
         _write(axes, kinds, window, style)
         axes.set(xlim=window[0], ylim=window[1])
         axes.set(xlabel=label_of(found.over[0]) + beside_name, ylabel=label_of(found.over[1]) + beside_name)
@@ -144,24 +159,25 @@ def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None
     Of points those with the fastest growth that is not exponential come first. Of the places where a text fits it takes
     the one that the fewest curves cross.
     """
-    em = _LETTERS * style.font_size
+    em = _CONDITION_SIZE * style.font_size
     across, high = (em / (72 * _INNER * inches) for inches in style.inches(_ASPECT))
-    wanted = [(*one, COLOURS[k % len(COLOURS)]) for k, kind in enumerate(kinds) for one in kind.labels]
-    wanted.sort(key=lambda one: (" = " not in one[0], -COLOURS.index(one[2])))
+    wanted = [(*one, COLORS[k % len(COLORS)]) for k, kind in enumerate(kinds) for one in kind.labels]
+    wanted.sort(key=lambda one: (" = " not in one[0], -COLORS.index(one[2])))
 
-    def inside(place: Sequence[float]) -> tuple[float, ...]:
+    def scaled(place: Sequence[float]) -> tuple[float, ...]:
         return tuple((c - low) / (end - low) for c, (low, end) in zip(place, window, strict=True))
 
     marks = []
-    for x, y in (inside(place) for kind in kinds for place in kind.points):
+    for x, y in (scaled(place) for kind in kinds for place in kind.points):
         marks.append((x - 0.35 * across, x + 0.35 * across, y - 0.35 * high, y + 0.35 * high))
-    lines = np.array([inside(x) for kind in kinds for piece in kind.curves for x in _resampled(piece, _DOTS)])
+    lines = np.array([scaled(x) for kind in kinds for piece in kind.curves for x in _resampled(piece, _DOTS)])
     taken: list[tuple[float, ...]] = []
-    for text, places, colour in wanted:
-        wide, is_curve = _LETTER * len(text) * across, " = " in text
+    for text, places, color in wanted:
+        label, is_curve = label_of(text), " = " in text
+        wide = LETTER_WIDTH * letter_count(label) * across
         found: list[Any] = []
         for place, side, up in product(places, (1, -1), (1, -1)):
-            x, y = inside(place)
+            x, y = scaled(place)
             low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.6 * high
             box = (low, low + wide, bottom, bottom + 1.2 * high)
             covered = sum(_overlap(box, one) for one in marks)
@@ -174,7 +190,7 @@ def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None
             taken.append(box)
             where = {"ha": "left" if side > 0 else "right", "va": "center"}
             offset = (0.4 * em * side, 0.7 * em * up)
-            write(axes, text, place, offset, halo=2.5, size=em, color=colour, zorder=20, **where)
+            write_beside(axes, label, place, offset, halo=2.5, size=em, color=color, zorder=20, **where)
 
 
 def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:

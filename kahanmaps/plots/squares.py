@@ -24,9 +24,9 @@ from kahanmaps.maps.floats.doubles import to_floats
 from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, as_map
 from kahanmaps.plots.curves.plane_cubics import Floats
-from kahanmaps.plots.figures import beside, drawing, label_of, new_figure, plain, wrapped
+from kahanmaps.plots.figures import drawing, label_of, new_figure, plain, wrapped, write_beside
 from kahanmaps.plots.portraits.windows import outside, window_of
-from kahanmaps.plots.style import COLOURS, Style
+from kahanmaps.plots.style import COLORS, Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -183,7 +183,7 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
     return MapPair(file.map, g, ("f", "g"), note)
 
 
-_F, _G, _GAP = COLOURS[1], COLOURS[5], COLOURS[0]
+_F, _G, _GAP = COLORS[1], COLORS[5], COLORS[0]
 _LARGEST = 1e150  # what can be squared
 _SEEN = 0.06  # of the width of a panel: a gap below it is shown magnified
 
@@ -271,6 +271,7 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, l
     if caption:
         equations = caption.replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
         title = plain(wrapped(equations, style.font_size / letter, style.font_size))
+        title = re.sub(r"\b([fg])(?=[:\xa0])", r"$\1$", title)
     else:
         f, g = (re.sub(r"^f_(.*)", r"f_{\1}", name).replace("grad ", r"\nabla ") for name in squares.pair.names)
         title = f"$f = {f}$,  $g = {g}$"
@@ -309,9 +310,9 @@ def _draw_lattices(axes: Axes, one: Floats, other: Floats) -> None:
         for j in range(steps + 1):
             arrows = [(one[i, j], one[i, j + 1], _G)] if j < steps else []
             arrows += [(other[i, j], other[i + 1, j], _F)] if i < steps else []
-            for start, end, colour in arrows:
+            for start, end, color in arrows:
                 if np.isfinite([*start, *end]).all() and not np.array_equal(start, end):
-                    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), color=colour, **arrow))
+                    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), color=color, **arrow))
             if not np.array_equal(one[i, j], other[i, j], equal_nan=True):
                 ends = np.stack([one[i, j], other[i, j]])
                 axes.plot(ends[:, 0], ends[:, 1], color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
@@ -341,7 +342,7 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     inset.set_yticks([])
     factor = rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half[0]))}$"
     how: dict[str, Any] = {"xycoords": "axes fraction", "fontsize": style.smallest}
-    beside(inset, factor, (0.04, 0.96), (0, 0), 1.5, va="top", zorder=8, **how)
+    write_beside(inset, factor, (0.04, 0.96), (0, 0), 1.5, va="top", zorder=8, **how)
     _draw_lattices(inset, one[-2:, -2:], other[-2:, -2:])
     inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
 
@@ -376,7 +377,7 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
         aligned = "center" if abs(away[0]) < 0.4 else "left" if away[0] > 0 else "right"
         offset = 7 * away[0], 7 * away[1]
     raised = "center" if abs(away[1]) < 0.4 and maps < 2 else "bottom" if away[1] >= 0 else "top"
-    beside(axes, text, (float(x), float(y)), offset, 2, ha=aligned, va=raised, zorder=5)
+    write_beside(axes, text, (float(x), float(y)), offset, 2, ha=aligned, va=raised, zorder=5)
 
 
 def _table(lattice: Lattice) -> Floats:

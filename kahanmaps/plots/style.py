@@ -1,7 +1,7 @@
-"""How pictures look: sizes as a journal states them, colours that everybody can tell apart.
+"""How pictures look: sizes as a journal states them, colors that color-blind readers can tell apart.
 
-The colours are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a grey copy of up
-to four curves is readable; beyond colour, curves differ in line style and points in their marks. Values are shown by
+The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up
+to four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown by
 the map cividis, whose lightness grows evenly for all eyes.
 """
 
@@ -14,10 +14,10 @@ from kahanmaps.errors import InputError, quoted
 
 CENTIMETRES_PER_INCH = 2.54
 # black, blue, orange, green, sky blue, vermilion, purple
-COLOURS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#56B4E9", "#D55E00", "#CC79A7")
+COLORS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#56B4E9", "#D55E00", "#CC79A7")
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
-COLOUR_MAP = "cividis"
+COLOR_MAP = "cividis"
 _MAX_PIXELS = 1 << 28  # a gigabyte while it is drawn
 
 
@@ -55,7 +55,7 @@ class Style:
         self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
-        """Width and height in inches; `aspect` is height over width where no height is asked for."""
+        """Width and height in inches; `aspect` is height over width where the style has no height."""
         height = self.width * aspect if self.height is None else self.height
         return self.width / CENTIMETRES_PER_INCH, height / CENTIMETRES_PER_INCH
 
@@ -83,4 +83,4 @@ class Style:
         """The settings of matplotlib for this style beyond those of pictures.mplstyle."""
         sizes = {"axes.titlesize": self.font_size, "axes.labelsize": self.font_size, "font.size": self.font_size}
         small = dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), self.small)
-        return {**sizes, **small, "image.cmap": COLOUR_MAP, "savefig.dpi": self.dpi}
+        return {**sizes, **small, "image.cmap": COLOR_MAP, "savefig.dpi": self.dpi}

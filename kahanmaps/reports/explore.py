@@ -1,7 +1,7 @@
-"""A page with sliders: eps and the start move, the orbit is drawn by the reader's browser, the exact verdict beside it.
+"""Pages with sliders for eps and the initial point: the browser draws the orbit beside the exact verdict.
 
-What the browser computes are machine numbers, from the same polynomials M and r (M x~ = r) as all orbits of the
-library; explore.js solves the linear system of each step. What is proved was proved before, and is text.
+The browser computes in floating point with the polynomials M and r of the map (M x~ = r); explore.js solves the linear
+system of each step. Proofs are made before and printed as text.
 """
 
 from __future__ import annotations

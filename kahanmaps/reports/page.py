@@ -1,8 +1,8 @@
-"""A page: a title, what it is about, sections with ids that stay the same, and how to make it again.
+"""HTML pages: a title, a lead, sections with stable ids, and how to reproduce the page.
 
-The page is one file, made by page.html, a template of Jinja2. It asks nothing of a network, it has no JavaScript (but
-that of explore.py), and the same input gives the same bytes. What is text here is escaped by the template; `Html` is
-HTML already. Formulas come as LaTeX and become MathML, which browsers show by themselves.
+A page is a single file made from page.html, a template of Jinja2. It needs no network and no JavaScript (except that of
+explore.py), and equal input gives equal bytes. The template escapes text; `Html` is not escaped. Formulas are converted
+from LaTeX to MathML.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from xml.etree import ElementTree
 
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display import markup
-from kahanmaps.display.latex import formula
+from kahanmaps.display.latex import formula, typeset
 from kahanmaps.display.systems import equations_html
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, printable
 from kahanmaps.version import __version__
 
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
-_LONGEST_SYSTEM = 200_000
+_MAX_SYSTEM = 200_000  # characters of a system file
 _MAX_EQUATIONS = 40
 # Commands with the words that belong to them, and words.
 _WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
@@ -40,7 +40,7 @@ _TEXT_COMMANDS = {
 
 
 class Html(str):
-    """Text that is HTML already: the template does not escape it."""
+    """HTML, which the template does not escape."""
 
     __slots__ = ()
 
@@ -50,18 +50,18 @@ class Html(str):
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page: its id, to be linked to, its title, and what stands in it; left out where that is nothing."""
+    """A section of a page with its id, title and content; an empty section is omitted."""
 
     id: str
     title: str
-    conclusion: tuple[str, str] | None = None  # in large letters: a word, a sentence
+    conclusion: tuple[str, str] | None = None  # in large letters: a verdict and a sentence
     paragraphs: Sequence[str] = ()
     items: Sequence[str] = ()  # of a list
-    statements: Sequence[tuple[str, str]] = ()  # a word and what it says
+    statements: Sequence[tuple[str, str]] = ()  # pairs of a status and a sentence
     pieces: Sequence[str] = ()
-    folded: Sequence[tuple[str, str]] = ()  # what is unfolded by a click, and what is seen then
+    folded: Sequence[tuple[str, str]] = ()  # pairs of a summary and the content that a click unfolds
     claims: Sequence[Mapping[str, Any]] = ()
-    explore: Mapping[str, Any] | None = None  # the orbit that moves, of explore.py
+    explore: Mapping[str, Any] | None = None  # the interactive orbit of explore.py
 
     def __bool__(self) -> bool:
         return any(getattr(self, field.name) for field in fields(self)[2:])
@@ -77,9 +77,9 @@ def page(
     file: SystemFile | None = None,
     script: str = "",
 ) -> str:
-    """The whole page; sections that are empty are left out. `script` is the one program that browsers may run.
+    """Return a page without its empty sections. `script` is the only program that browsers may run.
 
-    `command`, `seed` (None where nothing is drawn at random) and `file` say how it was made.
+    `command`, `seed` (None if nothing is random) and `file` tell how the page was made.
     """
     remake: list[tuple[str, str]] = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
     remake += [("version", f"kahanmaps {__version__}")]
@@ -89,7 +89,7 @@ def page(
         lead=lead,
         sections=[section for section in sections if section],
         remake=remake,
-        system_file="" if file is None else Html(markup.escape(markup.shortened(file.to_toml(), _LONGEST_SYSTEM))),
+        system_file="" if file is None else Html(markup.escape(markup.shortened(file.to_toml(), _MAX_SYSTEM))),
         script=Html(script),
         script_hash=f"sha256-{b64encode(sha256(script.encode()).digest()).decode()}" if script else "",
         version=__version__,
@@ -104,9 +104,9 @@ def page(
 
 @cache
 def font_face() -> str:
-    """The font of formulas as a rule of a stylesheet, which nothing has to be fetched for.
+    """Return the embedded font of formulas as a rule of a stylesheet.
 
-    Without a font that has a table for mathematics, browsers do not know where exponents and primes belong.
+    Browsers need a font with a MATH table to place exponents and primes.
     """
     font = resources.files("kahanmaps.reports") / "fonts" / "kahanmaps-math.woff"
     code = b64encode(font.read_bytes()).decode("ascii")
@@ -115,7 +115,7 @@ def font_face() -> str:
 
 @cache
 def page_template() -> Any:
-    """The template of all pages. Raises InputError where the extra [report] is not installed."""
+    """Return the template of all pages. Raises InputError where the extra [report] is not installed."""
     try:
         import latex2mathml.converter  # noqa: F401 (whether it is there)
         from jinja2 import Environment
@@ -132,13 +132,13 @@ def page_template() -> Any:
 
 @cache
 def mathml(latex: str) -> str:
-    r"""A formula as MathML, with its LaTeX as `alttext`; as code where it cannot be converted.
+    r"""Return a formula as MathML with its LaTeX as `alttext`, or as code where it cannot be converted.
 
-    latex2mathml raises for few mistakes: what it gives is parsed, and unknown commands that it leaves are seen.
+    latex2mathml raises few errors, so its output is parsed and searched for unknown commands.
     """
     from latex2mathml.converter import convert
 
-    # A name of several letters would look like a product: it is set upright, apart from the factors beside it.
+    # A name of several letters would look like a product: set it upright, with space around it.
     known = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
     known = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", known)
     for command, other in _TEXT_COMMANDS.items():
@@ -150,23 +150,23 @@ def mathml(latex: str) -> str:
         is_known = False
     if not is_known:
         return f"<code>{markup.escape(latex)}</code>"
-    sign = "<mo>&#x0003D;</mo><mo>&#x02212;</mo>"  # a sign behind = is none between terms
+    sign = "<mo>&#x0003D;</mo><mo>&#x02212;</mo>"  # a sign after = is a prefix, not an operator between terms
     text = text.replace(sign, sign.replace("><mo>&#x02212", '><mo form="prefix">&#x02212'))
     return re.sub("^<math[^>]*>", lambda _: f'<math alttext="{markup.escape(latex)}">', text)
 
 
 def text(words: object) -> Html:
-    """Text as HTML; what is far too long for a page loses its middle."""
+    """Return text as HTML, shortened where it is too long for a page."""
     return Html(markup.escape(markup.shortened(words, CHARACTERS)))
 
 
 def wide(table: str) -> Html:
-    """A table that is scrolled by itself where the page is too narrow for it."""
+    """Return a table that scrolls horizontally on narrow pages."""
     return Html(f'<div class="wide">{table}</div>')
 
 
 def system_section(file: SystemFile) -> Section:
-    """Equations, parameters and the Hamiltonian of a system."""
+    """Return the section with equations, parameters and Hamiltonian of a system."""
     if file.is_quadratic:
         pieces = [Html(f"<p>{equations_html(file.system, CHARACTERS, _MAX_EQUATIONS)}</p>")]
     else:
@@ -177,5 +177,6 @@ def system_section(file: SystemFile) -> Section:
     if file.hamiltonian is not None:
         kind = "the standard J" if file.hamiltonian.is_standard else "a constant J of the file"
         shown = formula(file.hamiltonian.H, "H", CHARACTERS)
-        pieces.append(Html(f"<p>x' = J grad H(x) with {kind}, {shown}</p>"))
+        flow = typeset(r"\dot{x} = J \nabla H", False)
+        pieces.append(Html(f"<p>{flow} with {kind}, {shown}</p>"))
     return Section("system", "The system", pieces=pieces)

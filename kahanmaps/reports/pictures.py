@@ -1,4 +1,4 @@
-"""The pictures of a page, as SVG in its text; where there can be none, a sentence says why."""
+"""The pictures of a page as inline SVG, or a sentence that says why there is none."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
     from kahanmaps.documents.files import SystemFile
 
-DEFAULT_EPS = fmpq(1, 20)  # where a page is for every eps
-_STYLE = Style(width=14, font_size=11, dpi=150)  # letters that are readable on a telephone as well
+DEFAULT_EPS = fmpq(1, 20)  # of pictures on a page for every eps
+_STYLE = Style(width=14, font_size=11, dpi=150)  # letters are legible on a phone
 _MAX_ELEMENTS = 1_500  # points: as elements of the page they would be a hundred bytes each
 _STEPS = 600
 _INITIAL_POINTS = 16
@@ -39,9 +39,9 @@ _CURVE_STEPS = 300
 
 
 class Pictures:
-    """Draws pictures into a page, or leaves them out: `requested` says whether the reader wants any.
+    """Draws the pictures of a page, or omits them unless `requested`.
 
-    `note` is a sentence for the page: that matplotlib is missing, and what to do; empty where it is there.
+    `note` is a sentence for the page where matplotlib is missing, else empty.
     """
 
     def __init__(self, requested: bool = True) -> None:
@@ -56,17 +56,17 @@ class Pictures:
     def draw(
         self, name: str, caption: str, alt: str, drawing: Callable[[Style], Figure], remarks: Sequence[str] = ()
     ) -> str:
-        """A <figure> with the picture that `drawing` makes; `name` is its id, `alt` says in words what it shows.
+        """Return a <figure> with the picture made by `drawing`; `name` is its id, `alt` its text alternative.
 
-        `remarks` are read after `drawing` was called, which may have written into them what the picture does not show;
-        they stand below the caption. Empty without pictures; where it cannot be drawn, the reason.
+        `drawing` may append `remarks`, which are printed below the caption. The answer is empty without pictures, and
+        the reason where the picture cannot be drawn.
         """
         if not self._requested:
             return ""
         try:
             figure = drawing(_STYLE)
             for axes in figure.axes:
-                # What has many points becomes an image within the picture; axes and letters stay lines.
+                # Rasterize artists with many points; axes and letters stay vectors.
                 lines: list[Any] = list(axes.lines)
                 clouds: list[Any] = list(axes.collections)
                 points = sum(len(line.get_xdata()) for line in lines) + sum(len(dots.get_offsets()) for dots in clouds)
@@ -81,9 +81,9 @@ class Pictures:
         return f'<figure id="{name}">\n{svg}\n<figcaption>{words}</figcaption>\n</figure>'
 
     def portrait(self, file: SystemFile, eps: Any) -> str:
-        """Sixteen orbits in the plane of the first two variables (in dimension 1 against the step).
+        """Draw sixteen orbits in the plane of the first two variables (in dimension 1 against the step).
 
-        They start around the fixed points of a vector field, and at random where there is none.
+        The initial points lie around the fixed points of a vector field, or are random where there is none.
         """
         at = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
@@ -107,12 +107,12 @@ class Pictures:
             return plot_portrait(shown, style)
 
         where = " and ".join(axes)
-        sentence = f"{eps_told(at, file.map)}, {_STEPS} steps in machine numbers".removeprefix(", ")
+        sentence = f"{eps_told(at, file.map)}, {_STEPS} steps in floating point".removeprefix(", ")
         caption = f"Orbits of {'the Kahan map' if file.is_quadratic else 'the map'} in {where}: {sentence}."
         return self.draw("portrait", caption, f"Portrait of orbits in {where}, {sentence}", drawing, remarks)
 
     def invariant_curves(self, file: SystemFile, eps: Any) -> str:
-        """Three orbits of a member of the family, plane by plane, on the cubic curves that they never leave."""
+        """Draw three orbits of a member of the family on their invariant cubics, plane by plane."""
         at = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
 

@@ -58,8 +58,8 @@ def report_html(
         file: the system that reports are about, for its equations and pictures; an Analysis brings its own.
         title: the title (default: the name of the system).
         pictures: whether to draw; without matplotlib the page says that there are none, and how to get them.
-        command: the command line that makes the page, to be told in it.
-        left_out: sentences on what is not on the page, to be told as notes.
+        command: the command line that makes the page, printed on the page.
+        left_out: sentences on what is not on the page, printed as notes.
         explore: for an Analysis, a page on which eps and the start of an orbit are moved by sliders.
 
     Returns:

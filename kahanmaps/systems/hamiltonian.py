@@ -15,7 +15,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ, integer
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import degree, evaluate, gradient, is_homogeneous, linear_combinations, names_of
-from kahanmaps.displayed import DisplayedAsFormula
+from kahanmaps.display_protocols import LatexDisplay
 from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -34,7 +34,7 @@ def standard_structure(dim: int) -> fmpq_mat:
 
 
 @dataclass(frozen=True, eq=False)
-class CubicHamiltonian(DisplayedAsFormula):
+class CubicHamiltonian(LatexDisplay):
     """A polynomial H of degree at most 3 and a constant skew matrix J; the system is f = J grad H.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial

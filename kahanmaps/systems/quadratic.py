@@ -19,7 +19,7 @@ from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.parsing import check_names, parse_polynomial
 from kahanmaps.algebra.polynomials import digits_of, evaluate, linear_combinations, names_of, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.displayed import DisplayedAsFormula
+from kahanmaps.display_protocols import LatexDisplay
 from kahanmaps.errors import InputError
 from kahanmaps.systems.polynomial import PolynomialField
 
@@ -29,7 +29,7 @@ LONG_COEFFICIENTS = 2_000  # digits, with which equations in them are no longer 
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticSystem(PolynomialField, DisplayedAsFormula):
+class QuadraticSystem(PolynomialField, LatexDisplay):
     """x' = f(x), its right-hand sides of degree at most 2 in the variables.
 
     `rhs` are polynomials over Q in the variables, then in `symbols`: constants without a value, eps possibly among

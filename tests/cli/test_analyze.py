@@ -164,7 +164,7 @@ def test_seconds_end_a_process_at_any_load():
 @pytest.mark.usefixtures("one_process")
 def test_sections_are_reported_as_soon_as_they_are_final(kahanmaps, monkeypatch):
     told = []
-    monkeypatch.setattr("kahanmaps_cli.commands.analyze.tell", lambda text, **_: told.append(text.strip()))
+    monkeypatch.setattr("kahanmaps_cli.commands.analyze.print_stdout", lambda text, **_: told.append(text.strip()))
     seen = {}
     for part in ("find_densities", "height_survey", "linear_symmetries"):
         whole = getattr(table, part)

@@ -246,7 +246,7 @@ def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batc
     done = batch("run", spec, "--json")
     assert done.status == 3
     assert (done.json["done"], done.json["missing"]) == ({"ok": 2, "lost": 1}, 1)
-    assert "1 task lost, without a result: what did them was killed, or could not be run, 5 times" in done.err
+    assert "1 task lost without a result: their worker was killed or could not be started 5 times" in done.err
     assert "(the child was killed by signal 9 (SIGKILL), from outside or for want of memory)" in done.err
     assert "1 task without a result yet; to continue: kahanmaps batch run study.toml --db study.db" in done.err
     assert "failed" not in done.err

@@ -127,7 +127,7 @@ def test_starts_are_not_awaited_from_a_pipe_that_nobody_may_write_to(kahanmaps, 
     os.mkfifo(tmp_path / "s")
     outcome = kahanmaps(f"{TOP} --steps 1 --starts", tmp_path / "s")
     assert (outcome.status, outcome.out) == (2, "")
-    assert "it is a pipe or a device, expected a file" in outcome.err
+    assert "found a pipe or a device, expected a file" in outcome.err
 
 
 def test_integrals_may_contain_an_algebraic_parameter(kahanmaps, tmp_path):

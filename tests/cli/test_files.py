@@ -88,7 +88,7 @@ def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way
         target.symlink_to(source)
     outcome = kahanmaps(lines[name].replace("IN", str(source)), "-o", target)
     assert (outcome.status, outcome.out, source.read_bytes()) == (2, "", before)
-    assert "it would be written over" in outcome.err
+    assert "would be overwritten" in outcome.err
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])

@@ -59,8 +59,8 @@ def test_a_range_is_exact(text, values):
         ("1..5 Step 2", "expected \"FIRST..LAST\""),
         ("1..3..5", "found '3..5', expected an integer, p/q or a decimal"),
         ("a..b", "found 'a', expected an integer, p/q or a decimal"),
-        ("0..1e30", "more values than anybody can want"),
-        ("0..1 step 1e-5000", "more values than anybody can want"),
+        ("0..1e30", "too many values"),
+        ("0..1 step 1e-5000", "too many values"),
     ],
 )  # fmt: skip
 def test_a_wrong_range_is_refused_in_a_sentence(text, words):

@@ -106,7 +106,7 @@ def test_tasks_of_ones_own_are_brought_in_by_the_environment(modules, monkeypatc
     [
         (None, "ModuleNotFoundError: No module named 'own_one'"),
         ("def f(:", "SyntaxError: invalid syntax"),
-        (TASK.replace("NAME", "orbit"), "TypeError: there are two tasks of the name orbit"),
+        (TASK.replace("NAME", "orbit"), "TypeError: there are two tasks with the name orbit"),
         (TASK.replace("seed", "sed"), "TypeError: task NAME: sed is not an option; did you mean seed"),
     ],
 )

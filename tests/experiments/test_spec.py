@@ -44,7 +44,7 @@ def test_the_time_step_is_twice_eps(axes, eps):
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ('zip = [["parameters.s", "parameters.r"]]', "zip[1]: found the same values in places 1 and 2"),
+        ('zip = [["parameters.s", "parameters.r"]]', "zip[1]: found equal values at positions 1 and 2"),
         ("", "axes.parameters.s[2]: found 1, the same value as in place 1"),
     ],
 )

@@ -15,7 +15,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots.drifts.drift import _Bins, _edges, clipped_from, plot_drift, small_start, survey_drift
-from kahanmaps.plots.drifts.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
+from kahanmaps.plots.drifts.drift_functions import OfTheImage, functions_of, known_functions, requested_functions
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -26,7 +26,7 @@ SQUARE = SystemFile.from_system(QuadraticSystem.from_text(["x"], ["x^2"]), "squa
 
 
 def survey(file, start, steps, requests, methods=("generic",), eps=EPS, **how):
-    return survey_drift(file.system, eps, start, steps, asked_functions(file, eps, requests), methods, **how)
+    return survey_drift(file.system, eps, start, steps, requested_functions(file, eps, requests), methods, **how)
 
 
 def only(found):
@@ -71,11 +71,11 @@ def test_known_functions_are_claims_and_then_H_and_where_nothing_is_known_the_op
 
 
 def test_expressions_may_contain_eps_and_have_a_name_each():
-    [function] = asked_functions(CIRCLE, EPS, [("E", "x^2 + eps*y")])
+    [function] = requested_functions(CIRCLE, EPS, [("E", "x^2 + eps*y")])
     assert function(np.array([[2.0, 20.0]])).tolist() == [5.0]
     for requests in ([("", "x"), ("", "x")], [("E", "x"), ("E", "y")]):
         with pytest.raises(InputError, match="found two functions of the name"):
-            asked_functions(CIRCLE, EPS, requests)
+            requested_functions(CIRCLE, EPS, requests)
 
 
 # Errors
@@ -118,7 +118,7 @@ def test_an_orbit_that_ends_early_is_no_whole_one():
 )
 def test_wrong_values_are_refused(start, steps, eps, methods):
     with pytest.raises(InputError, match=r"expected|needs"):
-        survey_drift(CIRCLE.system, eps, start, steps, asked_functions(CIRCLE, EPS, [("E", "x")]), methods)
+        survey_drift(CIRCLE.system, eps, start, steps, requested_functions(CIRCLE, EPS, [("E", "x")]), methods)
 
 
 def test_a_pole_at_the_start_is_refused_and_points_without_a_value_are_counted():
@@ -164,7 +164,7 @@ def drawn(found, **how):
 def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():
     found = survey(load("weierstrass"), ["1/4", "1/8"], 300, [("", "known")], ("generic", "rk4", "midpoint"))
     figure = drawn(found)
-    assert [axes.get_ylabel() for axes in figure.axes] == ["relative error of modified_H", "relative error of $H$"]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["relative error of modified $H$", "relative error of $H$"]
     assert [len(axes.lines) for axes in figure.axes] == [3, 3]
     assert len({line.get_linestyle() for line in figure.axes[0].lines}) == 3
     assert all(line.get_ydata().max() < axes.get_ylim()[1] for axes in figure.axes for line in axes.lines)

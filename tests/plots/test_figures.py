@@ -10,7 +10,16 @@ import pytest
 from helpers import together
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.figures import FORMATS, drawing, format_of, label_of, new_figure, picture_bytes, points, svg_text
+from kahanmaps.plots.figures import (
+    FORMATS,
+    draw_points,
+    drawing,
+    format_of,
+    label_of,
+    new_figure,
+    picture_bytes,
+    svg_text,
+)
 from kahanmaps.plots.style import Style
 
 STYLE = Style(width=4)
@@ -20,7 +29,7 @@ def a_figure(count=10, style=STYLE):
     with drawing(style):
         figure = new_figure(style)
         axes = figure.subplots()
-        points(axes, np.linspace(0, 1, count), np.linspace(0, 1, count))
+        draw_points(axes, np.linspace(0, 1, count), np.linspace(0, 1, count))
         axes.set(xlabel=label_of("x1"), ylabel=label_of(r"a$\frac$_b"))  # a name of a user is no formula
     return figure
 
@@ -37,7 +46,7 @@ def test_the_same_picture_is_the_same_bytes_and_another_is_not(kind):
 
 
 def test_many_points_are_an_image_inside_the_picture(monkeypatch):
-    monkeypatch.setattr("kahanmaps.plots.figures.RASTERISE_ABOVE", 5000)
+    monkeypatch.setattr("kahanmaps.plots.figures.MAX_VECTOR_POINTS", 5000)
     few, many = (picture_bytes(a_figure(count), "svg", STYLE) for count in (5000, 5001))
     assert b"<image" not in few
     assert b"<image" in many

@@ -19,7 +19,7 @@ def planar(*rhs):
 @pytest.mark.parametrize(
     ("rhs", "kind"),
     [
-        (("y", "-x"), "centre"),
+        (("y", "-x"), "center"),
         (("x + y", "y - x"), "focus"),
         (("x", "2*y"), "node"),
         (("x", "-y"), "saddle"),

@@ -104,7 +104,9 @@ def test_marks_are_the_heights_and_the_legend_has_the_constants(survey):
         assert (steps[0], steps[-1]) == (1, 40)
         assert steps[-1] - steps[-2] > 2, "they stand apart"
     low, high = sorted(float(orbit.growth.constant) for orbit in survey.orbits)
-    assert labels(figure) == [rf"$\varepsilon = 1/10$, $2\varepsilon = 1/5$: $c\,n^2$, $c$ = {low:.3g} to {high:.3g}"]
+    assert labels(figure) == [
+        rf"$\varepsilon = 1/10$ (time step 1/5): $h_n \sim c\,n^2$, $c$ = {low:.3g} to {high:.3g}"
+    ]
 
 
 def test_the_fit_has_the_constant_of_the_library(survey):

@@ -174,7 +174,7 @@ def test_a_system_without_normal_form_is_refused_with_the_reason():
 # The picture
 
 
-def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_colour_in_all_panels(curves):
+def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_color_in_all_panels(curves):
     found = curves("m = 3")
     figure = plot_invariant_curves(found, STYLE, original=(0, 1))
     clouds = [axes.collections[0] for axes in figure.axes[:4]]

@@ -45,7 +45,7 @@ def test_text_is_parsed_and_nothing_else_and_eps_needs_a_value():
 
 
 @pytest.mark.parametrize(
-    ("text", "label"), [("x1", "$x_1$"), ("x1^2*y", "$x_1^2 y$"), ("(x1-1)/y", "(x1-1)/y"), ("y+0*x1", "$y$")]
+    ("text", "label"), [("x1", "$x_1$"), ("x1^2*y", "$x_1^2 y$"), ("(x1-1)/y", "$(x_1 - 1) / y$"), ("y+0*x1", "$y$")]
 )
 def test_labels_are_formulas_where_they_are_short(text, label):
     assert point_function(text, ["x1", "y"]).label == label

@@ -1,11 +1,14 @@
 """Portraits: the numbers that are shown, and what is in the figure that shows them."""
 
+from dataclasses import replace
+
 import numpy as np
 from matplotlib.collections import PathCollection
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
+from kahanmaps.plots.portraits.flow import plane_flow
 from kahanmaps.plots.portraits.portrait import neighbours, plot_portrait, portrait_of
 from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, euler_orbits, walked
 from kahanmaps.plots.style import Style
@@ -34,9 +37,9 @@ def test_all_points_of_all_orbits_are_there_and_an_axis_may_be_the_step():
     assert shown.labels == ("step", "$x$")
 
 
-def test_points_at_a_pole_of_an_axis_or_of_the_colour_are_left_out_and_counted():
+def test_points_at_a_pole_of_an_axis_or_of_the_color_are_left_out_and_counted():
     found = trajectories([[[1, 0]], [[2, 1]], [[0, 1]]])
-    shown = portrait_of(found, [point_function("1/x", "xy"), AXES[1]], colour=point_function("1/y", "xy"))
+    shown = portrait_of(found, [point_function("1/x", "xy"), AXES[1]], color=point_function("1/y", "xy"))
     assert shown.undefined == 2
     assert np.isnan(shown.points[:, 0, 0]).tolist() == [True, False, True]
 
@@ -58,7 +61,7 @@ def test_explicit_euler_is_what_its_formula_says_and_spirals_outward_where_kahan
     assert np.ptp(closed) < 0.005  # O(eps^2), for ever
 
 
-def test_more_orbits_are_one_cloud_with_a_colour_for_each_the_widest_first():
+def test_more_orbits_are_one_cloud_with_a_color_for_each_the_widest_first():
     figure = plot_portrait(portrait_of(orbits(8), AXES), STYLE)
     (cloud,) = (c for c in figure.axes[0].collections if isinstance(c, PathCollection))
     # the starts are farther and farther from the equilibrium
@@ -66,10 +69,10 @@ def test_more_orbits_are_one_cloud_with_a_colour_for_each_the_widest_first():
     assert len(cloud.get_offsets()) == 8 * 21
 
 
-def test_points_outside_the_window_do_not_spoil_the_colours():
+def test_points_outside_the_window_do_not_spoil_the_colors():
     values = np.append(np.linspace(0, 1, 50), [1e6] * 20)
     found = trajectories(np.stack([values, values], axis=1)[:, None])
-    shown = portrait_of(found, AXES, colour=AXES[0], window=((0, 2), (0, 2)))
+    shown = portrait_of(found, AXES, color=AXES[0], window=((0, 2), (0, 2)))
     axes = plot_portrait(shown, STYLE).axes[0]
     assert axes.collections[0].norm.vmax == 1
     assert (axes.get_xlim(), axes.get_ylim(), shown.left_out) == ((0, 2), (0, 2), 20)
@@ -87,10 +90,10 @@ def test_points_outside_the_window_are_not_drawn_in_space():
 
 
 def test_no_line_goes_through_a_missing_point_and_no_points_at_all_are_an_empty_picture():
-    shown = portrait_of(trajectories([[[0, 0]], [[1, 1]], [[np.nan, np.nan]], [[3, 0]]]), AXES, colour="step")
+    shown = portrait_of(trajectories([[[0, 0]], [[1, 1]], [[np.nan, np.nan]], [[3, 0]]]), AXES, color="step")
     assert len(plot_portrait(shown, STYLE, lines=True).axes[0].collections[0].get_segments()) == 1
     found = trajectories(np.full((2, 1, 2), np.nan))
-    assert picture_bytes(plot_portrait(portrait_of(found, AXES, colour="step"), STYLE), "png", STYLE)
+    assert picture_bytes(plot_portrait(portrait_of(found, AXES, color="step"), STYLE), "png", STYLE)
 
 
 # Neighbours on a curve
@@ -117,3 +120,20 @@ def test_an_orbit_that_has_not_come_round_has_two_ends_and_one_in_bunches_none()
 def test_a_cloud_has_no_curve():
     assert neighbours(np.random.default_rng(1).uniform(size=(300, 2))) is None
     assert neighbours(np.full((50, 2), np.nan)) is None
+
+
+def test_initial_points_and_equilibria_have_different_marks_and_both_are_in_the_legend():
+    found = orbits(8)
+    shown = replace(portrait_of(found, AXES), flow=plane_flow(LOTKA_VOLTERRA, (0, 1), ((-1, 3), (-1, 3))))
+    [legend] = plot_portrait(shown, STYLE).legends
+    marks = {
+        text.get_text(): line.get_marker() for text, line in zip(legend.get_texts(), legend.get_lines(), strict=True)
+    }
+    assert list(marks) == ["vector field", "separatrix", "saddle", "center", "initial point"]
+    assert (marks["saddle"], marks["center"], marks["initial point"]) == ("x", "o", ">")
+
+
+def test_the_legend_names_only_what_is_drawn():
+    [legend] = plot_portrait(portrait_of(orbits(8), AXES), STYLE).legends
+    assert [text.get_text() for text in legend.get_texts()] == ["initial point"]
+    assert plot_portrait(portrait_of(orbits(8), AXES, color="step"), STYLE).legends == []

@@ -1,4 +1,4 @@
-"""The plane of two parameters: curves and points of a scan, a colour for each block."""
+"""The plane of two parameters: curves and points of a scan, a color for each block."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ import pytest
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.scan.scan import scan
+from kahanmaps.plots.figures import label_of
 from kahanmaps.plots.scan import plot_scan
 
 PLANE = """variables = ["x", "y"]
@@ -48,7 +49,7 @@ def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_the
     assert np.abs(2 * a * b - a - b).max() < 1e-9
     assert (axes.get_xlim(), axes.get_xlabel()) == ((-2.0, 2.0), "$a$")
     at = {text.get_text(): text.xy for text in axes.texts}
-    a, b = at["2*a*b - a - b = 0"]
+    a, b = at["$2 a b - a - b = 0$"]
     assert abs(2 * a * b - a - b) < 1e-9
     assert at["(1, 1)"] == (1, 1)
     # Conditions do not overlap, and none is of exponential growth.
@@ -56,7 +57,7 @@ def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_the
     boxes = [text.get_window_extent() for text in axes.texts]
     assert len(boxes) > 3
     assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
-    assert not set(at) & {one.text for one in of_growth(found, "exponential")}
+    assert not set(at) & {label_of(one.text) for one in of_growth(found, "exponential")}
 
 
 def test_a_scan_without_conditions_is_an_empty_plane_and_one_of_another_dimension_refused():
@@ -73,7 +74,7 @@ def test_the_plane_modulo_a_prime_has_every_slow_member(found):
     sweep = next(one for one in found.sweeps if one.prime == 13)
     drawn = [tuple(point) for line in axes.lines for point in line.get_xydata().tolist()]
     assert sorted(drawn) == sorted(sweep.slow)
-    a, b = {text.get_text(): text.xy for text in axes.texts}["2*a*b - a - b = 0"]
+    a, b = {text.get_text(): text.xy for text in axes.texts}["$2 a b - a - b = 0$"]
     assert (2 * a * b - a - b) % 13 == 0
     with pytest.raises(InputError, match="expected one modulo which all members were tried: 11, 13, 17"):
         plot_scan(found, modulo=19)

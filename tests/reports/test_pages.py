@@ -140,7 +140,7 @@ def test_a_system_with_an_algebraic_parameter_is_drawn_around_its_fixed_points()
     assert "separatrix" in html
     assert "outside" not in html
     which = Pictures().portrait(km.System(field, a="root of t^2 - 2"), None)
-    assert "machine numbers: not drawn, for a root of t^2 - 2 may be -1.41421, 1.41421" in which
+    assert "floating point: not drawn, for a root of t^2 - 2 may be -1.41421, 1.41421" in which
 
 
 def test_browsers_are_told_to_run_no_script_and_to_load_nothing(drawn):
@@ -208,7 +208,7 @@ def test_a_page_names_the_second_system_its_eps_and_an_orbit_that_ended_early():
     assert "euler_top, euler_top, eps = 1/10 (time step 2 eps = 1/5), second map at eps2 = 1/7" in page.text
     settings = km.Settings(eps="1/10", start=(1, "1/2"), steps=60, max_digits=200, orbit_is_asked=True)
     report = km.check_integrals(km.load("planar_cubic_hamiltonian"), settings)
-    assert "The orbit that was asked for ended early" in require_sound(report_html(report, pictures=False)).text
+    assert "The requested orbit ended early" in require_sound(report_html(report, pictures=False)).text
     assert "ended early" in report._repr_html_()
     assert "ended early" not in report_html(km.check_integrals(top), pictures=False)
 

@@ -11,9 +11,9 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import symbols_and_eps
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import echo, formula, on_terminal, tell
+from kahanmaps_cli.screen.terminal import formula, on_terminal, print_raw, print_stdout
 from kahanmaps_cli.signals import INTERRUPTED
 
 
@@ -23,10 +23,10 @@ from kahanmaps_cli.signals import INTERRUPTED
 @opt.symbolic_option
 @opt.effort_options
 @opt.seed_option
-@click.option("--markdown", is_flag=True, help="The report in Markdown.")
+@click.option("--markdown", is_flag=True, help="Print the report in Markdown.")
 @opt.output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
-    """What the map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
+    """Analyze the map of SYSTEM: report what it preserves, how it grows, and a verdict on integrability.
 
     \b
       kahanmaps analyze euler_top --symbolic a1,a2,a3
@@ -36,15 +36,14 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)" --json
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
-    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).
-    Fixed points with eigenvalues, and a system of the catalogue that an affine change of variables leads to.
-    Integrals and densities in closed form with their proofs, which integrals of the flow it keeps, deforms and loses,
-    genus and base points of the curves of a planar integral, Hirota-Kimura relations, degrees of the iterates and their
-    recurrence, heights, symmetries and reversing ones, commuting systems, singularity confinement, and whether the
-    system belongs to the commuting family, in these or other affine coordinates. Claims in the file are not read.
-    Without --eps everything is for every eps.
+    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md). The report
+    contains fixed points with eigenvalues; an affinely equivalent system of the catalogue; integrals and densities with
+    proofs; the integrals of the flow that the map keeps, deforms or loses; genus and base points of the curves of a
+    planar integral; Hirota-Kimura relations; degrees of the iterates and their recurrence; heights; symmetries and
+    reversing symmetries; commuting systems; singularity confinement; and membership in the commuting family. Claims in
+    the file are not used. Without --eps the results hold for every eps.
 
-    proved, supported: formulas, as identities in x and eps. measured: modulo primes and along orbits, which is
+    Formulas are proved or supported as identities in x and eps. Results measured modulo primes and along orbits are
     evidence. The number of integrals and the growth are separate findings.
 
     Exit status: 0 there is a verdict, 2 usage error, 3 undecided.
@@ -74,17 +73,17 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
             lines += [f"## {name}", ""]
             lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
             lines.append("")
-        echo("\n".join([*lines, found.work]))
+        print_raw("\n".join([*lines, found.work]))
     else:
-        report.tell(found.sections)
+        report.print_new(found.sections)
         final = found.conclusion
-        tell("\nverdict", style="bold")
-        tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
-        tell(found.work)
+        print_stdout("\nverdict", style="bold")
+        print_stdout(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
+        print_stdout(found.work)
     if search.is_over:
         return 3
     if found.interrupted:
-        say("interrupted: the verdict rests on what was found so far")
+        print_stderr("interrupted: the verdict rests on what was found so far")
         return INTERRUPTED
     return 3 if found.conclusion.kind == "undecided" else 0
 
@@ -102,16 +101,16 @@ class _Report:
         if self._is_silent:
             return
         if begins:
-            tell(lib.analysis_head(found))
-        self.tell(found.final_sections)
+            print_stdout(lib.analysis_head(found))
+        self.print_new(found.final_sections)
 
-    def tell(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
+    def print_new(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
         """Print the sections that have not been printed yet."""
         if self.progress is not None and len(sections) > self._told:
             self.progress.clear()
         for name, lines in sections[self._told :]:
-            tell(f"\n{name}", style="bold")
+            print_stdout(f"\n{name}", style="bold")
             for line in lines:
-                tell(f"{line.status}\t{formula(line.text)}")
+                print_stdout(f"{line.status}\t{formula(line.text)}")
         self._told = max(self._told, len(sections))
         sys.stdout.flush()

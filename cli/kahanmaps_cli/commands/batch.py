@@ -24,9 +24,9 @@ from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.params import Shard
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import Progress, as_typed, duration, say
+from kahanmaps_cli.screen.progress import Progress, as_typed, duration, print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
+from kahanmaps_cli.screen.terminal import on_terminal, print_entry, print_raw, print_stdout, print_table, shorten
 from kahanmaps_cli.signals import interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -41,7 +41,7 @@ _NEEDS = {
 }
 
 _ONLY = click.option(
-    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable."
+    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Restrict to this experiment. Repeatable."
 )
 
 
@@ -52,13 +52,13 @@ def _database(required: bool = True) -> Callable[[F], F]:
         envvar="KAHANMAPS_DB",
         required=required,
         metavar="FILE",
-        help="The database of results (or set KAHANMAPS_DB).",
+        help="Database of results (default: the variable KAHANMAPS_DB).",
     )
 
 
 @click.group("batch", cls=SuggestingGroup)
 def command() -> None:
-    """Thousands of experiments from one file: planned, run in worker processes, stored, resumed.
+    """Run thousands of experiments from one file in worker processes; store and resume them.
 
     \b
       kahanmaps batch run study.toml -j 2       # results go to study.db
@@ -68,11 +68,11 @@ def command() -> None:
       kahanmaps batch export --db study.db --csv -o study.csv
       kahanmaps batch tasks                     # what an experiment can do
 
-    docs/batch.md describes the file, and how to use many machines.
+    docs/batch.md describes the file and the use of several machines.
     """
 
 
-@command.command("run", short_help="Do the tasks of a spec, with the results in a database.")
+@command.command("run", short_help="Run the tasks of a spec; store the results in a database.")
 @click.argument("spec", required=False, type=click.Path(dir_okay=False), shell_complete=complete_toml)
 @_database(required=False)
 @click.option(
@@ -80,16 +80,16 @@ def command() -> None:
     "--jobs",
     type=click.IntRange(1, 1024),
     metavar="N",
-    help="Worker processes at a time (default: the processors).",
+    help="Number of worker processes (default: one per processor).",
 )
 @_ONLY
-@click.option("--shard", type=Shard(), metavar="I/N", help="Only the I-th of N parts: for job arrays.")
-@click.option("--retry-failed", is_flag=True, help="Do failed tasks again as well.")
-@click.option("--dry-run", is_flag=True, help="Check the spec, show how many tasks there are and the first few.")
+@click.option("--shard", type=Shard(), metavar="I/N", help="Run the I-th of N parts only (for job arrays).")
+@click.option("--retry-failed", is_flag=True, help="Repeat failed tasks too.")
+@click.option("--dry-run", is_flag=True, help="Check the spec and list its first tasks; run none.")
 @click.option(
     "--skip-bad",
     is_flag=True,
-    help='Leave out systems that cannot be read, and list them in the database (on_error = "skip" in the spec).',
+    help='Skip systems that cannot be read, and list them in the database (as on_error = "skip" in the spec).',
 )
 @click.option(
     "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more tasks (default 1000000)."
@@ -99,40 +99,40 @@ def command() -> None:
     metavar="ADDRESS",
     help="Use the workers of a dask scheduler that you trust: tls://host:port, tcp://host:port or its file.",
 )
-@click.option("--worker-python", metavar="PATH", help="The Python of those workers (default: the path of this one).")
+@click.option("--worker-python", metavar="PATH", help="Python of those workers (default: the path of this one).")
 @click.option(
     "--group-seconds",
     type=click.FloatRange(0, 86400),
     metavar="T",
     default=5.0,
     show_default=True,
-    help="Short tasks share a worker process, or a command on the cluster, for so long.",
+    help="Run short tasks together in one worker process, or one job of the cluster, for T seconds.",
 )
-@click.option("--jsonl", "as_jsonl", is_flag=True, help="Every record on standard output, as it comes in.")
+@click.option("--jsonl", "as_jsonl", is_flag=True, help="Print each record on standard output when it is finished.")
 @output_options
 def run(spec: str | None, db: str | None, **options: Any) -> int:
-    """Do the tasks of SPEC that have no result yet, and put the results into a database.
+    """Run the tasks in SPEC that have no result yet, and store the results in a database.
 
     \b
       kahanmaps batch run study.toml --dry-run
       kahanmaps batch run study.toml -j 2              # results in study.db
-      kahanmaps batch run study.toml --db all.db       # does what is missing
+      kahanmaps batch run study.toml --db all.db       # runs what is missing
       kahanmaps batch run --db all.db --retry-failed   # without the spec
       kahanmaps batch run study.toml --shard 3/16 --db part3.db
       kahanmaps batch run study.toml --scheduler tcp://head:8786
 
-    Every result is in the database the moment it is there: whatever is killed, only tasks in flight are lost, and the
-    same command continues. Ctrl-C lets the tasks in flight end, for ten seconds at most; a second one ends at once.
+    Each result is stored as soon as it is finished: if the run is killed, only running tasks are lost, and the same
+    command continues. The first Ctrl-C waits up to ten seconds for running tasks; the second one ends at once.
 
-    Exit status: 0 every task is done, whatever the verdicts, 2 usage error, 3 some task failed or has no result, 130
-    interrupted.
+    Exit status: 0 every task has a result, whatever its verdict, 2 usage error, 3 some task failed or has no result,
+    130 interrupted.
     """
     if options["as_json"] and options["as_jsonl"]:
         raise click.UsageError("give --json or --jsonl, not both")
     if spec is None and (db is None or options["dry_run"]):
-        raise click.UsageError("missing SPEC, a TOML file with experiments (or --db FILE, to continue what is in it)")
+        raise click.UsageError("missing SPEC, a TOML file with experiments (or --db FILE, to continue its experiments)")
     if options["scheduler"] is not None and options["jobs"] is not None:
-        raise click.UsageError("give --jobs or --scheduler, not both: on a cluster its workers say how many")
+        raise click.UsageError("give --jobs or --scheduler, not both: a cluster has its own number of workers")
     db = db or Path(str(spec)).with_suffix(".db").name
     if options["dry_run"]:
         _dry_run(str(spec), db, options)
@@ -141,12 +141,12 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
 
 
 def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
-    """Read the spec, and say what it would do."""
+    """Read the spec and print what it would run."""
     spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
     chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
     _require_experiments(options["only"], [experiment.name for experiment in spec.experiments])
     missing = None
-    if os.path.exists(db):  # it is asked, and not changed
+    if os.path.exists(db):  # opened read-only
         with lib.Store.open(db, readonly=True) as store:
             done = {row.task.key for row in store.rows() if row.record is not None}
         missing = len({task.key for experiment in chosen for task in experiment.tasks()} - done)
@@ -178,22 +178,24 @@ def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
         )
         return
     for experiment in chosen:
-        tell(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
+        print_stdout(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
         for k in range(min(_TASKS_SHOWN, experiment.size)):
             task = experiment[k]
             given = {name: value for name, value in task.options.items() if value is not None}
             if "other" in given:
                 given["other"] = lib.system_words(given["other"])
-            tell(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given)}")
+            print_stdout(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given)}")
         if experiment.size > _TASKS_SHOWN:
-            tell(f"\t... and {experiment.size - _TASKS_SHOWN} more")
+            print_stdout(f"\t... and {experiment.size - _TASKS_SHOWN} more")
         for system, reason in experiment.skipped:
-            tell(f"\tskipped\t{system}\t{reason}")
-    tell(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
+            print_stdout(f"\tskipped\t{system}\t{reason}")
+    print_stdout(
+        _tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without a result")
+    )
 
 
 def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
-    """Do what is missing; the exit status."""
+    """Run the missing tasks; return the exit status."""
     limits = {"max_tasks": options["max_tasks"] or lib.MAX_TASKS, "skip_bad": options["skip_bad"]}
     spec = None if path is None else lib.read_spec(path, **limits)
     experiments = () if spec is None else spec.experiments
@@ -206,35 +208,35 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
         progress = BatchProgress(store.count_pending(**which, retry_failed=options["retry_failed"]), options["quiet"])
         for experiment in experiments:
             if experiment.skipped:
-                progress.say(
+                progress.print(
                     f"{experiment.name}: {counted(len(experiment.skipped), 'system')} skipped (see batch status)"
                 )
         for name, plan in planned.items():
             if not plan.is_resumed:
-                words = [_tasks(plan.total)]
-                words += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
-                words += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
-                progress.say(f"{name}: {', '.join(words)}")
+                parts = [_tasks(plan.total)]
+                parts += [f"{plan.new_tasks} of them new"] if plan.new_tasks < plan.total else []
+                parts += [f"{plan.dropped} of the earlier plan are not in it"] if plan.dropped else []
+                progress.print(f"{name}: {', '.join(parts)}")
         todo = f"{_tasks(progress.todo)} to do, results go to {db}"
-        progress.say(todo if progress.todo else f"nothing to do: every task has a result in {db}")
+        progress.print(todo if progress.todo else f"nothing to do: every task has a result in {db}")
         was_interrupted = False
         if progress.todo:
             jobs = store.pending(**which, retry_failed=options["retry_failed"])
             cluster = (options["scheduler"], options["worker_python"])
             processes = options["jobs"] or lib.processors()
-            executor = lib.executor_for(store.document, processes, *cluster, options["group_seconds"], progress.say)
+            executor = lib.executor_for(store.document, processes, *cluster, options["group_seconds"], progress.print)
             with progress, closing(executor):
-                batch, is_told = lib.Batch(jobs, executor), False
+                batch, is_announced = lib.Batch(jobs, executor), False
                 with interruptible(batch.interrupt):
                     for records in batch:
-                        if batch.was_interrupted and not is_told:  # not in the handler: a line may be half written
-                            is_told = True
+                        if batch.was_interrupted and not is_announced:  # not in the handler: a line may be half written
+                            is_announced = True
                             if executor.in_flight:
-                                flying = _tasks(executor.in_flight)
-                                progress.say(f"finishing {flying} in flight (Ctrl-C again ends at once)")
-                        if records:  # before the next job is handed out
+                                running = _tasks(executor.in_flight)
+                                progress.print(f"finishing {running} in flight (Ctrl-C again ends at once)")
+                        if records:  # stored before the next job is submitted
                             store.add(records)
-                        progress.tell(records, executor.in_flight)
+                        progress.add(records, executor.in_flight)
                         for record in records if options["as_jsonl"] else ():
                             click.echo(json.dumps({"record": "result", **record.to_json()}))
                 was_interrupted = batch.was_interrupted
@@ -248,10 +250,10 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     elif not options["as_jsonl"]:
         _print_status(data)
     if progress.done:
-        progress.say(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
+        progress.print(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
     if progress.lost:
-        progress.say(
-            f"{_tasks(progress.lost)} lost, without a result: what did them was killed, or could not be run, "
+        progress.print(
+            f"{_tasks(progress.lost)} lost without a result: their worker was killed or could not be started "
             f"{lib.TRIES} times ({progress.why_lost})"
         )
     words = ["kahanmaps", "batch", "run", *([f"./{path}" if path.startswith("-") else path] if path else [])]
@@ -264,10 +266,10 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     again = as_typed(words)
     if missing:
         how = "interrupted: " if interrupted else ""
-        progress.say(f"{how}{_tasks(missing)} without a result yet; to continue: {again}")
+        progress.print(f"{how}{_tasks(missing)} without a result yet; to continue: {again}")
     if failed:
         why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
-        progress.say(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
+        progress.print(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
     if interrupted:
         return 130
     return 3 if failed or missing else 0
@@ -278,32 +280,32 @@ def _tasks(number: int) -> str:
 
 
 class BatchProgress(Progress):
-    """Progress that is told of records; `todo` of them are expected."""
+    """Progress of a batch by its records; `todo` of them are expected."""
 
     def __init__(self, todo: int, quiet: bool) -> None:
         super().__init__(quiet)
         self.todo = todo
         self.outcomes: Counter[str] = Counter()
-        self.why_lost = ""  # the last of them
+        self.why_lost = ""  # message of the last lost task
         self._begin = time.monotonic()
 
     @property
     def done(self) -> int:
-        """How many tasks have come to a result."""
+        """The number of tasks that have a result."""
         return sum(self.outcomes.values()) - self.lost
 
     @property
     def lost(self) -> int:
-        """How many were given up without a result."""
+        """The number of tasks given up without a result."""
         return self.outcomes["lost"]
 
     @property
     def seconds(self) -> float:
-        """Since the beginning."""
+        """Seconds since the start."""
         return time.monotonic() - self._begin
 
-    def tell(self, records: Sequence[lib.Record], in_flight: int) -> None:
-        """Some more records, or none for a while; how many tasks are being done."""
+    def add(self, records: Sequence[lib.Record], in_flight: int) -> None:
+        """Count new records, perhaps none, and show how many tasks are running."""
         for record in records:
             self.outcomes[str(record.outcome)] += 1
             if record.outcome == "lost":
@@ -316,11 +318,11 @@ class BatchProgress(Progress):
         counts = {"running": in_flight, "failed": bad, "lost": self.lost}
         self(", ".join([*pieces, *(f"{count} {word}" for word, count in counts.items() if count)]))
 
-    def say(self, text: str) -> None:
-        """A message on a line of its own."""
+    def print(self, text: str) -> None:
+        """Print a message on its own line."""
         if not self.quiet:
             self.clear()
-            say(text)
+            print_stderr(text)
 
 
 @command.command("status")
@@ -328,13 +330,13 @@ class BatchProgress(Progress):
 @_ONLY
 @json_option
 def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
-    """How far the experiments in a database have come.
+    """Show the progress of the experiments in a database.
 
     \b
       kahanmaps batch status --db study.db
       kahanmaps batch status --db study.db --json | jq '.experiments[].missing'
 
-    May be asked while a batch is running.
+    It may be used while a batch is running.
     """
     with lib.Store.open(db, readonly=True) as store:
         data = _status(store, only)
@@ -345,7 +347,7 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
 
 
 def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
-    """How far the experiments are, as plain data."""
+    """Return the progress of the experiments for JSON."""
     experiments = store.status()
     _require_experiments(only, [experiment.name for experiment in experiments])
     return {
@@ -368,7 +370,7 @@ def _status(store: lib.Store, only: Sequence[str]) -> dict[str, Any]:
 
 
 def _require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
-    """Raises InputError for a name that no experiment has."""
+    """Raise InputError for an unknown experiment."""
     for name in only:
         if name not in known:
             hint = suggestion(name, known)
@@ -378,7 +380,7 @@ def _require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
 
 
 def _print_status(data: Mapping[str, Any]) -> None:
-    """A line for each experiment."""
+    """Print a line for each experiment."""
     rows = data["experiments"]
     kinds = ["ok", *(kind for kind in lib.KEPT[1:] if any(row["outcomes"].get(kind) for row in rows))]
     verdicts = [verdict for verdict in lib.VERDICTS if any(row["verdicts"].get(verdict) for row in rows)]
@@ -390,9 +392,9 @@ def _print_status(data: Mapping[str, Any]) -> None:
     print_table(table)
     for row in rows:
         for skipped in row["skipped"]:
-            echo(f"{row['name']} skips {skipped['system']}: {skipped['reason']}")
+            print_raw(f"{row['name']} skips {skipped['system']}: {skipped['reason']}")
     if data["unplanned"]:
-        click.echo(f"{data['unplanned']} more results belong to tasks that no experiment has now")
+        click.echo(f"{data['unplanned']} more results belong to tasks of no current experiment")
 
 
 @command.command("show")
@@ -400,19 +402,19 @@ def _print_status(data: Mapping[str, Any]) -> None:
 @_database()
 @json_option
 def show(key: str, db: str, as_json: bool) -> None:
-    """One task with all that is known of it.
+    """Show a task with its options, result and documents.
 
     \b
       kahanmaps batch show 3fa8 --db study.db
       kahanmaps batch show 3fa8 --db study.db --json | jq .result
 
-    KEY: the first digits of its key, four or more; batch run --dry-run and batch export have the keys.
+    KEY is the key of the task or its first digits, at least four; batch run --dry-run and batch export list keys.
     """
     with lib.Store.open(db, readonly=True) as store:
-        found = store.find(key)
-        if not found:
+        matches = store.find(key)
+        if not matches:
             raise lib.InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
-        for k, (task, record, places, attempts) in enumerate(found):
+        for k, (task, record, places, attempts) in enumerate(matches):
             data: dict[str, Any] = {
                 **envelope("batch show"),
                 "convention": lib.CONVENTION,
@@ -447,19 +449,23 @@ def show(key: str, db: str, as_json: bool) -> None:
                 lines["where"] = f"{data['host']}, {data['finished']}, {versions}"
             for name, value in lines.items():
                 text = value if isinstance(value, str) else json.dumps(value)
-                tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
+                print_stdout(
+                    f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t")
+                )
 
 
-@command.command("export", short_help="The results as CSV, JSON lines or Parquet.")
+@command.command("export", short_help="Export results as CSV, JSON lines or Parquet.")
 @_database()
-@click.option("--csv", "form", flag_value="csv", help="A table, a column for each option and each entry of results.")
-@click.option("--jsonl", "form", flag_value="jsonl", help="One JSON object a line, everything in it.")
-@click.option("--parquet", "form", flag_value="parquet", help="The table of --csv with types; needs pyarrow, and -o.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
-@click.option("--stable", is_flag=True, help="Leave out times, memory, hosts and versions: the same work, same bytes.")
+@click.option("--csv", "form", flag_value="csv", help="Write a table: a column for each option and each result.")
+@click.option("--jsonl", "form", flag_value="jsonl", help="Write one complete JSON object per line.")
+@click.option(
+    "--parquet", "form", flag_value="parquet", help="Write the table of --csv with types (needs pyarrow, -o)."
+)
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
+@click.option("--stable", is_flag=True, help="Omit times, memory, hosts and versions: the same in each run.")
 @_ONLY
 def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
-    """Write the results of a database to standard output or a file, in the order of the plan.
+    """Export the results of a database in the order of the plan.
 
     \b
       kahanmaps batch export --db study.db --csv -o study.csv
@@ -472,14 +478,14 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
     if form is None:
         raise click.UsageError("missing --csv, --jsonl or --parquet")
     if form == "parquet" and output in (None, "-"):
-        raise click.UsageError("--parquet needs -o FILE: it is no text")
+        raise click.UsageError("--parquet needs -o FILE: Parquet is binary")
     with lib.Store.open(db, readonly=True) as store, ExitStack() as stack:
         rows = partial(store.rows, list(only) or None)
         if form == "parquet":
             lib.write_parquet(rows, str(output), stable=stable)
             return
         stream: Any = sys.stdout
-        if output not in (None, "-"):  # a file is complete or is not there
+        if output not in (None, "-"):  # written atomically
             stream = codecs.getwriter("utf-8")(stack.enter_context(lib.atomic_write(str(output))))
         if form == "csv":
             lib.write_csv(rows, stream, stable=stable)
@@ -487,25 +493,25 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
             lib.write_jsonl(rows(), stream, stable=stable)
 
 
-@command.command("summary", short_help="Counts and quantiles for groups of tasks.")
+@command.command("summary", short_help="Summarize groups of tasks by counts and quantiles.")
 @_database()
-@click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Group by these, e.g. m,eps.")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="Only these numbers. Repeatable.")
-@click.option("--stable", is_flag=True, help="Leave out times and memory.")
-@click.option("--markdown", "as_markdown", is_flag=True, help="Tables in Markdown.")
+@click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Group by names, e.g. m,eps.")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="Summarize this number only. Repeatable.")
+@click.option("--stable", is_flag=True, help="Omit times and memory.")
+@click.option("--markdown", "as_markdown", is_flag=True, help="Print tables in Markdown.")
 @_ONLY
 @json_option
 def summary(
     db: str, by: str, values: tuple[str, ...], stable: bool, as_markdown: bool, only: tuple[str, ...], as_json: bool
 ) -> None:
-    """Counts of outcomes and verdicts, and quantiles of the numbers, for groups of tasks.
+    """Summarize groups of tasks: outcomes, verdicts, and quantiles of numbers.
 
     \b
       kahanmaps batch summary --db study.db --by m,eps
       kahanmaps batch summary --db study.db --by m --value constant --markdown
-      kahanmaps batch summary --db study.db --by outcome,message  # why they fail
+      kahanmaps batch summary --db study.db --by outcome,message  # why tasks fail
 
-    --by takes options (eps), parts of the system (name, m, seed, parameters.a), entries of results (dimension,
+    --by accepts options (eps), parts of the system (name, m, seed, parameters.a), entries of results (dimension,
     growth), and experiment, task, outcome, verdict, message.
     """
     if as_json and as_markdown:
@@ -517,21 +523,21 @@ def summary(
     if as_json:
         print_json({**envelope("batch summary"), "convention": lib.CONVENTION, **result.to_json()})
     elif as_markdown:
-        echo(lib.summary_markdown(result), end="")
+        print_raw(lib.summary_markdown(result), end="")
     elif on_terminal():
         for table in result.tables(digits=4):
             print_table([table.columns, *table.rows], words=table.words)
     else:
         for line in result.lines():
-            echo(line)
+            print_raw(line)
 
 
-@command.command("merge", short_help="Bring the results of several databases together.")
+@command.command("merge", short_help="Merge databases of results.")
 @click.argument("target", type=click.Path(dir_okay=False))
 @click.argument("sources", nargs=-1, required=True, type=click.Path(dir_okay=False))
 @output_options
 def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> int:
-    """Bring the results of SOURCES into TARGET, which is made if it is not there.
+    """Merge the results of SOURCES into TARGET, which is created if it does not exist.
 
     \b
       kahanmaps batch merge all.db part1.db part2.db
@@ -539,32 +545,34 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
     Exit status: 0 done, 2 usage error, 3 some task has different results in two of them (those of TARGET are kept).
     """
-    for source in sources:  # one that cannot be read is told before an empty target is made
+    for source in sources:  # check all before an empty target is created
         lib.Store.open(source, readonly=True).close()
     with lib.Store.open(target, create=True) as store:
         merged = [(source, store.merge(source)) for source in sources]
-    conflicts = sum(found.conflicts for _, found in merged)
+    conflicts = sum(counts.conflicts for _, counts in merged)
     if as_json:
-        data = [{"source": source, **asdict(found)} for source, found in merged]
+        data = [{"source": source, **asdict(counts)} for source, counts in merged]
         print_json({**envelope("batch merge"), "target": target, "merged": data})
     else:
-        for source, found in merged:
-            counts = f"new results: {found.results}\tfailures replaced: {found.replaced}\tconflicts: {found.conflicts}"
-            echo(f"{source}\t{counts}")
+        for source, counts in merged:
+            print_raw(
+                f"{source}\tnew results: {counts.results}\tfailures replaced: {counts.replaced}\t"
+                f"conflicts: {counts.conflicts}"
+            )
     if conflicts and not quiet:
-        keys = [key for _, found in merged for key in found.conflicting]
-        say(
+        keys = [key for _, counts in merged for key in counts.conflicting]
+        print_stderr(
             f"{lib.counted(conflicts, 'task')} with different results in two databases, those of {target} were kept: "
             f"{', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''} (batch show KEY --db FILE)"
         )
     return 3 if conflicts else 0
 
 
-@command.command("tasks", short_help="What an experiment can do, with all options.")
+@command.command("tasks", short_help="List the kinds of tasks and their options.")
 @click.argument("name", required=False)
 @json_option
 def tasks(name: str | None, as_json: bool) -> None:
-    """What an experiment can do: the kinds of tasks, and their options with defaults.
+    """List the kinds of tasks of an experiment, or the options of one kind with defaults.
 
     \b
       kahanmaps batch tasks
@@ -588,18 +596,18 @@ def tasks(name: str | None, as_json: bool) -> None:
         return
     width = max(len(kind.name) for kind in kinds)
     for kind in kinds:
-        tell_entry(f"{kind.name:<{width}}  ", kind.summary)
+        print_entry(f"{kind.name:<{width}}  ", kind.summary)
     if name is None:
-        tell("'kahanmaps batch tasks NAME' has the options of one of them")
+        print_stdout("'kahanmaps batch tasks NAME' lists the options of a kind")
         return
     kind = kinds[0]
-    tell(f"system: {_NEEDS[kind.needs]}")
+    print_stdout(f"system: {_NEEDS[kind.needs]}")
     for key, option in kind.options.items():
         default = "required" if key in kind.required else f"default {json.dumps(kind.defaults[key])}"
-        tell_entry(f"  {key:<12}  ", option.help + (f" ({default})" if default != "default null" else ""))
+        print_entry(f"  {key:<12}  ", option.help + (f" ({default})" if default != "default null" else ""))
     if kind.needs is not None:
-        tell('with system = "family" also:')
+        print_stdout('with system = "family" also:')
         for key, option in lib.FAMILY.items():
-            tell_entry(f"  {key:<12}  ", option.help)
+            print_entry(f"  {key:<12}  ", option.help)
         if "seed" not in kind.options:
-            tell_entry(f"  {'seed':<12}  ", "seed of everything drawn at random (default 0)")
+            print_entry(f"  {'seed':<12}  ", "random seed (default 0)")

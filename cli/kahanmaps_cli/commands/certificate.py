@@ -10,7 +10,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli.commands.convert import write_text
 from kahanmaps_cli.options import integral_option, load_system, quiet_option, system_options
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import as_typed, say
+from kahanmaps_cli.screen.progress import as_typed, print_stderr
 
 _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certificate, which --help does not load
 
@@ -56,7 +56,7 @@ def command(system: str | None, checker: str, output: str | None, quiet: bool, *
     try:
         text = lib.certificate(file, checker, options["claims"] or None, integrals or None, command=as_typed(words))
     except lib.FalseClaim as error:
-        say(f"refuted: {error}")
+        print_stderr(f"refuted: {error}")
         return 1
     write_text(text, f"{file.name}: a certificate for {checker}", output, quiet)
     return 0

@@ -54,7 +54,10 @@ def command(name: str) -> click.Command:
     run = opt.check_options(run)
     if check.is_of_pair:
         run = click.option(
-            "--eps2", type=ExactNumber(), metavar="E", help="Another eps for the second map (needs --eps)."
+            "--eps2",
+            type=ExactNumber(),
+            metavar="E",
+            help="Half the time step of the second map (needs --eps; default: the same).",
         )(run)
         run = opt.inline_options(run)
         run = click.argument("other", required=False, shell_complete=complete_system)(run)

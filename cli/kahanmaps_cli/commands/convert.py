@@ -9,7 +9,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import as_typed, say
+from kahanmaps_cli.screen.progress import as_typed, print_stderr
 
 # Those of kahanmaps.languages.convert, which --help does not load.
 _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran", "toml")
@@ -34,11 +34,11 @@ _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia",
     "(default: system, map, and integrals and density where known).",
 )
 @symbolic_option
-@click.option("--name", default="", metavar="NAME", help="Put before the names of all functions.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
+@click.option("--name", default="", metavar="NAME", help="Prefix for the names of all functions.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @quiet_option
 def command(system: str | None, language: str, output: str | None, quiet: bool, **options: Any) -> None:
-    """Write SYSTEM, its map and what is known of it for another program.
+    """Convert SYSTEM, its map and its known invariants to another language.
 
     \b
       kahanmaps convert euler_top --to pari
@@ -48,8 +48,8 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
       kahanmaps convert weierstrass --to julia --what map-formulas,inverse
       kahanmaps convert --vars x,y --rhs x*y --rhs=-x^2 --to toml -o my.toml
 
-    The output is a file that runs as it stands; toml is a system file. eps is an argument of the map, where it has one:
-    the time step is 2 eps. Numbers are exact, but in numpy, c and fortran.
+    The output is a complete file; toml is a system file. eps is an argument of the map if it depends on eps: the time
+    step is 2 eps. Numbers are exact except in numpy, c and fortran.
     """
     file = load_system(system, {**options, "quiet": quiet})
     if language == "toml":
@@ -78,7 +78,7 @@ def write_text(text: str, what: str, output: str | None, quiet: bool) -> None:
         return
     lib.write_atomically(output, text.encode())
     if not quiet:
-        say(f"{output}: {what}, {len(text.splitlines())} lines")
+        print_stderr(f"{output}: {what}, {len(text.splitlines())} lines")
 
 
 def _split(text: str) -> list[str]:

@@ -10,21 +10,21 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
 
 @click.command("cycles")
 @opt.system_options
-@click.option("--prime", "primes", type=int, multiple=True, metavar="P", help="The prime; repeatable.")
+@click.option("--prime", "primes", type=int, multiple=True, metavar="P", help="Prime P. Repeatable.")
 @opt.several_eps_options
 @click.option("--samples", type=int, metavar="N", help="Follow N random points instead of all points.")
-@click.option("--steps", type=int, metavar="N", help="... for at most N steps (default 10000).")
+@click.option("--steps", type=int, metavar="N", help="With --samples: follow them for at most N steps (default 10000).")
 @opt.seconds_option
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """How long the cycles of the map of SYSTEM are on projective space over a finite field.
+    """Count the cycles of the map of SYSTEM on projective space over a finite field by their lengths.
 
     \b
       kahanmaps cycles weierstrass --prime 101
@@ -34,16 +34,16 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps cycles henon_heiles -p c=-2..0 --prime 11
       kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
 
-    All points of P^n over GF(P), or random ones where they are more than two million (from dimension 7 on, half as many
-    with each dimension). Without --eps two values are tried for each prime: one alone may be special.
+    All points of P^n over GF(P) are used, or random ones where there are more than two million (from dimension 7 on,
+    half as many with each dimension). Without --eps two values are used for each prime, since one may be special.
 
-    A point is indeterminate where the map is not defined; where forms have a common factor it is divided out first (up
-    to dimension 6). It is pre-indeterminate if its orbit gets to such a point, and preperiodic if its orbit gets to a
-    cycle. The counts are exact, and compared with no law: integrable maps, too, may have cycles longer than
-    P + 1 + 2 sqrt P, on levels of several components or on levels that the map exchanges.
+    A point is indeterminate if the map is undefined there, after common factors of its forms are divided out (up to
+    dimension 6); pre-indeterminate if its orbit reaches such a point; and preperiodic if its orbit reaches a cycle. The
+    counts are exact and are not compared with any law: integrable maps too may have cycles longer than
+    P + 1 + 2 sqrt P, on levels with several components or levels that the map permutes.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line. Values without a map are named at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
+    record) for each combination of values. Values at which the map is undefined are listed at the end.
 
     Exit status: 0 done, 2 usage error, 3 stopped by --seconds.
     """
@@ -70,11 +70,11 @@ def command(system: str | None, **options: Any) -> int:
 def _print(file: lib.SystemFile, runs: list[lib.Census]) -> None:
     what = "the Kahan map" if file.is_quadratic else file.map.kind
     share = lib.eps_share(file.map)
-    tell(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
+    print_stdout(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
     for census in runs:
         at = f", eps = {census.eps}" if file.map.has_eps else ""
-        tell(f"\n# p = {census.prime}{at}")
-        tell(str(census))
+        print_stdout(f"\n# p = {census.prime}{at}")
+        print_stdout(str(census))
 
 
 def _record(file: lib.SystemFile, options: dict[str, Any], runs: list[lib.Census]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
 _SHOWN = 8  # degrees in a line of a table
@@ -22,7 +22,7 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.eps_options,
     opt.effort_options,
     click.option(
-        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
+        "--terms", type=int, metavar="N", help="Compute d_1, ..., d_N (default: until a recurrence is certain)."
     ),
     click.option(
         "--max-degree",
@@ -30,7 +30,7 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
         metavar="D",
         default=lib.ITERATE_DEGREE,
         show_default=True,
-        help="Work out no larger degree.",
+        help="Compute no larger degree.",
     ),
     opt.seed_option,
 )
@@ -40,11 +40,11 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
 @opt.system_options
 @degree_options
 @click.option(
-    "--steps", type=int, metavar="N", help="Steps to follow singularities for (default: as singularities does)."
+    "--steps", type=int, metavar="N", help="Number of steps to trace singularities (default: as in singularities)."
 )
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
+    """Compute the degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
 
     \b
       kahanmaps degrees euler_top
@@ -53,8 +53,8 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps degrees --rhs "x' = x*(1-y); y' = y*(x-1)"
       kahanmaps degrees henon_heiles -p c=-2..0:1/2 --terms 6
 
-    The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 61 bits, two of
-    each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
+    The degree of Phi^n as a map of projective space is measured on two random lines modulo random primes of 61 bits.
+    Without --eps, eps is a random residue. Measured degrees are evidence, not proof.
 
     The hypersurfaces that the map contracts are followed, and explain the degrees for all times: generating function,
     recurrence, dynamical degree; of long compositions, map by map. A line for each of them says when it comes
@@ -62,14 +62,14 @@ def command(system: str | None, **options: Any) -> int:
     than determine it, with terms enough beyond the last confinement, and else there is an estimate only. "no
     confinement" is said with the number of steps that were tried.
 
-    In the plane a dynamical degree above 1 is proved: its bounds are then exact. Proved is also the growth of monomial
-    maps, by powers of the exponent matrix, and of maps with an iterate of degree 1, whose formulas are composed.
+    In the plane a dynamical degree above 1 is proved by exact bounds. The growth of monomial maps is proved by powers
+    of the exponent matrix, and that of maps with an iterate of degree 1 by composing formulas.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line. Values without a map are named at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
+    record) for each combination of values. Values at which the map is undefined are listed at the end.
 
-    Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
-    vary; 2 usage error; 3 undecided, or stopped early.
+    Exit status: 0 a recurrence was found, all requested terms were computed, or the iterates are constant or undefined
+    from some step on; 2 usage error; 3 undecided, or stopped early.
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
 
@@ -104,8 +104,8 @@ def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
     eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 61 bits"
     at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_told(eps, file.map)
     how = f"{lines}: measured, not proved" if found.primes else "powers of the exponent matrix: exact"
-    tell(f"# {file.name}{at}, {how}")
-    tell(found.text)
+    print_stdout(f"# {file.name}{at}, {how}")
+    print_stdout(found.text)
 
 
 def _record(

@@ -14,9 +14,9 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Whole
 from kahanmaps_cli.runs.ensemble_starts import normal_form_for, requested_starts, starts_record
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import Progress, say
+from kahanmaps_cli.screen.progress import Progress, print_stderr
 from kahanmaps_cli.screen.render import json_number, print_json, record_of, short_float
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.signals import interruptible
 
 MAX_STEPS = 10**13  # years
@@ -30,18 +30,20 @@ _VALUES = 200_000  # of them at most
 @opt.system_options
 @opt.random_starts_options
 @opt.eps_options
-@click.option("--steps", type=int, metavar="N", required=True, help="How many steps to take.")
+@click.option("--steps", type=int, metavar="N", required=True, help="Number of steps.")
 @opt.backward_option
-@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points there.")
+@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points to FILE.npy.")
 @click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
 @opt.integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
-@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Makes no difference to numbers, only to speed.")
-@click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
-@click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
+@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Method (default: chosen automatically).")
+@click.option(
+    "--kernel", type=click.Choice(("numpy", "numba")), help="Library that iterates: same numbers, other speed."
+)
+@click.option("--threads", type=Whole(1), metavar="T", help="Number of threads of numba (default: all processors).")
+@click.option("-v", "--verbose", is_flag=True, help="Print the method on standard error.")
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """Many orbits of the map of SYSTEM at once: how many go through, and how well integrals are kept.
+    """Iterate many orbits of the map of SYSTEM at once: how many complete, and how far integrals drift.
 
     \b
       kahanmaps ensemble paper_m2 --random 1000 --box 1/2 --seed 1 \\
@@ -51,9 +53,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
       kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 \\
           --steps 1000 --integral F1
 
-    FILE.npy is an array (records, orbits, dimension): row k holds step k K. It grows while the orbits are walked, and
-    is valid at every moment, also after Ctrl-C. Orbits that have ended early are NaN there. Starts in text are exact
-    numbers, separated by commas or blanks; # starts a comment, and a first line may name the columns.
+    FILE.npy is an array (records, orbits, dimension) whose row k holds step k K. It grows during the computation and is
+    valid at any time, also after Ctrl-C. Orbits that ended early are NaN. Initial points in text files are exact
+    numbers separated by commas or blanks; # starts a comment, and a first line may name the columns.
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """
@@ -87,7 +89,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     method = "generic" if form is None else "normal-form"
     if verbose and not quiet:
         why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
-        say(f"method {method}: {why}; kernel {ensemble.kernel}")
+        print_stderr(f"method {method}: {why}; kernel {ensemble.kernel}")
     # Integrals are looked at more often than the first and the last point are written.
     whole = every or max(1, steps)
     interval = whole
@@ -143,9 +145,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     else:
         _print(file, eps, options["backward"], ensemble.kernel, found)
     if not quiet and output is not None:
-        say(f"{output}: {counted(records, 'record')} of {counted(ensemble.n, 'orbit')}")
+        print_stderr(f"{output}: {counted(records, 'record')} of {counted(ensemble.n, 'orbit')}")
     if not quiet and ensemble.step < steps:
-        say(f"interrupted after step {ensemble.step}")
+        print_stderr(f"interrupted after step {ensemble.step}")
     return 130 if ensemble.step < steps else 0 if found["counts"]["completed"] == ensemble.n else 3
 
 
@@ -170,7 +172,7 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
 
 def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, found: dict[str, Any]) -> None:
     """Tab-separated lines, aligned on a terminal."""
-    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
+    print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
     rows = [("orbits", str(found["orbits"])), ("steps", str(found["steps_taken"])), ("kernel", kernel)]
     rows += [(word, str(number)) for word, number in found["counts"].items()]
     near = found["near_singular"]
@@ -188,4 +190,4 @@ def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, found: d
     if more:
         rows.append(("ended early", f"and {counted(more, 'more orbit')}"))
     for name, text in rows:
-        tell(f"{name}\t{text}", 15)
+        print_stdout(f"{name}\t{text}", 15)

@@ -14,9 +14,9 @@ from kahanmaps.errors import InputError, counted, quoted
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.screen.outputs import OutputFile, OutputFolder, file_name, will_write
-from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.terminal import formula, print_stdout
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -24,16 +24,18 @@ F = TypeVar("F", bound=Callable[..., Any])
 draw_options: Callable[[F], F] = opt.stack(
     click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
     click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
-    click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
-    click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),
-    click.option("--size", type=int, metavar="N", help="Bound for the integer coefficients drawn (default 2 or 1)."),
+    click.option("--generic", is_flag=True, help="Draw a random integer polynomial chi, typically irreducible over Q."),
+    click.option("--chi", metavar="EXPR", help="The polynomial chi in t, e.g. '(t-1)*(t^2-2)'."),
+    click.option("--size", type=int, metavar="N", help="Bound for the random integer coefficients (default 2 or 1)."),
 )
 DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 
 
 @click.group("family", cls=SuggestingGroup)
 def command() -> None:
-    """Members of the commuting family: A skew-Hamiltonian (A^T J = J A), H a cubic with A Hess(H) = Hess(H) A^T.
+    """Construct and inspect members of the commuting family.
+
+    A member consists of a skew-Hamiltonian matrix A (A^T J = J A) and a cubic H with A Hess(H) = Hess(H) A^T.
 
     \b
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
@@ -46,13 +48,13 @@ def command() -> None:
 
 @command.command("new")
 @draw_options
-@click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
+@click.option("--signs", metavar="S1,S2,...", help="Choose an associated system: 1 or -1 for each factor of chi.")
 @opt.seed_option
-@click.option("--name", help="The name in the file.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
+@click.option("--name", help="Name of the system in the file.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @opt.quiet_option
 def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
-    """Draw a member at random and write it as a system file.
+    """Generate a random member and write it as a system file.
 
     \b
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
@@ -60,7 +62,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
       kahanmaps family new --chi '(t-1)*(t^2-2)' --seed 1
       kahanmaps family new --m 2 --seed 3 --signs 1,-1 -o g.toml
 
-    Without --eigenvalues, --generic or --chi the eigenvalues are distinct small integers drawn from the seed.
+    Without --eigenvalues, --generic or --chi the eigenvalues are distinct small random integers.
     """
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
@@ -75,7 +77,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     _write(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
-        say(f"{where}dimension {member.dim}; {lib.diagnosis(member.A)}")
+        print_stderr(f"{where}dimension {member.dim}; {lib.diagnosis(member.A)}")
 
 
 def drawn_file(options: dict[str, Any]) -> lib.SystemFile:
@@ -114,7 +116,9 @@ def draw_member(
 
 @command.command("show")
 @opt.system_options
-@click.option("--normal-form", is_flag=True, help="Also the system as one planar cubic h(X, Y) over K = Q[t]/chi.")
+@click.option(
+    "--normal-form", is_flag=True, help="Also print the normal form: one planar cubic h(X, Y) over K = Q[t]/chi."
+)
 @opt.json_option
 def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
@@ -125,8 +129,8 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
       kahanmaps family show hamiltonian.toml
       kahanmaps family show paper_m3 --json | jq -r '.hamiltonians[1]'
 
-    For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
-    A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
+    For a SYSTEM of kind [hamiltonian] or [system] a matrix A is searched for: it is a member if there is an A with
+    A^T J = J A and A Hess(H) = Hess(H) A^T that is not a multiple of I.
     """
     file = opt.load_system(system, options)
     recognised, member = None, file.member
@@ -170,44 +174,46 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     if as_json:
         print_json(data)
         return
-    tell(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
+    print_stdout(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
     if recognised is not None:
-        tell(f"found, not declared: {recognised.text}")
-    tell(data["diagnosis"])
+        print_stdout(f"found, not declared: {recognised.text}")
+    print_stdout(data["diagnosis"])
     if recognised is not None and not recognised.is_standard:
-        tell("x = T y, T =")
+        print_stdout("x = T y, T =")
         _print_matrix(recognised.T)
-    tell("A =")
+    print_stdout("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
-        tell(f"H_{k} = {formula(text)}")
+        print_stdout(f"H_{k} = {formula(text)}")
     if any(sign < 0 for sign in member.signs):
-        tell(f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}")
+        print_stdout(
+            f"signs = {','.join(map(str, member.signs))}: K = {formula(lib.format_polynomial(member.chosen.K))}"
+        )
     if form is not None:
-        tell(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
-        tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
-        tell(f"h = {formula(form.h_text)}")
-        tell(f"D = {formula(form.D_text)}")
-        tell(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
+        print_stdout(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
+        print_stdout("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
+        print_stdout(f"h = {formula(form.h_text)}")
+        print_stdout(f"D = {formula(form.D_text)}")
+        print_stdout(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
         if form.parts:
             total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
-            tell(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
-            tell("the Kahan map conserves h/(1 + eps^2 D) at each of them")
+            print_stdout(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
+            print_stdout("the Kahan map conserves h/(1 + eps^2 D) at each of them")
         for part in form.parts:
             root, weight = formula(lib.format_number(part.root)), formula(lib.format_number(part.weight))
-            tell(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
+            print_stdout(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
         point = "x" if recognised is None or recognised.is_standard else "y"
-        tell(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
+        print_stdout(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
         _print_matrix(form.S)
 
 
 @command.command("space")
 @opt.system_argument
 @opt.parameter_option
-@click.option("--matrix", metavar="ROWS", help="A itself instead of a file: '1,0;0,1'.")
+@click.option("--matrix", metavar="ROWS", help="The matrix A instead of a SYSTEM, e.g. '1,0;0,1'.")
 @opt.json_option
 def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: str | None, as_json: bool) -> None:
-    """The space of cubics H with A Hess(H) = Hess(H) A^T: its dimension, 4m for generic A, and a basis.
+    """Compute the space of cubics H with A Hess(H) = Hess(H) A^T: its dimension (4m for generic A) and a basis.
 
     \b
       kahanmaps family space paper_m3
@@ -241,24 +247,26 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     if as_json:
         print_json(data)
         return
-    tell(
+    print_stdout(
         f"dimension {found.dimension} (generic A: 4m = {found.expected}); "
         f"the linear system has {found.unknowns} unknowns and rank {found.rank}"
     )
-    tell(data["diagnosis"])
+    print_stdout(data["diagnosis"])
     for k, text in enumerate(data["basis"], start=1):
-        tell(f"{k}\t{formula(text)}")
+        print_stdout(f"{k}\t{formula(text)}")
 
 
 @command.command("associated")
 @opt.system_argument
 @opt.parameter_option
-@click.option("--write-to", type=OutputFolder(), metavar="DIR", help="Write each as a system file to DIR.")
+@click.option(
+    "--write-to", type=OutputFolder(), metavar="DIR", help="Write each associated system as a system file to DIR."
+)
 @opt.json_option
 def associated(
     system: str | None, parameters: tuple[tuple[str, str], ...], write_to: str | None, as_json: bool
 ) -> None:
-    """All rational associated systems up to sign: signs, B_s as a polynomial in A, and K_s with grad K_s = B_s grad H.
+    """List all rational associated systems up to sign: signs, B_s as a polynomial in A, K_s with grad K_s = B_s grad H.
 
     \b
       kahanmaps family associated paper_m3
@@ -319,19 +327,21 @@ def associated(
         )
         return
     named = ", ".join(f"({factor})" for factor in member.factors)
-    tell(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
+    print_stdout(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
-        tell(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
+        print_stdout(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
     for row in conjugate:
         signs, powers = "".join("+" if sign > 0 else "-" for sign in row["signs"]), ", ".join(row["B_in_powers_of_A"])
-        tell(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {formula(row['K'])}")
+        print_stdout(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {formula(row['K'])}")
 
 
 @command.command("tensor")
 @opt.system_options
-@click.option("--algebra", metavar="CHI", required=True, help="K = Q[t]/(chi), chi a polynomial in t: 't^2-2'.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
+@click.option(
+    "--algebra", metavar="CHI", required=True, help="Polynomial chi in t of the algebra K = Q[t]/(chi), e.g. 't^2-2'."
+)
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @opt.quiet_option
 def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **options: Any) -> None:
     """Write a quadratic system over the algebra K = Q[t]/(chi) as one over Q.
@@ -353,7 +363,7 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
     if not quiet:
         where = f"{output}: " if output else ""
         claimed = len(over_algebra.integrals) * int(chi.degree())
-        say(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
+        print_stderr(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
 
 
 def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[lib.SystemFile, lib.FamilyMember]:
@@ -376,4 +386,4 @@ def _print_matrix(matrix: Any) -> None:
     rows = [[formula(cell, 24) for cell in row] for row in lib.plain(matrix)]
     widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
     for row in rows:
-        tell("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
+        print_stdout("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))

@@ -17,15 +17,15 @@ from kahanmaps_cli.screen.progress import SearchProgress
 @click.option(
     "--shape",
     type=click.Choice(["linear", "quadratic"]),
-    help="linear: g = B f with a constant B; quadratic: any g of degree at most 2 (default in dimension 1 to 3, where "
-    "a second is enough).",
+    help="Form of g: linear (g = B f with a constant matrix B) or quadratic (any g of degree at most 2; default in "
+    "dimension 1 to 3).",
 )
 @opt.seed_option
-@opt.error_bits_option("What is supported is false with probability below 2^-BITS.")
+@opt.error_bits_option("Bound the error probability of supported solutions by 2^-BITS.")
 @opt.effort_options
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """All rational g whose Kahan map commutes with that of SYSTEM, x' = f(x), at the same eps, for every eps.
+    """Find all g over Q whose Kahan maps commute with that of SYSTEM, x' = f(x), at the same eps, for every eps.
 
     \b
       kahanmaps find-commuting paper_m3
@@ -35,9 +35,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps find-commuting "x' = a*x^2; y' = y^2" -p 'a=root of t^2 - 2'
 
     First the g with [f, g] = 0 by linear algebra; then equations from the next powers of eps, solved over Q; then every
-    solution is proved, or supported at random points. Nothing is lost on the way, so the list is complete unless it
-    says otherwise. Over a number field it is the same for the system over Q that f is; "g = B f" is then the default in
-    every dimension. 0, f and -f always commute and are left out; --json has them, with a word in "trivial".
+    solution is proved, or supported at random points. No solution is discarded at any stage, so the list is complete
+    unless it says otherwise. A system over a number field is treated as a system over Q; "g = B f" is then the default
+    in every dimension. 0, f and -f always commute and are omitted; --json has them, marked by "trivial".
 
     Exit status: 0 the list is complete, 2 usage error, 3 something remained open.
     """

@@ -10,18 +10,18 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.search import (
-    asked,
     heading,
     print_search,
     record,
     require_one_form,
     scope,
+    search_arguments,
     search_options,
     symbols_and_eps,
 )
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.terminal import formula, print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
 
 
@@ -32,19 +32,19 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     "sets",
     metavar="LIST",
     multiple=True,
-    help="A Hirota-Kimura basis of these polynomials instead, e.g. 'x^2,y^2,1'; x~ is the image of x.",
+    help="Search for a Hirota-Kimura basis of these monomials, e.g. 'x^2,y^2,1'; x~ is the image of x.",
 )
 @click.option(
     "--darboux",
     type=click.IntRange(1, 12),
     metavar="DEGREE",
-    help="Instead: all discrete Darboux polynomials up to it; with --flow those of the differential equation.",
+    help="Search for discrete Darboux polynomials up to this degree; with --flow for those of the vector field.",
 )
-@click.option("--flow", is_flag=True, help="Integrals of the differential equation, and what the map makes of them.")
+@click.option("--flow", is_flag=True, help="Compare with the integrals of the differential equation.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
-    """Integrals of the map of SYSTEM in closed form: how many, formulas P/Q, and their proofs.
+    """Search for rational integrals of the map of SYSTEM and prove them; measure how many there are.
 
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
@@ -58,23 +58,23 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals lorenz --parameter b=20 --flow --darboux 3
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
-    Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
-    from theorems, and from orbits, measured modulo primes; every formula is verified as an identity. Where there is
-    none in x alone it may contain x~, the image of x, x~~, that of x~, and so on. --flow adds which integrals of the
-    differential equation those of the map tend to as eps -> 0, and which are lost.
+    Without --eps the formulas contain eps (the time step is 2 eps). The number of independent integrals is known from
+    theorems, and measured along orbits modulo primes; every formula is verified as an identity. An integral may contain
+    the image x~ of x, the image x~~ of x~, and so on. --flow adds the limits of the integrals as eps -> 0, and the
+    integrals of the differential equation that the map loses.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line. Values without a map are named at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
+    record) for each combination of values. Values at which the map is undefined are listed at the end.
 
-    Exit status: 0 every integral that theorems give or orbits show has a formula, 2 usage error, 3 some have none,
-    orbits were not measured, or the time was too short.
+    Exit status: 0 as many formulas were found as theorems and orbits predict, 2 usage error, 3 fewer, or orbits were
+    not measured.
     """
     require_one_form(options)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
-        found = lib.find_integrals(file, **asked(options, "max_degree"), progress=search)
+        found = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
         line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
         return Cell(line, lambda: record("find-integrals", found, search), lambda: None, found.reason)
@@ -92,7 +92,7 @@ def command(system: str | None, **options: Any) -> int:
         return (_bases if options["sets"] else _darboux)(system, options)
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
-        find = partial(lib.find_integrals, file, **asked(options, "max_degree"), progress=search)
+        find = partial(lib.find_integrals, file, **search_arguments(options, "max_degree"), progress=search)
         if options["flow"]:
             stages = lib.budget_for("integrals", options["effort"]).share([1, 1])
             found = find(flow=True, effort=next(stages))
@@ -108,9 +108,9 @@ def command(system: str | None, **options: Any) -> int:
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for one in found.time_dependent:
             where = "" if found.flow else "of the n-th point: "
-            tell(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\t{where}depends on time")
+            print_stdout(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\t{where}depends on time")
         for status, text in () if beside is None else beside.lines(others=False):
-            tell(f"{status}\t{formula(text)}")
+            print_stdout(f"{status}\t{formula(text)}")
     return 3 if found.reason else 0
 
 
@@ -123,12 +123,12 @@ def _count(found: Any) -> str:
 def _darboux(system: str | None, options: dict[str, Any]) -> int:
     with SearchProgress(options) as search:
         file, degree = opt.load_system(system, options), options["darboux"]
-        found = lib.darboux_polynomials(file, degree, **asked(options, "flow"), progress=search)
+        found = lib.darboux_polynomials(file, degree, **search_arguments(options, "flow"), progress=search)
     if options["as_json"]:
         print_json(record("darboux-polynomials", found, search))
     else:
-        tell(f"Darboux polynomials: {found.file.name}{scope(found)}")
-        tell("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
+        print_stdout(f"Darboux polynomials: {found.file.name}{scope(found)}")
+        print_stdout("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
     return 3 if found.reason else 0
 
 
@@ -175,14 +175,14 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
         )
         return 3 if reason else 0
     step = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
-    tell(f"Hirota-Kimura bases: {file.name}{step}, measured on two orbits modulo each of two primes")
+    print_stdout(f"Hirota-Kimura bases: {file.name}{step}, measured on two orbits modulo each of two primes")
     for row in rows:
-        tell(f"dimension {row.dimension}\t{', '.join(row.functions)}")
+        print_stdout(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:
             names = [name for name, same in zip(row.functions, vector, strict=True) if not same]
-            tell(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
+            print_stdout(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
         if not row.agree:
-            tell("\tthe orbits that were compared do not agree: try another --seed")
+            print_stdout("\tthe orbits that were compared do not agree: try another --seed")
     for text in filter(None, (note, reason)):
-        tell(f"note\t{text}")
+        print_stdout(f"note\t{text}")
     return 3 if reason else 0

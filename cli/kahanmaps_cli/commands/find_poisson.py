@@ -8,9 +8,9 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.search import asked, print_search, require_one_form, search_options
+from kahanmaps_cli.runs.search import print_search, require_one_form, search_arguments, search_options
 from kahanmaps_cli.screen.progress import SearchProgress
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 
 
 @click.command("find-poisson")
@@ -21,10 +21,10 @@ from kahanmaps_cli.screen.terminal import tell
     metavar="D",
     help="Largest degree of entries (default: 3 in dimension 3, else 2).",
 )
-@click.option("--denominator", metavar="EXPR", help="A function that all entries are divided by, e.g. a density.")
+@click.option("--denominator", metavar="EXPR", help="Common denominator of the entries, e.g. a density.")
 @search_options("poisson")
 def command(system: str | None, **options: Any) -> int:
-    """Poisson tensors of SYSTEM: skew P(x), its entries polynomials, that the map preserves, dPhi P dPhi^T = P(x~).
+    """Search for Poisson tensors P with polynomial entries that the map of SYSTEM preserves: dPhi P dPhi^T = P(x~).
 
     \b
       kahanmaps find-poisson lotka_volterra
@@ -32,16 +32,16 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-poisson volterra_periodic_4 --degree 3
       kahanmaps find-poisson weierstrass --symbolic g2 --toml
 
-    They are told by brackets {x_i, x_j} = P_ij, with rank, the Jacobi identity, the Casimirs and the involution of the
-    integrals that are found; products of polynomial integrals and others are left out. Without --eps the formulas
-    contain eps (the time step is 2 eps).
+    Each is printed by its brackets {x_i, x_j} = P_ij, with its rank, the Jacobi identity, Casimirs, and integrals in
+    involution; products with polynomial integrals are omitted. Without --eps the formulas contain eps (the time step is
+    2 eps).
 
-    Exit status: 0 found, 2 usage error, 3 none up to the degree that was tried.
+    Exit status: 0 found, 2 usage error, 3 none up to the degree tried.
     """
     require_one_form(options)
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
-        settings, denominator = asked(options), None
+        settings, denominator = search_arguments(options), None
         if options["denominator"] is not None:
             denominator = lib.parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
         found = lib.find_poisson(file, options["degree"], denominator=denominator, **settings, progress=search)
@@ -50,5 +50,5 @@ def command(system: str | None, **options: Any) -> int:
     )
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for integral in found.integrals:
-            tell(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
+            print_stdout(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
     return 0 if found.tensors else 3

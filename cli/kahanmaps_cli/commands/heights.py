@@ -12,20 +12,22 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.screen.progress import Progress, SearchProgress
 from kahanmaps_cli.screen.render import record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
 # Of the picture as well.
 height_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.eps_options,
-    click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit."),
+    click.option(
+        "--steps", type=int, metavar="N", default=60, show_default=True, help="Number of steps of each orbit."
+    ),
     click.option(
         "--max-digits",
         type=Whole(1),
         metavar="N",
         default=20_000,
         show_default=True,
-        help="Digit budget of each orbit.",
+        help="Stop an orbit when a number exceeds N digits.",
     ),
     opt.effort_options,
     opt.seed_option,
@@ -41,7 +43,7 @@ height_options: Callable[[opt.F], opt.F] = opt.stack(
     cls=opt.Renamed,
     type=Whole(1),
     metavar="N",
-    help="N starts drawn at random (default 3).",
+    help="Draw N random initial points (default 3).",
 )
 @click.option(
     "--start",
@@ -49,12 +51,12 @@ height_options: Callable[[opt.F], opt.F] = opt.stack(
     type=PointText(),
     multiple=True,
     metavar="X",
-    help="Instead: this start, e.g. 1/2,-1/3,0.25. Repeatable.",
+    help="Initial point instead of random ones, e.g. 1/2,-1/3,0.25. Repeatable.",
 )
 @height_options
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """How fast the heights of exact orbits of the map of SYSTEM grow, from several starts.
+    """Measure how fast the heights of exact orbits of the map of SYSTEM grow.
 
     \b
       kahanmaps heights weierstrass
@@ -63,15 +65,14 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps heights henon_heiles -p c=-2..0:1/2
       kahanmaps heights --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
 
-    The height is the bit length of the largest integer that a point needs. Quadratic growth goes with integrable
-    maps, exponential growth with others; bounded and linear growth are seen on special curves, too. Without --eps the
-    values 1/10 and 3/11 are taken and compared: one eps may be special. This is evidence, and no proof.
+    The height of a point is the bit length of its largest numerator or denominator. Integrable maps typically have
+    quadratic growth, others exponential growth; bounded and linear growth also occur on special curves. Without --eps
+    the values 1/10 and 3/11 are compared, since one may be special. The result is evidence, not proof.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line. Values without a map are named at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
+    record) for each combination of values. Values at which the map is undefined are listed at the end.
 
-    Exit status: 0 all orbits that were decided agree, 2 usage error, 3 undecided, or the orbits disagree, or the budget
-    was spent.
+    Exit status: 0 all decided orbits agree, 2 usage error, 3 undecided, the orbits disagree, or the budget was spent.
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
@@ -108,8 +109,8 @@ def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     each = ", ".join(lib.eps_told(value, file.map).removeprefix(", eps = ") for value in values)
     eps = f", eps = {each}" if file.map.has_eps else ""
-    tell(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
-    tell(str(found))
+    print_stdout(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
+    print_stdout(str(found))
 
 
 def _record(

@@ -10,9 +10,9 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json, record_of
-from kahanmaps_cli.screen.terminal import on_terminal, print_table, tell
+from kahanmaps_cli.screen.terminal import on_terminal, print_stdout, print_table
 
 _MAX_STEPS = 10**9
 _DEFAULT_STARTS = 16
@@ -22,25 +22,28 @@ _DEFAULT_STARTS = 16
 @opt.system_options
 @opt.random_starts_options
 @opt.eps_options
-@click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="How many steps to count.")
-@click.option("--transient", type=int, metavar="K", help="Steps before those, not counted (default: a tenth).")
+@click.option(
+    "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps to average over."
+)
+@click.option("--transient", type=int, metavar="K", help="Initial steps to discard (default: a tenth).")
 @opt.seconds_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Lyapunov exponents of float orbits of the map of SYSTEM, by the exact tangent map.
+    """Estimate Lyapunov exponents of floating-point orbits of the map of SYSTEM, by the exact tangent map.
 
     \b
       kahanmaps lyapunov lorenz --eps 1/400 --box 5 --steps 20000
       kahanmaps lyapunov euler_top --eps 1/10 --random 100 --seed 1
       kahanmaps lyapunov henon_heiles --eps 1/10 --box 1/3 --json
 
-    Per unit of time, which is 1/(2 eps) steps, and per step: means over the starts, their spread, and how far the first
-    half of the steps is from all of them. Without --starts and --random there are 16 random starts.
+    The output has exponents per unit of time, which is 1/(2 eps) steps, and per step: means over the initial points,
+    their spread, and the difference between the first half of the steps and all of them. The default is 16 random
+    initial points.
 
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is checked against log |det dPhi|.
 
-    Exit status: 0 all orbits went through, 2 usage error, 3 some ended early or --seconds stopped all.
+    Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, or --seconds stopped them.
     """
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
@@ -81,17 +84,17 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         _print(file, eps, found)
     if found.ended and not quiet:
-        say(f"{found.ended} of {found.orbits} orbits left the range of floats or met a pole")
+        print_stderr(f"{found.ended} of {found.orbits} orbits left the range of floats or met a pole")
     return 3 if found.ended or search.is_over else 0
 
 
 def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
-    tell(f"# {file.name}{lib.eps_told(eps, file.map)}, double precision")
-    tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
+    print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, double precision")
+    print_stdout(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
     if found.stopped and not found.steps:  # the means of nothing would be nan
-        tell(f"steps\tnone counted: stopped in the transient, after {found.transient} of its steps")
+        print_stdout(f"steps\tnone counted: stopped in the transient, after {found.transient} of its steps")
         return
-    tell(f"steps\t{found.steps} after {found.transient}")
+    print_stdout(f"steps\t{found.steps} after {found.transient}")
     columns = {"per unit of time": found.mean} if file.map.time_steps else {}
     columns |= {"per step": found.per_step, "spread": found.spread, "change from half": found.change}
     rows = [
@@ -100,5 +103,5 @@ def _print(file: lib.SystemFile, eps: Any, found: lib.Lyapunov) -> None:
     ]
     print_table([["exponent" if on_terminal() else "# exponent", *columns], *rows])
     volume = found.log_volume.mean() if len(found.log_volume) else float("nan")
-    tell(f"sum\t{found.mean.sum():.6g}")
-    tell(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")
+    print_stdout(f"sum\t{found.mean.sum():.6g}")
+    print_stdout(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")

@@ -13,7 +13,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Arithmetic, PointText, Steps, Whole
 from kahanmaps_cli.screen.outputs import OutputFile
-from kahanmaps_cli.screen.progress import Progress, TimeLeft, say
+from kahanmaps_cli.screen.progress import Progress, TimeLeft, print_stderr
 from kahanmaps_cli.screen.streams import is_read
 from kahanmaps_cli.signals import interruptible
 
@@ -28,12 +28,12 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     type=PointText(True),
     required=True,
     metavar="X",
-    help="The start, e.g. 1/2,-1/3,0.25, or 1,t with -p 't = root of t^2 + 1'.",
+    help="Initial point, e.g. 1/2,-1/3,0.25, or 1,t with -p 't = root of t^2 + 1'.",
 )
 @opt.eps_options
-@click.option("--steps", type=int, metavar="N", help="How many steps to take.")
-@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
-@click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
+@click.option("--steps", type=int, metavar="N", help="Number of steps.")
+@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Compute these iterates only, instead of --steps.")
+@click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Output every K-th iterate.")
 @opt.backward_option
 @click.option(
     "--arithmetic",
@@ -41,27 +41,46 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     metavar="KIND",
     default="exact",
     show_default=True,
-    help="exact, float, mod:P, ball:BITS or ball:auto.",
+    help="Arithmetic: exact, float, mod:P, ball:BITS or ball:auto.",
 )
 @click.option(
     "--method",
     type=click.Choice(("generic", "normal-form", "doubling")),
-    help="How to compute it; chosen by itself unless given (-v says which and why).",
+    help="Method (default: chosen automatically; -v prints which and why).",
 )
-@click.option("--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="For ball:auto; default 15.")
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="What computes float orbits; numba needs [fast].")
+@click.option(
+    "--accuracy",
+    type=click.IntRange(1, 100_000),
+    metavar="DIGITS",
+    help="Accuracy of ball:auto in digits (default 15).",
+)
+@click.option(
+    "--kernel", type=click.Choice(("numpy", "numba")), help="Library that computes float orbits; numba needs [fast]."
+)
 @opt.integral_option(
     "A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
     "the word known for all that theorems give (not in floats)."
 )
-@click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget (exact arithmetic; default 200000).")
-@click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
-@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
-@click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
+@click.option(
+    "--max-digits",
+    type=Whole(1),
+    metavar="N",
+    help="Stop an exact orbit when a number exceeds N digits (default 200000).",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(_FORMATS),
+    help="Output format (default: by the extension of FILE, else text).",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
+@click.option(
+    "-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE (default: standard output)."
+)
+@click.option("-v", "--verbose", is_flag=True, help="Print the method on standard error.")
 @opt.quiet_option
 def command(system: str | None, output: str | None, verbose: bool, quiet: bool, **options: Any) -> int:
-    """Iterate the map of SYSTEM from a start; a vector field stands for its Kahan map.
+    """Iterate the map of SYSTEM from an initial point; a vector field stands for its Kahan map.
 
     \b
       kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 5
@@ -76,14 +95,15 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
       kahanmaps orbit --vars x,y --image 'y; (3 + y)/x' --start 1,2 --steps 5
 
     SYSTEM is a file, a name of the catalogue, or - for standard input. Numbers are exact: integers, p/q, decimals.
-    A map may be another than Kahan's; one that does not depend on eps needs none.
-    Ctrl-C ends after the step in flight and leaves a valid file; a second and third one end at once.
+    The map need not be a Kahan map; --eps is required if it depends on eps. The
+    first Ctrl-C stops after the current step and leaves a valid file; the next ones stop at once.
 
-    Members of the commuting family are stepped in their normal form, and --at reaches an iterate directly, by
-    doublings: modulo P and in balls for steps of thirty digits. Poles on the way are passed over then, except over Q.
+    Members of the commuting family are iterated in their normal form, and --at computes an iterate directly by
+    doublings: modulo P and in balls for step numbers of thirty digits. Poles in between are then skipped, except over
+    Q.
 
-    --integral adds a column: an expression, the name of an integral of the file, or the word known for all that
-    theorems give (not in floats).
+    --integral adds a column: an expression, the name of an integral of the file, or the word known for all integrals
+    given by theorems (not in floats).
 
     Exit status: 0 done, 2 usage error, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
@@ -112,7 +132,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     walk.integrals = functions
     said = walk.why
     if verbose and not quiet:
-        say(said)
+        print_stderr(said)
     on_terminal = output is None and sys.stdout.isatty()
     is_table = on_terminal and form == "text"
     to: Any = sys.stdout if output is None else output
@@ -134,11 +154,11 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     with interruptible(walk.interrupt), Progress(quiet or on_terminal) as progress:  # points themselves show it
         end = walk.write(to, form, file.name, told)
     if verbose and not quiet and walk.why != said:
-        say(walk.why)
+        print_stderr(walk.why)
     if output is not None and not quiet:
-        say(f"{output}: {end.text}")
+        print_stderr(f"{output}: {end.text}")
     elif end.status not in _STATUS and not (quiet or unread or is_table):  # whose last line says it
-        say(end.text)
+        print_stderr(end.text)
     return 3 if unread else _STATUS.get(end.status, 3)
 
 

@@ -9,9 +9,9 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.params import Arithmetic, PointText
-from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json, record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
 _WALK = "To walk instead: kahanmaps orbit ... --steps N says when the start comes back"
@@ -20,16 +20,21 @@ _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from secon
 
 @click.command("period")
 @system_options
-@click.option("--start", type=PointText(), metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
-@click.option("--levels", type=int, metavar="N", help="Instead: the levels on which all orbits have period N.")
+@click.option("--start", type=PointText(), metavar="X", help="Initial point, e.g. 1/2,-1/3,0.25.")
+@click.option("--levels", type=int, metavar="N", help="Find the levels on which all orbits have period N instead.")
 @eps_options
 @click.option(
-    "--arithmetic", type=Arithmetic(), metavar="KIND", default="exact", show_default=True, help="exact or mod:P."
+    "--arithmetic",
+    type=Arithmetic(),
+    metavar="KIND",
+    default="exact",
+    show_default=True,
+    help="Arithmetic: exact or mod:P.",
 )
-@click.option("-v", "--verbose", is_flag=True, help="Say on standard error what was found in the system.")
+@click.option("-v", "--verbose", is_flag=True, help="Print the normal form on standard error.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """The exact period of an orbit of a member of the commuting family, without walking it.
+    """Compute the exact period of an orbit of a member of the commuting family without iterating it.
 
     \b
       kahanmaps period paper_m3 --start 1,2,3,4,5,6 --eps 1/10
@@ -43,15 +48,15 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     In every plane of its normal form the map is a translation on a cubic curve, and the period is the order of a point.
     Modulo P it is computed; over Q the orbit is proved periodic or aperiodic.
 
-    SYSTEM may be a member of the family without saying so. The translation goes on where the map does not, through
-    poles: if the orbit meets one, the period is that of the orbit continued, and the output says so.
+    SYSTEM need not be declared as a member. The translation extends the map through poles: if the orbit meets one, the
+    output says so, and the period is that of the extended orbit.
 
     --levels N prints the polynomial psi_N whose roots gamma = 1 - disc(h) level^2 are the levels with period N or a
     divisor, and the rational gamma with period N; with SYSTEM and eps also these levels in each plane at a rational
     root of chi, as values of the integral h/(1 + eps^2 D).
 
-    Exit status: 0 found (or proved that there is none), 2 usage error, also where there is no normal form, 3 undecided,
-    or the orbit comes to a point where it cannot be continued.
+    Exit status: 0 found (or proved that there is none), 2 usage error or no normal form, 3 undecided, or the orbit
+    reaches a point where it cannot be continued.
     """
     if (options["levels"] is None) == (options["start"] is None):
         raise click.UsageError("give --start X, or --levels N, one of the two")
@@ -74,9 +79,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         )
     if not quiet:
         if verbose:
-            say(normal_form.text)
+            print_stderr(normal_form.text)
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
-            say(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
+            print_stderr(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
     found = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
     message, status = found.text.splitlines()[0], _STATUS.get(found.status, 3)
     if as_json:
@@ -106,10 +111,10 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         )
         print_json(record)
         if status and not quiet:
-            say(f"{found.status}: {message}")
+            print_stderr(f"{found.status}: {message}")
     else:
-        tell(f"# {file.name}{lib.eps_told(eps, file.map)}, {options['arithmetic']} arithmetic")
-        tell(str(found))
+        print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, {options['arithmetic']} arithmetic")
+        print_stdout(str(found))
     return status
 
 
@@ -149,14 +154,14 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
     if as_json:
         print_json(data)
         return 0
-    tell(f"psi_{levels.period}\t{data['psi']}" + " times gamma^(1/3)" * (levels.period % 3 == 0))
-    tell(f"period {levels.period} only\t{data['primitive']}")
-    tell(f"rational gamma\t{', '.join(data['gamma']) or 'none'}")
+    print_stdout(f"psi_{levels.period}\t{data['psi']}" + " times gamma^(1/3)" * (levels.period % 3 == 0))
+    print_stdout(f"period {levels.period} only\t{data['primitive']}")
+    print_stdout(f"rational gamma\t{', '.join(data['gamma']) or 'none'}")
     for plane in data.get("planes", ()):
-        tell(f"plane t = {plane['root']}\th = {plane['h']}, D = {plane['D']}")
+        print_stdout(f"plane t = {plane['root']}\th = {plane['h']}, D = {plane['D']}")
         for square in plane["squares"]:
             real = "" if square[0] != "-" else ", no real level"
-            tell(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
+            print_stdout(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
         if plane["disc"] == "0":  # 1 is no root of any psi_N
-            tell("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
+            print_stdout("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0

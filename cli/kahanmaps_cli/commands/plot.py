@@ -11,24 +11,24 @@ from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, por
 
 
 class PlotCommands(SuggestingGroup):
-    """The group, with what to use instead of the commands that it had."""
+    """The group, with the replacements of removed commands."""
 
     removed: ClassVar = {
         "batch": "kahanmaps batch export writes tables for pandas and matplotlib",
-        "recipe": "exiftool, or any program that shows metadata, prints the command in a picture (its description)",
+        "recipe": "exiftool, or any program that shows metadata, prints the command of a picture (its description)",
     }
 
 
 @click.group("plot", cls=PlotCommands)
 def command() -> None:
-    """Pictures as PDF, SVG or PNG for papers.
+    """Draw pictures for papers as PDF, SVG or PNG.
 
     \b
       kahanmaps plot portrait lotka_volterra --eps 1/20 -o portrait.pdf
       kahanmaps plot degrees euler_top -o degrees.svg --size 8.6
 
-    Pictures need matplotlib: pip install 'kahanmaps[plot]'. The metadata of each hold the command that makes it, and
-    the system.
+    Pictures need matplotlib: pip install 'kahanmaps[plot]'. The command and the system are stored in the metadata of
+    each picture.
     """
 
 

@@ -13,7 +13,7 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 
 _ONLY_FOR = {
     "symbolic": ("analyze",),
@@ -33,15 +33,22 @@ _ONLY_FOR = {
     type=click.Choice(["analyze", "verify", "checks"]),
     default="analyze",
     show_default=True,
-    help="What the page is made of.",
+    help="Command whose results the page shows.",
 )
-@click.option("--explore", is_flag=True, help="A page with sliders: eps and the start of an orbit move.")
+@click.option("--explore", is_flag=True, help="Add sliders for eps and the initial point of an orbit (JavaScript).")
 @opt.eps_options
 @opt.symbolic_option
 @opt.effort_options
 @opt.seed_option
 @draw_options
-@click.option("--section", "sections", type=int, multiple=True, metavar="N", help="With verify: only this section.")
+@click.option(
+    "--section",
+    "sections",
+    type=int,
+    multiple=True,
+    metavar="N",
+    help="With verify: only this section. Repeatable.",
+)
 @click.option(
     "-o",
     "--output",
@@ -49,13 +56,13 @@ _ONLY_FOR = {
     default="-",
     show_default=True,
     metavar="FILE",
-    help="FILE.html; - is standard output.",
+    help="Output file FILE.html; - is standard output.",
 )
-@click.option("--title", help="The title of the page (default: the name of the system).")
-@click.option("--no-pictures", is_flag=True, help="Formulas and tables only.")
+@click.option("--title", help="Title of the page (default: the name of the system).")
+@click.option("--no-pictures", is_flag=True, help="Omit pictures.")
 @opt.quiet_option
 def command(system: str | None, **options: Any) -> int:
-    """One HTML page about SYSTEM or a member of the family, to be read, printed or sent.
+    """Write an HTML page about SYSTEM or a member of the family.
 
     \b
       kahanmaps report euler_top -o top.html
@@ -63,26 +70,25 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps report euler_top --explore -o explore.html
       kahanmaps report --from verify --m 2 -o paper.html
 
-    analyze: what the map preserves and how it grows, the verdict first. verify: the paper's claims for a member of the
-    family, section by section. checks: the four checks, those that apply. The page is one file with its pictures
-    inside; it needs no network and no JavaScript, and says how it was made. Only --explore has JavaScript in it: eps
-    and the start move by sliders, and the exact verdict stands beside the picture of the orbit. A verdict at one --eps
-    leaves only the start to move.
+    --from analyze shows the verdict, what the map preserves and how it grows; --from verify the claims of the paper for
+    a member of the family, by sections; --from checks those of the four checks that apply. The page is a single file
+    with its pictures and the command that made it; it needs neither network nor JavaScript. With --explore it has
+    sliders for eps and the initial point beside the exact verdict; with one --eps, for the initial point only.
 
-    Exit status: as the command that the page is made of.
+    Exit status: as that of the command named by --from.
     """
     is_named, is_drawn = _require_consistent(system, options)
-    lib.page_template()  # what has to be installed is said before the work
+    lib.page_template()  # raises the error for a missing package before the work
     how = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
     with SearchProgress(options) as search:
         if options["source"] == "analyze":
             from kahanmaps_cli.runs.search import symbols_and_eps
 
             symbols, eps = symbols_and_eps(options)
-            asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
+            arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
             reached: list[lib.Analysis] = []
             try:
-                lib.analyze(opt.load_system(system, options), **asked, progress=search, reached=reached.append)
+                lib.analyze(opt.load_system(system, options), **arguments, progress=search, reached=reached.append)
                 search("the page")
                 html = lib.report_html(reached[-1], explore=options["explore"], **how)
             except lib.TimeLimit:
@@ -92,7 +98,7 @@ def command(system: str | None, **options: Any) -> int:
                 html = lib.report_html(reached[-1], **{**how, "pictures": False}, left_out=[search.ending])
             status = 3 if search.is_over or reached[-1].conclusion.kind == "undecided" else 0
         else:
-            # For verify, and where one is to be drawn, a member of the family.
+            # Without SYSTEM, verify and the options of a random member need a member of the family.
             draws = not is_named and (is_drawn or options["source"] == "verify")
             file = drawn_file(options) if draws else opt.load_system(system, options)
             eps = opt.the_eps(options["eps"], options["time_step"], required=False)
@@ -116,12 +122,12 @@ def command(system: str | None, **options: Any) -> int:
             status = {lib.Certainty.REFUTED: 1, lib.Certainty.UNDECIDED: 3}.get(verdict, 0)
     content = html.encode()
     if deliver(options["output"], content) and not options["quiet"]:
-        say(f"{options['output']}: {len(content)} bytes")
+        print_stderr(f"{options['output']}: {len(content)} bytes")
     return status
 
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bool, bool]:
-    """Whether a system is named, and whether a member is to be drawn. Raises UsageError where options do not agree."""
+    """Return whether a system is named and whether a random member is requested; refuse contradicting options."""
     context = click.get_current_context()
     names = {parameter.name: parameter.opts[0] for parameter in context.command.params}
     given = [
@@ -135,14 +141,14 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bo
     drawn = [name for name in DRAWN if name in given]
     is_named = system is not None or bool(options["variables"] or options["rhs"])
     if drawn and is_named:
-        raise click.UsageError(f"give a system or say which member to draw ({names[drawn[0]]}), not both")
+        raise click.UsageError(f"give a SYSTEM or options of a random member ({names[drawn[0]]}), not both")
     if not is_named and options["parameters"] and (drawn or options["source"] == "verify"):
-        raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
+        raise click.UsageError("found -p without SYSTEM, expected a SYSTEM: a random member has no parameters")
     if options["output"] == "-" and sys.stdout.isatty():
-        raise click.UsageError("a terminal cannot show a page: give -o FILE.html")
+        raise click.UsageError("the output is an HTML page: give -o FILE.html, or redirect it")
     if options["explore"] and options["no_pictures"]:
-        raise click.UsageError("found --explore and --no-pictures, expected one of the two: what moves is a picture")
+        raise click.UsageError("give --explore or --no-pictures, not both")
     suffix = Path(options["output"]).suffix
     if suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
-        raise click.UsageError(f"found the ending {suffix} of {options['output']}, expected .html: a page is HTML")
+        raise click.UsageError(f"found the extension {suffix} of {options['output']}, expected .html")
     return is_named, any(options[name] is not None and options[name] is not False for name in DRAWN)

@@ -10,11 +10,11 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import output_options
-from kahanmaps_cli.runs.scan_run import ending, scan_options, scanned
+from kahanmaps_cli.runs.scan_run import ending, run_scan, scan_options
 from kahanmaps_cli.screen.outputs import OutputFolder, file_name, will_write
-from kahanmaps_cli.screen.progress import say
+from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import print_json, record_of
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 
 
 @click.command("scan")
@@ -59,7 +59,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")
-    found, search = scanned(system, quiet, options)
+    found, search = run_scan(system, quiet, options)
     if options["folder"] is not None:
         _write(found, options["folder"], quiet)
     if options["as_toml"]:
@@ -71,8 +71,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         print_json(record_of("scan", found.file, "modulo primes", **more))
     else:
         at = "" if "eps" in found.over else lib.eps_told(found.eps, found.file.map)
-        tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
-        tell(found.text)
+        print_stdout(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
+        print_stdout(found.text)
     return ending(found, search)
 
 
@@ -90,4 +90,4 @@ def _write(found: lib.Scan, folder: str, quiet: bool) -> None:
     for path, one in zip(paths, known, strict=True):
         lib.write_atomically(str(path), found.member(one).to_toml().encode())
     if not quiet:
-        say(f"{folder}: {len(known)} system files")
+        print_stderr(f"{folder}: {len(known)} system files")

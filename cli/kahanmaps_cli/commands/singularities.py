@@ -8,9 +8,9 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json, record_of
-from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.terminal import formula, print_stdout
 
 
 @click.command("singularities")
@@ -20,35 +20,33 @@ from kahanmaps_cli.screen.terminal import formula, tell
     "--steps",
     type=int,
     metavar="N",
-    help="Steps to follow each hypersurface for (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
+    help="Trace each hypersurface for N steps (default: 1000, 500, 250 in dimension 2, 3, 4, else 100).",
 )
 @opt.effort_options
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Are the singularities of the map of SYSTEM confined, and after how many steps?
+    """Trace the singularities of the map of SYSTEM: are they confined, and after how many steps?
 
     \b
       kahanmaps singularities euler_top
       kahanmaps singularities lotka_volterra --eps 1/10 --steps 20
       kahanmaps singularities --vars x,y --rhs y --rhs '6*x^2 - 2' --json
 
-    The hypersurfaces that the map contracts are found over Q, its poles det(I - eps f'(x)) = 0 among them, and followed
-    along power series modulo large primes: what dimension do their images have, and when is it full again? Without
-    --eps two values are tried and compared.
+    The exceptional hypersurfaces (those contracted by the map, among them det(I - eps f'(x)) = 0) are computed over Q
+    and traced by power series modulo large primes: which dimensions do their images have, and when is the dimension
+    full again? Without --eps two values are compared.
 
-    "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles, for the first
-    steps. Z is the hyperplane at infinity. Confined singularities are evidence for, and no proof of integrability:
-    those of henon_heiles are confined, and its degrees grow exponentially. "not confined" is said with the number of
-    steps that were tried. Where the map is not dominant, that is, where its image lies in a hypersurface, nothing is
-    followed.
+    "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles. Z is the
+    hyperplane at infinity. Confinement is evidence for integrability, not proof: the singularities of henon_heiles are
+    confined, and its degrees grow exponentially. "not confined" comes with the number of steps that were tried. A map
+    that is not dominant (its image lies in a hypersurface) is not traced.
 
-    A composition too long to be multiplied out is followed map by map: then
-    steps are single maps, and each hypersurface is told with the map that
-    contracts it.
+    A composition too long to be expanded is traced map by map: its steps are single maps, and each hypersurface is
+    listed with the map that contracts it.
 
-    Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their outcome,
-    known by random points.
+    Where the polynomials are too large, ? stands for all hypersurfaces of equal multiplicity and behavior, known by
+    random points.
 
     Exit status: 0 done, 2 usage error, 3 undecided (the budget was spent, or two points or two eps differ).
     """
@@ -82,23 +80,25 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         name = file.map.denominator_name
         share = lib.eps_share(file.map)
-        tell(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
+        print_stdout(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
         if symbolic is not None:
             factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-            tell(f"factors of {name}\t{formula(factors, 200) or 'none'}")
+            print_stdout(f"factors of {name}\t{formula(factors, 200) or 'none'}")
         for run in runs:
             at = f"eps = {run.eps}: " if file.map.has_eps else ""
             text = str(run).replace("# ", f"\n# {at}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
-            tell("\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n")))
-        tell(f"\n# {runs[0].text if agree else verdict}")
+            print_stdout(
+                "\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n"))
+            )
+        print_stdout(f"\n# {runs[0].text if agree else verdict}")
     if verdict == lib.UNDECIDED and not quiet and not search.is_over:
         if any(run.stopped for run in runs):
             why = "the budget was spent: give more --effort"
         elif not agree:
-            why = "the two eps tell different things: try others with --eps"
+            why = "the two values of eps disagree: try others with --eps"
         else:
             why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
-        say(f"undecided: {why}")
+        print_stderr(f"undecided: {why}")
     return 3 if verdict == lib.UNDECIDED or search.is_over else 0
 
 

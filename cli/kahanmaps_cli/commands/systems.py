@@ -10,19 +10,19 @@ from kahanmaps import internals as lib
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import json_option, load_reference, parameter_option
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import formula, tell, tell_entry
+from kahanmaps_cli.screen.terminal import formula, print_entry, print_stdout
 
 
 @click.command("systems")
 @click.argument("name", required=False, shell_complete=complete_system)
 @parameter_option
-@click.option("--toml", "as_toml", is_flag=True, help="The system file itself, to copy and change.")
-@click.option("--latex", "as_latex", is_flag=True, help="Equations, integrals and density in LaTeX.")
+@click.option("--toml", "as_toml", is_flag=True, help="Print the system file.")
+@click.option("--latex", "as_latex", is_flag=True, help="Print equations, integrals and density in LaTeX.")
 @json_option
 def command(
     name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: bool, as_latex: bool, as_json: bool
 ) -> None:
-    """List the named systems, or show one: its equations, what is known of it, and from where.
+    """List the systems of the catalogue, or show one: its equations and what is known about it, with references.
 
     \b
       kahanmaps systems
@@ -43,9 +43,9 @@ def command(
         found = lib.titles()
         width = max(map(len, found))
         for key, (dim, title) in found.items():
-            tell_entry(f"{key:<{width}}  {dim:>2}  ", title, "bold")
+            print_entry(f"{key:<{width}}  {dim:>2}  ", title, "bold")
         for family in lib.FAMILIES.values():
-            tell_entry(f"{family.form:<{width}}   n  ", f"{family.title}, e.g. {family.example}", "bold")
+            print_entry(f"{family.form:<{width}}   n  ", f"{family.title}, e.g. {family.example}", "bold")
         return
     file = load_reference(name, dict(parameters))
     if as_toml:
@@ -110,18 +110,18 @@ def _latex(file: Any) -> str:
 
 
 def _show(file: Any) -> None:
-    tell(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
+    print_stdout(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
-        tell(f"  {name} = {value}")
+        print_stdout(f"  {name} = {value}")
     for line in str(file.map).split("\n"):
-        tell(formula(line))
+        print_stdout(formula(line))
     if file.hamiltonian is not None:
-        tell(f"H = {formula(lib.format_polynomial(file.hamiltonian.H))}")
+        print_stdout(f"H = {formula(lib.format_polynomial(file.hamiltonian.H))}")
     claimed = "" if file.catalog else "claimed "  # what stands in the catalogue has been put to the test
     for name, integral in file.integrals.items():
-        tell(f"{claimed}integral {name} = {formula(lib.format_factored(integral))}")
+        print_stdout(f"{claimed}integral {name} = {formula(lib.format_factored(integral))}")
     if file.density is not None:
-        tell(f"{claimed}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
+        print_stdout(f"{claimed}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
     known, lines = _known(file), []
     if known["verdict"]:
         lines.append(f"verdict: {known['verdict']}")
@@ -140,12 +140,12 @@ def _show(file: Any) -> None:
         what = f"polynomials of {found.text}" if found.text.startswith("degree") else found.text
         lines.append(f"{count} along an orbit among: {what}")
     if lines:
-        tell("for generic parameters and eps:" if file.parameters else "for generic eps:")
+        print_stdout("for generic parameters and eps:" if file.parameters else "for generic eps:")
     for line in lines:
-        tell(f"  {line}")
+        print_stdout(f"  {line}")
     for fact in file.catalog.get("facts", []):
-        tell(f"* {fact}")
+        print_stdout(f"* {fact}")
     if file.catalog.get("convention"):
-        tell(f"step: {file.catalog['convention']}")
+        print_stdout(f"step: {file.catalog['convention']}")
     for key in file.catalog.get("sources", []):
-        tell(f"source: {lib.source(key)}")
+        print_stdout(f"source: {lib.source(key)}")

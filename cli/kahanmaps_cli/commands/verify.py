@@ -14,7 +14,7 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
-from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
+from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, on_terminal, print_raw, print_stdout, shorten, styled
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -49,18 +49,24 @@ _LEGEND = {
 @opt.parameter_option
 @draw_options
 @opt.eps_options
-@click.option("--universal", is_flag=True, help="Not one member: everything at random over GF(p), for every member.")
 @click.option(
-    "--beyond", is_flag=True, help="A table of what survives for other H, J, steps and A, with counterexamples."
+    "--universal", is_flag=True, help="Check the generic member at random points over GF(p) instead of one member."
 )
-@click.option("--controls", is_flag=True, help="Run every claim on input that breaks one hypothesis: it has to fail.")
+@click.option(
+    "--beyond",
+    is_flag=True,
+    help="Print which statements survive for other H, J, time steps and A, with counterexamples.",
+)
+@click.option(
+    "--controls", is_flag=True, help="Also check every claim on input that violates one hypothesis, where it must fail."
+)
 @click.option(
     "--section",
     "sections",
     type=int,
     metavar="N",
     multiple=True,
-    help="Only this section (1 to 9; 10: beyond the paper). Repeatable.",
+    help="Restrict to this section (1 to 9; 10 is beyond the paper). Repeatable.",
 )
 @click.option(
     "--order",
@@ -70,13 +76,15 @@ _LEGEND = {
     show_default=True,
     help="Order in eps^2 of the series of the integrals.",
 )
-@click.option("--balls", "ball_bits", type=int, metavar="BITS", help="Also over complex balls, all roots enclosed.")
+@click.option(
+    "--balls", "ball_bits", type=int, metavar="BITS", help="Also compute over complex balls that enclose all roots."
+)
 @opt.evidence_options
-@click.option("--markdown", "as_markdown", is_flag=True, help="The table in Markdown.")
+@click.option("--markdown", "as_markdown", is_flag=True, help="Print the table in Markdown.")
 @opt.verbose_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Every statement of the paper of Petrera and Suris, put to the test for a member of its family.
+    """Check every statement of the paper of Petrera and Suris for a member of its family.
 
     \b
       kahanmaps verify                        # a random member with m = 3
@@ -84,13 +92,13 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --m 4 --generic --seed 2          # chi irreducible over Q
       kahanmaps verify --chi '(t-1)*(t^2+1)' --balls 128
       kahanmaps verify --universal --m 3      # theorems for the generic member
-      kahanmaps verify --controls --section 6            # what makes it fail
+      kahanmaps verify --controls --section 6            # violated hypotheses
       kahanmaps verify --m 2 --json | jq '.claims[0]'
-      kahanmaps verify --beyond             # what survives of them
+      kahanmaps verify --beyond             # other H, J, A
 
-    The member is SYSTEM, or drawn from --m, --eigenvalues, --generic or --chi; without any of these m = 3. Claims are
+    The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi (default: m = 3). Claims are
     proved by expanding them symbolically, verified exactly, or supported at random points over GF(p) with a bound on
-    the error. Misprints stand in the table in both forms. m = 1 to 8; beyond m = 6 claims that sum over all eigenvalues
+    the error. Misprints are checked in both forms. m = 1 to 8; beyond m = 6 claims that sum over all eigenvalues
     are supported only.
 
     Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 usage error, 3 one is undecided.
@@ -107,9 +115,9 @@ def command(system: str | None, **options: Any) -> int:
             flag = "--beyond" if options["beyond"] else "--universal"
             raise click.UsageError(f"found {flag} and {clash[0]}, expected {flag} with --m only")
     elif system is not None and given:
-        raise click.UsageError("give a SYSTEM or say which member to draw (--m, --eigenvalues, ...), not both")
+        raise click.UsageError("give a SYSTEM or options of a random member (--m, --eigenvalues, ...), not both")
     if system is None and options["parameters"]:
-        raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
+        raise click.UsageError("found -p without SYSTEM, expected a SYSTEM: a random member has no parameters")
     with Progress(options["quiet"]) as progress:
         settings = lib.Settings(
             eps=opt.the_eps(options["eps"], options["time_step"], required=False),
@@ -132,9 +140,9 @@ def command(system: str | None, **options: Any) -> int:
             report = lib.verify(file, settings, what)
     as_json, verbose = options["as_json"], options["verbose"]
     if report.context.get("beyond") and not as_json:
-        echo(lib.table(report))
+        print_raw(lib.table(report))
     elif options["as_markdown"]:
-        echo(markdown(report))
+        print_raw(markdown(report))
     elif as_json or not on_terminal():
         return print_report(report, as_json, verbose, options["quiet"])
     else:
@@ -164,31 +172,31 @@ def markdown(report: lib.Report) -> str:
 
 
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
-    tell(headline(report), style="bold")
+    print_stdout(headline(report), style="bold")
     by_section = sections_of(report.findings)
     others = by_section.pop("", [])
     for name, findings in by_section.items():
         console().print(_table(name, findings, verbose, bool(report.context.get("controls"))))
     for finding in others:
-        tell(f"{finding.claim}: {finding.evidence.summary}")
+        print_stdout(f"{finding.claim}: {finding.evidence.summary}")
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
-            tell(_LEGEND[method])
+            print_stdout(_LEGEND[method])
     # On the evidence beside the one that decided.
     also = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
     bounds = [int(str(one.data["error_bound"])[3:]) for one in also if "error_bound" in one.data]
     if bounds:
         held = f"also: {len(bounds)} claims held at random points over GF(p)"
-        tell(f"{held}, each false with probability below 2^-{min(bounds)}")
+        print_stdout(f"{held}, each false with probability below 2^-{min(bounds)}")
     methods = Counter(e.method for f in report.findings for e in f.also if "error_bound" not in e.data)
     for method, count in methods.items():
-        tell(f"also: {count} claims: {method} (-v)")
+        print_stdout(f"also: {count} claims: {method} (-v)")
     for finding in report.findings:
         if str(finding.verdict) == "refuted" and not finding.control:
-            tell(f"refuted: {shorten(finding.claim, 200)}")
+            print_stdout(f"refuted: {shorten(finding.claim, 200)}")
     for note in report.notes:
-        tell(f"note: {note}")
-    tell(f"verdict\t{report.verdict}\t({_count(report)})", 9)
+        print_stdout(f"note: {note}")
+    print_stdout(f"verdict\t{report.verdict}\t({_count(report)})", 9)
 
 
 def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool) -> Table:

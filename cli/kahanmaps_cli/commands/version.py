@@ -10,13 +10,13 @@ import click
 
 from kahanmaps_cli.options import json_option
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 
 
 @click.command("version")
 @json_option
 def command(as_json: bool) -> None:
-    """The versions of kahanmaps and of what it computes with.
+    """Print the versions of kahanmaps and its libraries.
 
     \b
       kahanmaps version --json
@@ -40,4 +40,4 @@ def command(as_json: bool) -> None:
         print_json(versions)
         return
     for name, number in versions.items():
-        tell(f"{name}\t{number}")
+        print_stdout(f"{name}\t{number}")

@@ -1,1 +1,1 @@
-"""The commands below `kahanmaps plot`, one file each, and what they share (output.py)."""
+"""The subcommands of `kahanmaps plot`, one file each, and what they share (output.py)."""

@@ -10,38 +10,45 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import eps_options, integral_option, load_system, seed_option, system_options, the_eps
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import Drawn, picture
+from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_START = 160  # characters
-_MAX_INTEGRALS = 3  # known ones, unless more are asked for
+_MAX_INTEGRALS = 3  # shown by default
 
 
 @picture(
     "drift",
     system_options,
-    click.option("--start", type=PointText(), metavar="X", help="Where orbits start (default: a random small point)."),
+    click.option(
+        "--start", type=PointText(), metavar="X", help="Initial point (default: a random point near the origin)."
+    ),
     eps_options,
-    click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="Steps of each orbit."),
-    integral_option("An expression in the variables and eps, a known one by name, or 'known' for all of these."),
+    click.option(
+        "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps of each orbit."
+    ),
+    integral_option(
+        "Function to plot: an expression in the variables and eps, the name of a known integral, or 'known' for all. "
+        "Repeatable."
+    ),
     click.option(
         "--method",
         "methods",
         type=click.Choice(["generic", "normal-form", "rk4", "midpoint"]),
         multiple=True,
-        help="Repeatable (default: all that there are).",
+        help="Integration method (default: all available). Repeatable.",
     ),
     click.option(
         "--scale",
         type=click.Choice(["loglog", "semilog"]),
         default="loglog",
         show_default=True,
-        help="Axes of the errors.",
+        help="Scale of the axes.",
     ),
     seed_option,
 )
-def command(options: dict[str, Any], progress: Progress) -> Drawn:
-    """How far integrals drift along float orbits: Kahan, RK4, implicit midpoint.
+def command(options: dict[str, Any], progress: Progress) -> Drawing:
+    """Plot the drift of integrals along floating-point orbits: Kahan, RK4, implicit midpoint.
 
     \b
       kahanmaps plot drift henon_heiles --eps 1/20 -o drift.svg
@@ -50,29 +57,29 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
           -o top.svg
       kahanmaps plot drift harmonic --eps 1/10 --integral E=x^2+y^2 -o e.png
 
-    A panel shows |I(x_n) - I(x_0)|/|I(x_0)| for one function I, absolute where
-    I(x_0) = 0; all methods take the time step 2 eps. Kahan maps conserve the
-    integrals with eps in them; H is that of the differential equation. The
-    maximum over each of 200 bins of steps is plotted, and an error of exactly 0
-    lies in the grey band.
+    Each panel shows the relative error |I(x_n) - I(x_0)|/|I(x_0)| of one function I
+    (the absolute error where I(x_0) = 0). All methods use the time step 2 eps. The
+    Kahan map conserves the integrals that depend on eps; H is the Hamiltonian of
+    the differential equation. The maximum over each of 200 bins of steps is
+    plotted; errors of exactly 0 lie in the gray band.
 
     Exit status: 0 done, 2 usage error, 3 some orbit ended early (the picture is
     written).
     """
     file = load_system(options["system"], options)
     real_approximation = file.real_approximation
-    system = real_approximation.system  # it is compared with methods for vector fields
+    system = real_approximation.system  # a vector field, since the other methods need one
     eps = the_eps(options["eps"], options["time_step"])
     if eps == 0:
-        raise lib.InputError("found eps = 0, expected another number: nothing moves")
-    talk: list[str] = []
+        raise lib.InputError("found eps = 0, expected another number: at eps = 0 every map is the identity")
+    messages: list[str] = []
     if options["integrals"]:
-        functions = lib.asked_functions(real_approximation, eps, options["integrals"])
+        functions = lib.requested_functions(real_approximation, eps, options["integrals"])
     else:
         known = lib.known_functions(real_approximation, eps)
         own = [function for function in known if function.name != "H"]
         if len(own) > _MAX_INTEGRALS:
-            talk.append(f"shown: {_MAX_INTEGRALS} of {len(own)} known integrals; --integral NAME shows others")
+            messages.append(f"shown: {_MAX_INTEGRALS} of {len(own)} known integrals; --integral NAME shows others")
         functions = own[:_MAX_INTEGRALS] + [function for function in known if function.name == "H"]
     form, reason = lib.float_normal_form(real_approximation)
     methods = options["methods"] or [name for name in lib.METHODS if name != "normal-form" or form is not None]
@@ -92,10 +99,10 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     )
     early = not all(end.is_whole for end in survey.ends.values())
     figure = lib.plot_drift(survey, options["style"], scale=options["scale"])
-    return Drawn(figure, file, [*talk, *_told(survey)], 3 if early else 0)
+    return Drawing(figure, file, [*messages, *_messages(survey)], 3 if early else 0)
 
 
-def _told(survey: lib.DriftSurvey) -> Iterator[str]:
+def _messages(survey: lib.DriftSurvey) -> Iterator[str]:
 
     point = ",".join(lib.format_number(entry) for entry in survey.start)
     point = point if len(point) <= _MAX_START else point[:_MAX_START] + "..."

@@ -1,4 +1,4 @@
-"""kahanmaps plot degrees, kahanmaps plot heights: results computed now, or read from what --json wrote."""
+"""kahanmaps plot degrees and kahanmaps plot heights, computed now or read from the JSON of earlier runs."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.degrees import degree_options, is_done, measured
 from kahanmaps_cli.commands.heights import height_options, require_heights, surveyed
 from kahanmaps_cli.params import PointText, Whole
-from kahanmaps_cli.pictures.output import Drawn, picture
+from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import SearchProgress
 
 _MAX_BYTES = 64_000_000
-# Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
+# Statuses of OrbitEnd that count as early: a digit limit or a return are normal ends.
 _EARLY = ("singular",)
 
 _scale_option = click.option(
-    "--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given."
+    "--scale", type=click.Choice(["linear", "log", "loglog"]), help="Scale of the axes (default: by the growth)."
 )
 
 
@@ -30,12 +30,18 @@ _scale_option = click.option(
     "degrees",
     click.argument("systems", nargs=-1, metavar="[SYSTEM]..."),
     opt.inline_options,
-    click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable."),
+    click.option(
+        "--from",
+        "records",
+        multiple=True,
+        metavar="FILE",
+        help="Read a result of degrees --json; - is standard input. Repeatable.",
+    ),
     degree_options,
     _scale_option,
 )
-def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawn:
-    """Degrees of the iterates of maps, with the recurrence they satisfy.
+def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
+    """Plot the degrees of iterates and the recurrence that they satisfy.
 
     \b
       kahanmaps plot degrees euler_top -o degrees.png
@@ -44,9 +50,9 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawn:
       kahanmaps degrees euler_top --json | kahanmaps plot degrees --from - \\
           -o degrees.svg
 
-    Marks are measured degrees (docs: kahanmaps degrees --help), a solid line is
-    the recurrence they satisfy. Dots join degrees for which none was checked:
-    what the legend says of their growth is then estimated.
+    Marks are measured degrees (see kahanmaps degrees --help); a solid line is the
+    recurrence that they satisfy. A dotted line joins degrees without a checked
+    recurrence; the legend then gives an estimate of their growth.
 
     Exit status: 0 done, 2 usage error, 3 some system was stopped before a
     recurrence was found (the picture is written).
@@ -54,7 +60,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawn:
     growths: dict[str, lib.DegreeGrowth] = {}
 
     def add(name: str, found: lib.DegreeGrowth) -> None:
-        """Two systems may have one name: the second is called name (2)."""
+        """Add a result; the second one of the same name is called name (2)."""
         names = chain([name], (f"{name} ({k})" for k in count(2)))
         growths[next(free for free in names if free not in growths)] = found
 
@@ -66,39 +72,49 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawn:
     if inline or not (names or growths):
         names.append(None)
     if inline and len(names) > 1:
-        raise click.UsageError("give SYSTEMs or an inline one, not both")
+        raise click.UsageError("give SYSTEMs or an inline system, not both")
     if len(names) > 1 and options["parameters"]:
-        raise click.UsageError("-p is for one system: write several as files, or draw --from records")
+        raise click.UsageError("-p needs a single SYSTEM: write the systems to files, or use --from")
     files = [opt.load_system(name, options) for name in names]
     early: list[str] = []
     for file in files:
         if progress.is_over:
             break
 
-        def told(sentence: str, name: str = file.label) -> None:
+        def on_progress(sentence: str, name: str = file.label) -> None:
             progress(f"{name}: {sentence}")
 
-        found = measured(file, eps, options, told)
+        found = measured(file, eps, options, on_progress)
         add(file.label, found)
         if not is_done(found, None):
             early.append(f"{file.label}: stopped early: {found.message}")
     figure = lib.plot_degrees(growths, options["style"], scale=options["scale"])
-    return Drawn(figure, files[0] if len(files) == 1 else None, early, 3 if early or progress.is_over else 0)
+    return Drawing(figure, files[0] if len(files) == 1 else None, early, 3 if early or progress.is_over else 0)
 
 
 @picture(
     "heights",
     opt.system_options,
-    click.option("--from", "record", metavar="FILE", help="Written by heights --json, instead of SYSTEM."),
-    click.option("--random", "count", type=Whole(1), metavar="N", help="N starts drawn at random (default 3)."),
     click.option(
-        "--start", "given", type=PointText(), multiple=True, metavar="X", help="Instead: this start. Repeatable."
+        "--from",
+        "record",
+        metavar="FILE",
+        help="Read a result of heights --json instead of SYSTEM; - is standard input.",
+    ),
+    click.option("--random", "count", type=Whole(1), metavar="N", help="Draw N random initial points (default 3)."),
+    click.option(
+        "--start",
+        "given",
+        type=PointText(),
+        multiple=True,
+        metavar="X",
+        help="Initial point, instead of random ones. Repeatable.",
     ),
     height_options,
     _scale_option,
 )
-def heights(options: dict[str, Any], progress: SearchProgress) -> Drawn:
-    """Heights of exact orbits against the step: how fast the numbers grow.
+def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
+    """Plot the heights of exact orbits, which measure the growth of the numbers.
 
     \b
       kahanmaps plot heights weierstrass -o heights.png
@@ -107,9 +123,9 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawn:
       kahanmaps heights weierstrass --json | kahanmaps plot heights --from - \\
           -o heights.svg
 
-    The height is the bit length of the largest integer that a point needs; a
-    colour is an eps, a curve an orbit, a line the growth that was fitted.
-    Records hold heights at the steps 0, 1, 2, 4, 8, ... only.
+    The height of a point is the bit length of its largest numerator or
+    denominator. Each eps has a color; marks are heights, lines are fits. Results
+    read by --from contain the heights at the steps 0, 1, 2, 4, 8, ... only.
 
     Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
     budget was spent before all orbits were finished (the picture is written).
@@ -129,14 +145,14 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawn:
         survey = surveyed(file, eps, options, progress)
         curves, whole = lib.height_curves(survey), survey.is_whole
     figure = lib.plot_heights(curves, options["style"], scale=options["scale"])
-    talk = []
+    messages = []
     if short := sum(curve.status == "budget" for curve in curves):
-        talk.append(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {digits}")
+        messages.append(f"{short} of {len(curves)} orbits ended where a number exceeded --max-digits {digits}")
     if early := sum(curve.status in _EARLY for curve in curves):
-        talk.append(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
+        messages.append(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
     if not whole and not progress.is_over:
-        talk.append("stopped early: the budget was spent before all orbits were finished (--effort)")
-    return Drawn(figure, file, talk, 3 if early or not whole or progress.is_over else 0)
+        messages.append("stopped early: the budget was spent before all orbits were finished (--effort)")
+    return Drawing(figure, file, messages, 3 if early or not whole or progress.is_over else 0)
 
 
 def read_record(path: str) -> Any:

@@ -10,7 +10,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import Drawn, picture, two_variables
+from kahanmaps_cli.pictures.output import Drawing, picture, two_variables
 from kahanmaps_cli.screen.progress import Progress
 
 
@@ -24,16 +24,20 @@ from kahanmaps_cli.screen.progress import Progress
         metavar="X",
         multiple=True,
         required=True,
-        help="Start of an orbit. Repeatable.",
+        help="Initial point of an orbit. Repeatable.",
     ),
     eps_options,
-    click.option("--steps", type=int, metavar="N", default=120, show_default=True, help="Steps of each orbit."),
-    click.option("--original", metavar="X,Y", help="A first panel with the orbit in these two variables."),
-    click.option("--projective", is_flag=True, help="All of each plane as a disc, infinity as its rim."),
-    click.option("--flow", is_flag=True, help="Dashed: the level curves of the differential equation."),
+    click.option(
+        "--steps", type=int, metavar="N", default=120, show_default=True, help="Number of steps of each orbit."
+    ),
+    click.option("--original", metavar="X,Y", help="Add a panel with the orbit in these two variables."),
+    click.option(
+        "--projective", is_flag=True, help="Draw each projective plane as a disc whose rim is the line at infinity."
+    ),
+    click.option("--flow", is_flag=True, help="Add dashed level curves of the differential equation."),
 )
-def command(options: dict[str, Any], progress: Progress) -> Drawn:
-    """The curves that carry the orbits of a member of the commuting family, plane by plane.
+def command(options: dict[str, Any], progress: Progress) -> Drawing:
+    """Draw the invariant curves of a member of the commuting family, plane by plane.
 
     \b
       kahanmaps plot invariant-curves paper_m2 --start 1/2,-1/3,0,1 --eps 1/10 \\
@@ -45,14 +49,14 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
       kahanmaps plot invariant-curves paper_m3_irreducible \\
           --start 1,0,1/2,0,1/3,1 --eps 1/20 -o generic.png
 
-    In its normal form the Kahan map of a member is a product of planar maps, one for each root of chi, and each of
-    them moves its part of the orbit along a plane cubic. A colour is a step, the same in all panels.
+    The normal form of the Kahan map of a member is a product of planar maps, one for each root of chi, and each planar
+    orbit lies on a cubic curve. Dots are colored by the step, in the same way in all panels.
 
-    Real roots have real planes; their coordinates keep areas, and h = kappa (u^3 - 3 u v^2) or kappa (u^3 + 3 u v^2).
-    A pair of complex roots has one complex plane: dots without a curve, u and v in panels of their own. The system may
-    be a member that does not say so. Where chi has a repeated root there are no planes.
+    A real root has a real plane with symplectic coordinates u, v in which h = kappa (u^3 - 3 u v^2) or
+    kappa (u^3 + 3 u v^2). A pair of complex roots has one complex plane; u and v have a panel each, without a curve.
+    The system need not be declared as a member. There are no planes where chi has a repeated root.
 
-    Exit status: 0 done, 2 usage error or no normal form, 3 an orbit met a pole (the picture shows what came before).
+    Exit status: 0 done, 2 usage error or no normal form, 3 an orbit met a pole (the picture shows it up to there).
     """
     file = load_system(options["system"], options)
     eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
@@ -64,10 +68,10 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         found, options["style"], options["projective"], options["flow"], original, labels
     )
     is_whole = all(pole is None for pole in found.poles)
-    return Drawn(figure, file, list(_told(found, options["projective"])), 0 if is_whole else 3)
+    return Drawing(figure, file, list(_messages(found, options["projective"])), 0 if is_whole else 3)
 
 
-def _told(found: lib.InvariantCurves, projective: bool) -> Iterator[str]:
+def _messages(found: lib.InvariantCurves, projective: bool) -> Iterator[str]:
     yield f"{found.normal_form}; {lib.eps_phrase(lib.eps_record(found.eps))}"
     for k, pole in enumerate(found.poles, 1):
         if pole is not None:

@@ -11,11 +11,11 @@ from kahanmaps import internals as lib
 from kahanmaps.errors import counted
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText
-from kahanmaps_cli.pictures.output import Drawn, picture, window_from, window_option
+from kahanmaps_cli.pictures.output import Drawing, picture, window_from, window_option
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_STEPS = 10**9
-# In one variable the map is a fraction, drawn over the step: all there is to be seen happens at the beginning.
+# With one variable the orbit is drawn over the step, and only its beginning is of interest.
 _STEPS, _STEPS_ON_A_LINE = 1000, 100
 
 
@@ -24,41 +24,52 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     opt.system_options,
     opt.eps_options,
     click.option(
-        "--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits."
+        "--start", type=PointText(), multiple=True, metavar="X", help="Initial point, e.g. 1/2,-1/3. Repeatable."
     ),
     opt.random_starts_options,
-    click.option("--steps", type=int, metavar="N", help="Steps of each orbit (default 1000; of one variable 100)."),
+    click.option(
+        "--steps", type=int, metavar="N", help="Number of steps of each orbit (default 1000; with one variable 100)."
+    ),
     opt.backward_option,
     click.option(
-        "--axes", metavar="A,B[,C]", help="Two or three variables or expressions; step is the number of the step."
+        "--axes", metavar="A,B[,C]", help="Axes: two or three variables or expressions; step is the number of steps."
     ),
-    click.option("--3d", "space", is_flag=True, help="Three axes, chosen by themselves."),
+    click.option("--3d", "space", is_flag=True, help="Draw three axes, chosen automatically."),
     click.option(
         "--colour-by",
         "--color-by",
-        "colour",
+        "color_by",
         default="orbit",
         show_default=True,
         metavar="F",
-        help="orbit, step, an integral (or H) by its name, or an expression.",
+        help="Color points by orbit, step, an integral (or H) by its name, or an expression.",
     ),
     click.option(
-        "--lines", is_flag=True, help="Join the points of each orbit: neighbours on a curve, or one step and the next."
+        "--lines",
+        is_flag=True,
+        help="Join the points of each orbit by lines: neighbors on its curve, or else consecutive steps.",
     ),
-    click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes."),
     click.option(
-        "--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts."
+        "--levels", metavar="F", help="Draw level curves of an integral or expression in the plane of the axes."
     ),
-    click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below."),
     click.option(
-        "--flow", is_flag=True, help="The solutions of the differential equation through the starts, as lines."
+        "--levels-at",
+        type=PointText(),
+        metavar="C1,C2,...",
+        help="With --levels: draw these levels instead of those of the initial points.",
     ),
-    click.option("--no-field", is_flag=True, help="No arrows, equilibria and separatrices of a planar system."),
+    click.option("--euler", is_flag=True, help="Add orbits of the explicit Euler method in gray."),
+    click.option(
+        "--flow", is_flag=True, help="Add solutions of the differential equation through the initial points as lines."
+    ),
+    click.option(
+        "--no-field", is_flag=True, help="Omit the vector field, equilibria and separatrices of a planar system."
+    ),
     window_option(),
-    click.option("--equal", is_flag=True, help="The same unit of length along both axes."),
+    click.option("--equal", is_flag=True, help="Use the same unit of length on both axes."),
 )
-def command(options: dict[str, Any], progress: Progress) -> Drawn:
-    """The phase portrait of SYSTEM: float orbits of its map, projected.
+def command(options: dict[str, Any], progress: Progress) -> Drawing:
+    """Draw the phase portrait of SYSTEM: projected floating-point orbits of its map.
 
     \b
       kahanmaps plot portrait lotka_volterra --eps 1/20 -o portrait.png
@@ -66,33 +77,31 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
       kahanmaps plot portrait weierstrass --eps 1/20 --levels modified_H -o w.svg
       kahanmaps plot portrait lotka_volterra --eps 1/10 --flow -o flow.pdf
 
-    In the plane of a planar system grey arrows show the direction of the flow,
-    marks its equilibria, and dashes the separatrices of saddles; rings or marks
-    are starts. With --levels or --euler there are no arrows.
+    The picture of a planar system also has its vector field (unless --levels or
+    --euler is given), equilibria, and separatrices of saddles. Triangles are
+    initial points.
 
-    Without starts sixteen are chosen around an equilibrium. Without --axes the
-    projection with the largest spread is drawn. Standard error says what was
-    chosen, how many points lie outside, and which orbits ended early. Colours go
-    from dark to light with the value; the widest orbits are drawn first.
-
-    Ctrl-C ends it without a picture.
+    By default sixteen initial points are chosen around an equilibrium, and the
+    projection with the largest spread is drawn. Messages on standard error say
+    what was chosen, how many points lie outside the window, and which orbits
+    ended early. Colors go from dark to light; the widest orbits are drawn first.
 
     Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
-    _require_sense(options)
+    _require_consistent(options)
     file = opt.load_system(options["system"], options)
     eps = opt.eps_of(file, options)
-    file.map.at(lib.rational(1) if eps is None else eps)  # the demands of all commands on eps, in the same words
+    file.map.at(lib.rational(1) if eps is None else eps)  # raises the same errors for a bad eps as other commands
     notes: list[str] = []
     field = lib.field_of(file)
     starts = _starts(file, field, eps, options)
     default = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
     steps = default if options["steps"] is None else options["steps"]
-    colour = options["colour"]
-    if colour not in ("orbit", "step"):
-        colour = lib.asked_function(file, eps, colour)
-    levels = None if options["levels"] is None else lib.asked_axis(file, eps, options["levels"])
-    axes = _asked_axes(file, eps, options)
+    color = options["color_by"]
+    if color not in ("orbit", "step"):
+        color = lib.requested_function(file, eps, color)
+    levels = None if options["levels"] is None else lib.requested_axis(file, eps, options["levels"])
+    axes = _requested_axes(file, eps, options)
     found = lib.walked(
         lib.ensemble_of_file(file, eps, starts, steps, backward=options["backward"]),
         steps,
@@ -101,30 +110,29 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     if axes is None:
         count = 3 if options["space"] else 2
         chosen = [file.variables[k] for k in lib.fullest_axes(found.points.reshape(-1, file.dim), count)]
-        axes = tuple(lib.asked_axis(file, eps, name) for name in chosen)
+        axes = tuple(lib.requested_axis(file, eps, name) for name in chosen)
         if file.dim > count:
             notes.append(f"axes {', '.join(chosen)}: the projection with the largest spread (--axes chooses)")
     euler = None
     if options["euler"]:
-        # Without a quadratic field `file.system` says why there is none.
+        # Without a quadratic field `file.system` raises the error.
         euler = lib.euler_orbits(field or file.system, -eps if options["backward"] else eps, starts, steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
     window = window_from(options, len(axes))
-    shown = lib.portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
+    shown = lib.portrait_of(found, axes, color=color, window=window, euler=euler, join=options["lines"])
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
     if field is None and options["flow"]:
         raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
     if field is not None:
         flow = lib.plane_flow(field, plane if len(axes) == 2 and not options["no_field"] else [], shown.window)
-        if options["levels"] or options["euler"]:  # arrows among many grey lines show nothing
+        if options["levels"] or options["euler"]:  # arrows would be invisible among gray lines
             flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
         if options["flow"]:
             flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, found, options["backward"]))
         shown = replace(shown, flow=flow)
     if levels is not None:
         if len(plane) != 2 or len(axes) != 2:
-            wrong = "level curves are drawn in the plane of two variables: take --axes X,Y with two of them"
-            raise lib.InputError(wrong)
+            raise lib.InputError("--levels needs two variables as axes: give --axes X,Y")
         at = options["levels_at"]
         values = lib.levels_through(levels, starts) if at is None else lib.to_floats(at).tolist()
         curves = lib.level_curves(levels, plane, file.dim, values, shown.window)
@@ -135,20 +143,20 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     figure = lib.plot_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
 
     orbits = counted(found.orbits, "orbit")
-    origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from chosen starts"
+    origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from automatic initial points"
     backward = ", backward" if options["backward"] else ""
-    told = "" if eps is None else lib.eps_told(eps, file.map)
-    talk = [f"{file.label}: {orbits}{origin}, {counted(len(found.points) - 1, 'step')}{backward}{told}"]
-    talk += [f"{count} of {orbits} ended early: {reason}" for reason, count in found.ended.items()]
+    at_eps = "" if eps is None else lib.eps_told(eps, file.map)
+    messages = [f"{file.label}: {orbits}{origin}, {counted(len(found.points) - 1, 'step')}{backward}{at_eps}"]
+    messages += [f"{count} of {orbits} ended early: {reason}" for reason, count in found.ended.items()]
     points = found.points.shape[0] * found.points.shape[1]
     if chords := sum(one is None for one in shown.joined):
         what = f"{chords} of {counted(len(shown.joined), 'orbit')}"
-        notes.append(f"{what} fill no curve that could be followed: lines join each point with the next step")
+        notes.append(f"{what} do not fill a curve: their lines join consecutive steps")
     if shown.left_out:
         notes.append(f"{shown.left_out} of {points} points lie outside the window (--window)")
     if shown.undefined:
-        notes.append(f"{shown.undefined} of {points} points are left out: an axis or the colour has a pole there")
-    return Drawn(figure, file, [*talk, *notes], 3 if found.ended else 0)
+        notes.append(f"{shown.undefined} of {points} points are left out: an axis or the color has a pole there")
+    return Drawing(figure, file, [*messages, *notes], 3 if found.ended else 0)
 
 
 _STARTS = ("start", "starts", "count")
@@ -158,31 +166,32 @@ def _is_given(value: Any) -> bool:
     return value not in (None, ())
 
 
-def _require_sense(options: dict[str, Any]) -> None:
-    """Refuse options that contradict each other."""
+def _require_consistent(options: dict[str, Any]) -> None:
+    """Refuse contradicting options."""
     kinds = ["random" if name == "count" else name for name in _STARTS if _is_given(options[name])]
     if len(kinds) > 1:
         raise click.UsageError(f"give --{kinds[0]} or --{kinds[1]}, not both")
     if options["count"] is None and (options["box"] is not None or options["seed"] is not None):
         raise click.UsageError("--box and --seed are for --random N")
     if options["starts"] == "-" and options["system"] == "-":
-        raise click.UsageError("found - twice, and there is one standard input")
+        raise click.UsageError("found - twice, but standard input holds one input only")
     steps = options["steps"]
     if steps is not None and not 0 <= steps <= _MAX_STEPS:
         raise click.UsageError(f"found --steps {steps}, expected 0 to {_MAX_STEPS} (--backward steps backward)")
     if options["space"] and options["axes"] is not None:
         raise click.UsageError("give --axes A,B,C or --3d, not both")
     if options["levels_at"] is not None and options["levels"] is None:
-        raise click.UsageError("--levels-at says where: add --levels F, of which function")
+        raise click.UsageError("--levels-at needs --levels F")
 
 
 def _starts(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, options: dict[str, Any]) -> Any:
-    """The starts that the options ask for, or those that are chosen around an equilibrium of the field."""
+    """Return the requested initial points, or automatic ones around an equilibrium of the field."""
     if options["start"]:
         wrong = next((x for x in options["start"] if len(x) != file.dim), None)
         if wrong is not None:
             raise click.UsageError(
-                f"found a start with {len(wrong)} coordinates, expected {file.dim}: {', '.join(file.variables)}"
+                f"found an initial point with {len(wrong)} coordinates, expected {file.dim}: "
+                f"{', '.join(file.variables)}"
             )
         return lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)
     if options["starts"] is not None or options["count"] is not None:
@@ -191,8 +200,8 @@ def _starts(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, o
         return requested_starts(file, options)
     if field is None:
         raise lib.InputError(
-            f"found no starts for {file.map.kind}, expected --start X, --starts FILE or --random N: they are "
-            "chosen around the fixed points of a vector field only"
+            f"found no initial points for {file.map.kind}, expected --start X, --starts FILE or --random N: "
+            "automatic ones need a vector field"
         )
     named = [text.strip() for text in (options["axes"] or "").split(",")]
     plane = [file.variables.index(text) for text in named if text in file.variables]
@@ -200,21 +209,23 @@ def _starts(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, o
     return lib.automatic_starts(field, eps, plane, backward=options["backward"])
 
 
-def _asked_axes(file: lib.SystemFile, eps: Any, options: dict[str, Any]) -> tuple[lib.PointFunction | str, ...] | None:
-    """The axes that are asked for, or the only ones there are; None where the points have to say."""
+def _requested_axes(
+    file: lib.SystemFile, eps: Any, options: dict[str, Any]
+) -> tuple[lib.PointFunction | str, ...] | None:
+    """Return the requested axes, or the only possible ones; None where they are to be chosen by the points."""
     text, count = options["axes"], 3 if options["space"] else 2
     if text is not None:
         pieces = [piece.strip() for piece in text.split(",")]
         if len(pieces) not in (2, 3) or not all(pieces):
             raise lib.InputError(f"found --axes {text[:60]}, expected two or three: x,y or x,y,z")
         if len(set(pieces)) < len(pieces):
-            raise lib.InputError(f"found --axes {text[:60]}, expected different ones")
+            raise lib.InputError(f"found --axes {text[:60]}, expected different axes")
         return tuple(
-            "step" if piece == "step" and "step" not in file.variables else lib.asked_axis(file, eps, piece)
+            "step" if piece == "step" and "step" not in file.variables else lib.requested_axis(file, eps, piece)
             for piece in pieces
         )
     if file.dim == 1 and count == 2:
-        return "step", lib.asked_axis(file, eps, file.variables[0])
+        return "step", lib.requested_axis(file, eps, file.variables[0])
     if file.dim < count:
-        raise lib.InputError(f"found {file.dim} variables, expected at least {count} for that many axes")
+        raise lib.InputError(f"found {file.dim} variables, expected at least {count}, one for each axis")
     return None

@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.pictures.output import Drawn, picture, window_from, window_option
-from kahanmaps_cli.runs.scan_run import ending, names_of, primes_of, scan_options, scanned
+from kahanmaps_cli.pictures.output import Drawing, picture, window_from, window_option
+from kahanmaps_cli.runs.scan_run import ending, names_of, primes_of, run_scan, scan_options
 from kahanmaps_cli.screen.progress import Progress
 
 
@@ -16,10 +16,10 @@ from kahanmaps_cli.screen.progress import Progress
     "scan",
     scan_options,
     window_option("A0,A1,B0,B1"),
-    click.option("--modulo", type=int, metavar="P", help="The slow members modulo P, one of the primes, instead."),
+    click.option("--modulo", type=int, metavar="P", help="Show the special parameters modulo the prime P instead."),
 )
-def command(options: dict[str, Any], progress: Progress) -> Drawn:
-    """The plane of two parameters: where degrees grow more slowly.
+def command(options: dict[str, Any], progress: Progress) -> Drawing:
+    """Draw the plane of two parameters with the points and curves where degrees grow more slowly.
 
     \b
       kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 -o plane.svg
@@ -28,17 +28,16 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
       kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 --modulo 53 \\
           -o modulo.svg
 
-    A colour for each kind of growth; marks are points, lines are curves. The
-    conditions of those that do not grow exponentially are written beside them,
-    as far as there is room. With --modulo P
-    the plane over GF(P): all slow members that were seen.
+    Each kind of growth has a color. The equations of components without
+    exponential growth are written beside them, as far as space permits. With
+    --modulo P the plane over GF(P) with all special parameters is shown.
 
     Exit status: 0 done, 2 usage error, 3 the budget was spent, 130 interrupted
-    (the picture is written if something was found).
+    (the picture is written if it is not empty).
     """
     window = window_from(options, 2)
     if window is not None and options["modulo"] is not None:
-        raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
+        raise click.UsageError("give --window or --modulo, not both: --modulo shows the whole plane")
     modulo, primes = options["modulo"], primes_of(options["primes"])
     from flint import fmpz
 
@@ -46,11 +45,9 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
         raise click.UsageError(f"found --modulo {modulo}, expected one of the primes (--primes)")
     names = names_of(options)
     if len(names) != 2:
-        raise click.UsageError(f"found --over {','.join(names)}, expected two parameters: a plane is drawn")
-    found, search = scanned(options["system"], options["quiet"], options)
+        raise click.UsageError(f"found --over {','.join(names)}, expected two parameters")
+    found, search = run_scan(options["system"], options["quiet"], options)
     status = ending(found, search)
     if found.ended != "complete" and not (found.components or any(one.prime == modulo for one in found.sweeps)):
-        return Drawn(
-            None, talk=["there is no picture: nothing to be drawn was found before the scan ended"], status=status
-        )
-    return Drawn(lib.plot_scan(found, options["style"], window=window, modulo=modulo), found.file, status=status)
+        return Drawing(None, messages=["no picture is written: the scan ended before it found anything"], status=status)
+    return Drawing(lib.plot_scan(found, options["style"], window=window, modulo=modulo), found.file, status=status)

@@ -1,7 +1,7 @@
-"""The starts of many orbits: from a .npy file, from text with a point in each line, or drawn at random.
+"""Initial points of many orbits: from a .npy file, from text with a point per line, or random.
 
-Text is exact: integers, p/q and decimals, separated by commas or blanks; # starts a comment. A first line with the
-names of the variables says which columns are meant.
+Text has integers, fractions p/q and decimals, separated by commas or blanks; # starts a comment. A first line with the
+names of the variables assigns the columns.
 """
 
 from __future__ import annotations
@@ -18,28 +18,30 @@ from kahanmaps.errors import ExpressionError, InputError
 
 MAX_TEXT_BYTES = 100_000_000
 MAX_NPY_BYTES = 2_000_000_000
-MAX_NUMBERS = 50_000_000  # of all starts together
+MAX_NUMBERS = 50_000_000  # coordinates of all initial points
 _MAGIC = b"\x93NUMPY"
 
 
 def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.FloatArray:
-    """The starts of the options: those of a file, or drawn at random, `count` of them unless the options say."""
+    """Return the initial points of a file, or random ones: `count` of them unless the options give a number."""
     if options["starts"] is not None:
         return read_starts(options["starts"], file.variables)
     dim, count = file.dim, options["count"] or count or 1
     if count * dim > MAX_NUMBERS:
-        raise InputError(f"found --random {count}, expected at most {MAX_NUMBERS // dim} starts in dimension {dim}")
+        raise InputError(
+            f"found --random {count}, expected at most {MAX_NUMBERS // dim} initial points in dimension {dim}"
+        )
     box = lib.rational(1) if options["box"] is None else options["box"]
     if box <= 0:
         raise InputError(f"found --box {box}, expected a number above 0: coordinates are drawn from -R to R")
     size = lib.to_float(box)
     if size == 0.0:
-        raise InputError("found a --box that is 0 in machine numbers, expected a larger one")
+        raise InputError("found a --box that underflows to 0 in floating point, expected a larger one")
     return lib.starts_in_box(count, dim, size, options["seed"] or 0)
 
 
 def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
-    """What a record says of them, so that they can be had again."""
+    """Return the part of a record from which the initial points can be reproduced."""
     if options["starts"] is not None:
         return {"starts": {"file": options["starts"]}, "seed": None}
     box = "1" if options["box"] is None else lib.format_number(options["box"])
@@ -47,9 +49,9 @@ def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
 
 
 def normal_form_for(file: lib.SystemFile, method: str | None) -> lib.SystemNormalForm | lib.NoNormalForm:
-    """The normal form that steps are made in, or why there is none."""
+    """Return the normal form in which steps are computed, or why there is none."""
     if method == "generic":
-        return lib.NoNormalForm("generic, as asked for")
+        return lib.NoNormalForm("generic, as requested")
     normal_form = file.normal_form
     if not isinstance(normal_form, lib.NoNormalForm) and normal_form.T is not None:
         normal_form = lib.NoNormalForm("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
@@ -59,7 +61,7 @@ def normal_form_for(file: lib.SystemFile, method: str | None) -> lib.SystemNorma
 
 
 def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
-    """The starts in a file, or on standard input for "-": an array (n, dim) of doubles.
+    """Read initial points from a file, or standard input for "-", as an array (n, dim) of doubles.
 
     Raises InputError with file and line of the first mistake.
     """
@@ -67,11 +69,11 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
     if path == "-":
         data = sys.stdin.buffer.read(MAX_NPY_BYTES + 1)
     else:
-        # Nobody may ever write to a pipe, and a device need not end. But /dev/fd/63 is the shell's <(...).
+        # Reading a pipe or a device may never end. But /dev/fd/63 is the shell's <(...).
         mode = os.stat(path).st_mode
         is_of_shell = stat.S_ISFIFO(mode) and path.startswith(("/dev/fd/", "/dev/stdin"))
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
-            raise InputError(f"cannot read the starts {path}: it is a pipe or a device, expected a file")
+            raise InputError(f"cannot read initial points from {path}: found a pipe or a device, expected a file")
         with open(path, "rb") as stream:
             data = stream.read(MAX_NPY_BYTES + 1)
     if data.startswith(_MAGIC):
@@ -88,14 +90,14 @@ def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
 
 
 def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArray:
-    """The array of a .npy file; nothing is ever unpickled."""
+    """Read the array of a .npy file without unpickling anything."""
     import numpy as np
 
     if len(data) > MAX_NPY_BYTES:
         raise InputError(f"{where}: found more than {MAX_NPY_BYTES} bytes, expected fewer")
     try:
         rows = np.load(io.BytesIO(data), allow_pickle=False)
-    except Exception as error:  # its head is read like Python, and may go wrong like Python: in its tokens, its depth
+    except Exception as error:  # the header is parsed as Python, with any error that this may raise
         message = [*str(error).splitlines(), type(error).__name__][0]
         raise InputError(f"{where}: found a .npy file that cannot be read: {message[:200]}") from None
     dtype, shape, dim = rows.dtype, rows.shape, len(variables)
@@ -105,8 +107,8 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArr
         raise InputError(f"{where}: found an array of {kind}, expected real numbers")
     if len(shape) != 2 or shape[1] != dim or shape[0] < 1:
         raise InputError(
-            f"{where}: found an array of shape {shape}, expected (n, {dim}): one row for each start, with columns "
-            f"{', '.join(variables)}"
+            f"{where}: found an array of shape {shape}, expected (n, {dim}): one row for each initial "
+            f"point, with columns {', '.join(variables)}"
         )
     if rows.size > MAX_NUMBERS:
         raise InputError(f"{where}: found an array of shape {shape}, expected at most {MAX_NUMBERS} numbers")
@@ -120,14 +122,14 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArr
 
 
 def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.FloatArray:
-    """The points of text, one a line; a first line of names says in which columns the variables stand."""
+    """Read points from text, one per line; a first line of names assigns the columns."""
     import numpy as np
 
     rows: list[list[float]] = []
     columns: list[int] | None = None
     width, is_first = len(variables), True
     for number, line in enumerate(text.split("\n"), start=1):
-        content = line.partition("#")[0].strip().strip("()[]{}")  # as people print points
+        content = line.partition("#")[0].strip().strip("()[]{}")  # points are often printed in brackets
         if not content:
             continue
         cells = [cell.strip() for cell in content.split(",")] if "," in content else content.split()
@@ -150,5 +152,5 @@ def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.FloatArra
         if len(rows) * len(variables) > MAX_NUMBERS:
             raise InputError(f"{where}:{number}: found more than {MAX_NUMBERS} numbers, expected fewer")
     if not rows:
-        raise InputError(f"{where}: found no point, expected one a line: {', '.join(variables)}, e.g. 1/2,-1/3,...")
+        raise InputError(f"{where}: found no point, expected one per line: {', '.join(variables)}, e.g. 1/2,-1/3,...")
     return np.array(rows, dtype=np.float64)

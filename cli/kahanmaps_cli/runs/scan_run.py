@@ -1,4 +1,4 @@
-"""What scan and its picture share: the options, and the scan that they ask for."""
+"""Options and execution of a scan, shared by `scan` and `plot scan`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import quoted
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.signals import INTERRUPTED, interruptible
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -23,38 +23,46 @@ scan_options: Callable[[F], F] = opt.stack(
         "--over",
         required=True,
         metavar="A,B,...",
-        help="The parameters that vary, up to 8, eps perhaps among them; an inline system need not declare them.",
+        help="Vary these parameters, at most 8; eps may be one of them.",
     ),
     opt.eps_options,
-    click.option("--terms", type=int, metavar="N", help="Measure d_1, ..., d_N."),
-    click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
+    click.option("--terms", type=int, metavar="N", help="Compute the degrees d_1, ..., d_N."),
+    click.option(
+        "--primes",
+        metavar="P,Q,...",
+        help="Compute modulo these primes, at least three (default: by the number of parameters).",
+    ),
     opt.effort_options,
-    click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors)."),
+    click.option(
+        "-j", "--jobs", type=int, metavar="N", help="Number of threads, used with numba (default: all processors)."
+    ),
     opt.seed_option,
 )
 
 
 def names_of(options: dict[str, Any]) -> list[str]:
-    """The parameters of --over."""
+    """Return the parameters of --over."""
     names = [name.strip() for name in options["over"].split(",") if name.strip()]
-    twice = next((name for name in names if names.count(name) > 1), None)
-    if twice is not None:
-        raise click.UsageError(f"found {quoted(twice)} twice in --over, expected different parameters")
+    repeated = next((name for name in names if names.count(name) > 1), None)
+    if repeated is not None:
+        raise click.UsageError(f"found {quoted(repeated)} twice in --over, expected different parameters")
     return names
 
 
-def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[lib.Scan, SearchProgress]:
-    """The scan that a command line asks for, and the search that made it."""
+def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[lib.Scan, SearchProgress]:
+    """Run the scan of a command line; return it and its progress, which has the work."""
     names = names_of(options)
     if opt.is_inline(options, system):
         given = {"eps", *(name for name, _ in options["parameters"])}
         options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
-        raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
+        raise click.UsageError(
+            "system files contain no eps: leave eps out of --over, or leave out --toml and --write-to"
+        )
     file = opt.load_system(system, {**options, "quiet": quiet})
     has_begun, interrupted = Event(), Event()
 
-    def told(sentence: str) -> None:
+    def on_progress(sentence: str) -> None:
         has_begun.set()
         if interrupted.is_set():
             raise lib.TimeOver
@@ -62,8 +70,8 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[l
 
     def interrupt() -> None:
         if not has_begun.is_set():
-            # Loops are compiled, for ten seconds the first time, and nothing could be kept. What is raised within a
-            # callback of the compiler is lost.
+            # The first ten seconds may be compilation: there is no partial result, and an exception raised within a
+            # callback of the compiler would be lost.
             os.write(2, b"interrupted\n")
             os._exit(INTERRUPTED)
         interrupted.set()
@@ -76,13 +84,13 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[l
             **opt.given(options, "terms", "effort", "seed", "jobs"),
             primes=primes_of(options["primes"]),
             analysis=options.get("analysis"),
-            progress=told,
+            progress=on_progress,
         )
     return found, search
 
 
 def ending(found: lib.Scan, search: SearchProgress) -> int:
-    """The exit status, and a word where it is not 0 and nothing was said before."""
+    """Return the exit status, and print why the scan stopped early."""
     if search.is_over:
         return 3
     if found.ended == "complete":
@@ -90,12 +98,12 @@ def ending(found: lib.Scan, search: SearchProgress) -> int:
     is_interrupted = found.ended == "interrupted"
     if not search.quiet:
         why = "interrupted" if is_interrupted else "the budget was spent (--effort)"
-        say(f"stopped early: {why} before {', '.join(found.omitted)}")
+        print_stderr(f"stopped early: {why} before {', '.join(found.omitted)}")
     return INTERRUPTED if is_interrupted else 3
 
 
 def primes_of(text: str | None) -> list[int] | None:
-    """The numbers of --primes."""
+    """Return the numbers of --primes."""
     if text is None:
         return None
     pieces = [piece.strip() for piece in text.split(",")]

@@ -1,4 +1,4 @@
-"""What the commands share that search for formulas: find-integrals, find-density and analyze."""
+"""Options and output shared by the commands that search for formulas: find-integrals, find-density and others."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
-from kahanmaps_cli.screen.terminal import formula, tell
+from kahanmaps_cli.screen.terminal import formula, print_stdout
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def search_options(section: str) -> Callable[[F], F]:
-    """eps, --symbolic, the effort, --seed and the output; `section` is that of a system file."""
+    """Return the options of a search; `section` is the section of a system file that --toml prints."""
     return opt.stack(
         opt.eps_options,
         opt.symbolic_option,
         opt.effort_options,
         opt.seed_option,
-        click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
-        click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),
+        click.option("--toml", "as_toml", is_flag=True, help=f"Print the section [{section}] of a system file."),
+        click.option("--latex", "as_latex", is_flag=True, help="Print the formulas in LaTeX."),
         opt.output_options,
     )
 
 
 def require_one_form(options: dict[str, Any]) -> None:
-    """At most one of --toml, --latex and --json."""
+    """Refuse more than one of --toml, --latex and --json."""
     if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
         raise click.UsageError("give one of --toml, --latex and --json")
 
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
-    """The names of --symbolic without eps, and the number eps or None."""
+    """Return the names of --symbolic without eps, and the number eps or None."""
     named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     if eps is not None and "eps" in named:
@@ -44,14 +44,14 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
     return tuple(name for name in named if name != "eps"), eps
 
 
-def asked(options: dict[str, Any], *names: str) -> dict[str, Any]:
-    """What every search is asked with, and these options: symbols, eps, effort, seed."""
+def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
+    """Return the arguments of a search: symbols, eps, effort, seed and the options named."""
     symbols, eps = symbols_and_eps(options)
     return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "effort", "seed")}
 
 
 def scope(found: Any) -> str:
-    """For which eps and which symbols the formulas hold, to follow the name of the map."""
+    """Return text behind the name of the map: for which eps and symbols the formulas hold."""
     if getattr(found, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
     step = lib.eps_told(found.eps, found.file.map)
@@ -59,7 +59,7 @@ def scope(found: Any) -> str:
 
 
 def heading(name: str, found: Any, search: SearchProgress) -> dict[str, Any]:
-    """What is needed to redo a search, as plain data, and the work that it took."""
+    """Return the data needed to repeat a search, and its work, for JSON."""
     return {
         **envelope(name),
         "system": found.file.name,
@@ -73,7 +73,7 @@ def heading(name: str, found: Any, search: SearchProgress) -> dict[str, Any]:
 
 
 def record(name: str, found: Any, search: SearchProgress, **more: Any) -> dict[str, Any]:
-    """All that a search found, as plain data."""
+    """Return the JSON record of a search."""
     return {**heading(name, found, search), **found.to_json(), **more, "document": dict(found.file.document)}
 
 
@@ -85,10 +85,10 @@ def print_search(
     formulas: Iterable[tuple[str, Any, str]],
     count: str = "",
 ) -> None:
-    """The result of a search in the form that was asked for.
+    """Print the result of a search as text, JSON, TOML or LaTeX, as requested.
 
-    `formulas` are the name, the object (`text`, `verdict`, `evidence`) and the origin of each; `count` is a line below
-    them.
+    `formulas` are triples of a name, an object with `text`, `verdict` and `evidence`, and its origin; `count` is the
+    line after them.
     """
     if options["as_json"]:
         print_json(record(name, found, search))
@@ -98,25 +98,25 @@ def print_search(
         for label, one, _ in formulas:
             click.echo(f"{label} = {one.to_json()['latex']}")
     else:
-        tell(f"{name}: {found.file.name}{scope(found)}")
+        print_stdout(f"{name}: {found.file.name}{scope(found)}")
         for label, one, origin in formulas:
-            tell(f"{label}\t{one.verdict}\t{formula(one.text)}\n\t{origin}{one.evidence.summary}")
+            print_stdout(f"{label}\t{one.verdict}\t{formula(one.text)}\n\t{origin}{one.evidence.summary}")
         if count:
-            tell(count)
+            print_stdout(count)
         for text in filter(None, (found.note, found.reason)):
-            tell(f"note\t{text}")
+            print_stdout(f"note\t{text}")
 
 
 def print_list(
     name: str, heading: str, found: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
-    """A list that is complete unless it says otherwise, below its heading or as JSON; the exit status."""
+    """Print the result of a search that is complete or says what is undecided; return the exit status."""
     if as_json:
         print_json({"command": name, **context, **found.to_json()})
     else:
-        tell(heading)
-        tell(str(found))
+        print_stdout(heading)
+        print_stdout(str(found))
     if not search.quiet:
         for sentence in found.undecided:
-            say(f"undecided: {sentence}")
+            print_stderr(f"undecided: {sentence}")
     return 0 if found.complete and not search.is_over else 3

@@ -1,1 +1,1 @@
-"""Tables, progress, colours and streams: everything that is written for a reader."""
+"""Output for readers: tables, progress, colors and streams."""

@@ -1,4 +1,4 @@
-"""An orbit on a terminal: numbers are shortened so that a row fits a line."""
+"""Orbits on a terminal, with numbers shortened so that a row fits on a line."""
 
 from __future__ import annotations
 
@@ -8,39 +8,39 @@ from typing import Any
 
 from kahanmaps import internals as lib
 from kahanmaps.maps.orbits.writers import Writer, title
-from kahanmaps_cli.screen.terminal import columns, echo, tell
+from kahanmaps_cli.screen.terminal import columns, print_raw, print_stdout
 
-_NARROWEST = 9  # a column of numbers with the middle left out
-_NARROWEST_BALL = 22  # three digits and the radius
+_MIN_WIDTH = 9  # of a column of shortened numbers
+_MIN_BALL_WIDTH = 22  # of a column of balls: three digits and the radius
 
 
 class OrbitTable(Writer):
-    """Columns; where the terminal leaves too little of the numbers a point takes a line for each coordinate."""
+    """Print points as rows of a table, or on narrow terminals one coordinate per line."""
 
     def header(self, header: dict[str, Any]) -> None:
-        tell(title(header))
+        print_stdout(title(header))
         names = [*self.variables, *self.integrals]
         self._width = columns()
         self._first = max(6, len(str(header["steps"])))
         self._cell = (self._width - self._first) // len(names) - 2
-        self._has_digits = False  # whether some number stands without the word digits
-        self._is_table = self._cell >= (_NARROWEST_BALL if header["arithmetic"].startswith("ball") else _NARROWEST)
+        self._has_digits = False  # whether some counts of digits are shown without the word
+        self._is_table = self._cell >= (_MIN_BALL_WIDTH if header["arithmetic"].startswith("ball") else _MIN_WIDTH)
         if self._is_table:
-            echo("step".rjust(self._first) + self._row(names))
+            print_raw("step".rjust(self._first) + self._row(names))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         cells = [*x, *("pole" if value is None else value for value in values)]
         if self._is_table:
-            echo(str(step).rjust(self._first) + self._row(cells))
+            print_raw(str(step).rjust(self._first) + self._row(cells))
             return
-        echo(f"step {step}")
+        print_raw(f"step {step}")
         for name, cell in zip((*self.variables, *self.integrals), cells, strict=True):
-            echo(f"  {name} = {_elided(cell, max(_NARROWEST, self._width - len(name) - 5))}")
+            print_raw(f"  {name} = {_elided(cell, max(_MIN_WIDTH, self._width - len(name) - 5))}")
 
     def end(self, end: lib.OrbitEnd, more: Mapping[str, Any]) -> None:
-        tell(f"# {end.text}")
+        print_stdout(f"# {end.text}")
         if self._has_digits:
-            tell("# (30/28): digits above and below the line; (30): the larger number of them")
+            print_stdout("# (30/28): digits of numerator and denominator; (30): the larger of the two")
 
     def _row(self, cells: Sequence[str]) -> str:
         shown = [_elided(cell, self._cell) for cell in cells]
@@ -49,7 +49,7 @@ class OrbitTable(Writer):
 
 
 def _approximated(text: str) -> list[str]:
-    """A long exact number as a decimal and its digits, those above and those below, from long to short; else nothing.
+    """Return decimal forms of a long exact number with the digits of numerator and denominator, longest first.
 
     >>> _approximated("-133567234372186342562607635605/125821231910581795318152718151")
     ['-1.06156 (30/30 digits)', '-1.06156 (30/30)', '-1.06 (30/30)', '-1.06 (30)']
@@ -57,10 +57,10 @@ def _approximated(text: str) -> list[str]:
     exact = re.fullmatch(r"(-?)([0-9]+)(?:/([0-9]+))?", text)
     if exact is None:
         return []
-    sign, above, below = exact[1], exact[2], exact[3] or "1"
-    # of numbers with thousands of digits Python would make no integer, nor a double
-    value = int(above[:18]) / int(below[:18])
-    power = len(above[18:]) - len(below[18:])
+    sign, numerator, denominator = exact[1], exact[2], exact[3] or "1"
+    # Python refuses to convert thousands of digits to an integer, and a double would overflow
+    value = int(numerator[:18]) / int(denominator[:18])
+    power = len(numerator[18:]) - len(denominator[18:])
     mantissa, exponent = f"{value:.5e}".split("e")
     power += int(exponent)
 
@@ -69,8 +69,8 @@ def _approximated(text: str) -> list[str]:
         sign + (f"{float(mantissa) * 10**power:.{kept}g}" if is_small else f"{float(mantissa):.{kept}g}e{power:+03d}")
         for kept in (6, 3)
     )
-    digits = f"{len(above)}/{len(below)}" if exact[3] else f"{len(above)}"
-    most = max(len(above), len(below))
+    digits = f"{len(numerator)}/{len(denominator)}" if exact[3] else f"{len(numerator)}"
+    most = max(len(numerator), len(denominator))
     return [f"{long} ({digits} digits)", f"{long} ({digits})", f"{short} ({digits})", f"{short} ({most})"]
 
 

@@ -1,7 +1,7 @@
-"""The door to files that a command writes: those that it reads or cannot write are refused before anything is computed.
+"""Output files of commands: a file that is also an input, or cannot be written, is refused before anything is computed.
 
-What a command reads is known from Python itself, which tells every file before it is opened: no command has to say so,
-and none can forget to. A file counts by what it is, not by its name, so links are seen through.
+An audit hook of Python reports every file that a command opens for reading. Files are compared by device and inode, not
+by name, so that links are recognized.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Identity = tuple[int, int]
 
 
 class _Files:
-    """Which files a command has read, and which it is going to write, by what they are."""
+    """The files that a command has read and those it is going to write, by device and inode."""
 
     def __init__(self) -> None:
         self.read: set[Identity] = set()
@@ -35,17 +35,19 @@ class _Files:
             self.note(sys.stdin.fileno())
 
     def note(self, path: Any, is_written: bool = False) -> None:
-        """Note a file that is about to be read, or one that is going to be written; refuse one that is both."""
+        """Record a file that is read or will be written; refuse one that is both."""
         try:
-            found = os.stat(path)
+            status = os.stat(path)
         except (OSError, ValueError):
             return
-        if not stat.S_ISREG(found.st_mode):
-            return  # it holds nothing that could be written over
-        identity = found.st_dev, found.st_ino
+        if not stat.S_ISREG(status.st_mode):
+            return  # a pipe or device: nothing can be overwritten
+        identity = status.st_dev, status.st_ino
         if identity in (self.read if is_written else self.written):
             name = path if is_written else self.written[identity]
-            raise click.UsageError(f"found {name} both to be read and to be written (-o): it would be written over")
+            raise click.UsageError(
+                f"{name} is both an input and an output (-o) and would be overwritten: name another output"
+            )
         if is_written:
             self.written[identity] = path
         else:
@@ -53,7 +55,7 @@ class _Files:
 
 
 class OutputFile(click.Path):
-    """A file to write to, `-` for standard output. With `grows` it is written in its place, else one beside it."""
+    """A file to write to, `-` for standard output; with `grows` it is written in place, else replaced at the end."""
 
     name = "file"
 
@@ -64,7 +66,7 @@ class OutputFile(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = os.fsdecode(super().convert(value, param, ctx))
         if path != "-" and ctx is not None and not ctx.resilient_parsing:
-            # Whether there is a place for the file is known before anything is computed.
+            # Check that the file can be written before anything is computed.
             folder, target = lib.resolved(path).parent, Path(path)
             if not path or not folder.is_dir():
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
@@ -76,7 +78,7 @@ class OutputFile(click.Path):
 
 
 class OutputFolder(click.Path):
-    """A folder to write files to: each has to be announced by `will_write` before the first is written."""
+    """A folder to write files to: announce each file by `will_write` before the first is written."""
 
     def __init__(self) -> None:
         super().__init__(file_okay=False)
@@ -84,10 +86,10 @@ class OutputFolder(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = super().convert(value, param, ctx)
         if ctx is not None:
-            _files(ctx)  # notes from now on what is read
+            _files(ctx)  # start to record what is read
         if ctx is None or ctx.resilient_parsing:
             return path
-        # Whether files can be written there is found out, before anything is computed, by making it.
+        # Check that files can be written there, by creating the folder, before anything is computed.
         folder = Path(os.fsdecode(path))
         missing = [one for one in (folder, *folder.parents) if not one.exists()]
         try:
@@ -102,12 +104,12 @@ class OutputFolder(click.Path):
 
 
 def file_name(name: str) -> str:
-    """The name with everything replaced that might lead out of a folder, or that no file should be called."""
+    """Replace all characters that are unsafe in a file name."""
     return "".join(c if c.isalnum() or c in "._+-" else "_" for c in name)
 
 
 def deliver(path: str, content: bytes) -> bool:
-    """Write to a file, whole or not at all, or to standard output for `-`; whether it was a file."""
+    """Write to a file atomically, or to standard output for `-`; return whether it was a file."""
     if path == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
@@ -122,17 +124,17 @@ def will_write(path: str) -> None:
 
 
 def _files(context: click.Context) -> _Files:
-    _listen()
-    found = context.meta.get(_KEY)
-    if not isinstance(found, _Files):
-        found = context.meta[_KEY] = _Files()
-    return found
+    _install_hook()
+    files = context.meta.get(_KEY)
+    if not isinstance(files, _Files):
+        files = context.meta[_KEY] = _Files()
+    return files
 
 
-@cache  # a hook stays as long as the process
-def _listen() -> None:
-    def hear(event: str, arguments: tuple[Any, ...]) -> None:
-        """Tell the command that is running of every file that is opened to be read, also databases of results."""
+@cache  # an audit hook cannot be removed
+def _install_hook() -> None:
+    def record(event: str, arguments: tuple[Any, ...]) -> None:
+        """Record every file that the running command opens for reading, including databases of results."""
         if event == "open" and (arguments[2] or 0) & os.O_ACCMODE == os.O_RDONLY and not isinstance(arguments[0], int):
             path = arguments[0]
         elif event == "sqlite3.connect":
@@ -143,4 +145,4 @@ def _listen() -> None:
         if context is not None and _KEY in context.meta:
             context.meta[_KEY].note(path)
 
-    sys.addaudithook(hear)
+    sys.addaudithook(record)

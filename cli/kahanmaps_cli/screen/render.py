@@ -1,4 +1,4 @@
-"""Reports and numbers for people (a rich table on a terminal, plain lines in a pipe) and for scripts (JSON)."""
+"""Reports and numbers: a table on a terminal, plain lines in a pipe, or JSON."""
 
 from __future__ import annotations
 
@@ -9,26 +9,34 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.screen.progress import say
-from kahanmaps_cli.screen.terminal import COLOURS, NUMBER_WIDTH, console, on_terminal, shorten, styled, tell
+from kahanmaps_cli.screen.progress import print_stderr
+from kahanmaps_cli.screen.terminal import (
+    NUMBER_WIDTH,
+    VERDICT_COLORS,
+    console,
+    on_terminal,
+    print_stdout,
+    shorten,
+    styled,
+)
 
 # On a terminal long lists of claims are cut to this many.
 CLAIMS_SHOWN = 40
 
 
 def envelope(command: str) -> dict[str, str]:
-    """What every object begins with that a command prints as JSON."""
+    """Return the first keys of the JSON object of every command."""
     return {"command": command, "version": lib.__version__}
 
 
 def record_of(command: str, file: lib.SystemFile, arithmetic: str, **more: Any) -> dict[str, Any]:
-    """What a command found of a system, as plain data, with the system itself."""
+    """Return the JSON object of a command for a system, with the system file."""
     common = {"system": file.name, "convention": lib.convention(file.map), "arithmetic": arithmetic}
     return {**envelope(command), **common, **more, "document": dict(file.document)}
 
 
 def print_json(data: Mapping[str, Any]) -> None:
-    """One JSON object on a line of its own."""
+    """Print one JSON object on one line."""
     click.echo(json.dumps(data))
 
 
@@ -40,17 +48,17 @@ def print_report(report: lib.Report, as_json: bool, verbose: bool = False, quiet
     elif on_terminal():
         _print_terminal(report, verbose)
     else:
-        tell(str(report))
+        print_stdout(str(report))
     status = exit_status(report)
     if status == 3 and report.ended_early and not quiet:
         orbit = report.context["orbit"]
         hint = "; --max-digits N raises the budget" if orbit["status"] == "budget" else ""
-        say(f"the orbit that was asked for ended early: {orbit['message']}{hint}")
+        print_stderr(f"the requested orbit ended early: {orbit['message']}{hint}")
     return status
 
 
 def exit_status(report: lib.Report) -> int:
-    """0 holds, 1 refuted, 3 undecided, or an orbit that was asked for and ended early."""
+    """Return 0 where all claims hold, 1 where one is refuted, 3 where undecided or the requested orbit ended early."""
     if report.verdict is lib.Certainty.REFUTED:
         return 1
     if report.verdict is lib.Certainty.UNDECIDED or report.ended_early:
@@ -59,10 +67,10 @@ def exit_status(report: lib.Report) -> int:
 
 
 def verdict_style(finding: lib.Finding) -> str:
-    """Red is for what nobody expected: a control that is refuted, as it should be, stays without a colour."""
+    """Return the style of a verdict: red for an unexpected one, none for a control that is refuted as it should be."""
     if not finding.is_as_expected:
         return "bold red"
-    return "" if finding.control else COLOURS[str(finding.verdict)]
+    return "" if finding.control else VERDICT_COLORS[str(finding.verdict)]
 
 
 def _print_terminal(report: lib.Report, verbose: bool) -> None:
@@ -80,11 +88,11 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     table.add_column("claim", overflow="fold")
     if not verbose:
         table.add_column("decided by", overflow="fold")
-    told: set[str] = set()
+    printed_hypotheses: set[str] = set()
     for finding in shown:
         verdict = styled(lib.verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
         if verbose:
-            lines = [finding.claim, *lib.details(finding, told, NUMBER_WIDTH)]
+            lines = [finding.claim, *lib.details(finding, printed_hypotheses, NUMBER_WIDTH)]
             table.add_row(verdict, styled("\n  ".join(lines)))
             continue
         has_formula = report.check != "commute" and finding.formula not in finding.claim
@@ -94,31 +102,31 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
         if hypotheses:
             reason = f"{evidence.data['theorem']} ({len(hypotheses)} hypotheses verified exactly)"
         table.add_row(verdict, styled(claim), styled(reason))
-    tell(lib.headline(report), style="bold")
+    print_stdout(lib.headline(report), style="bold")
     console().print(table)
     if len(shown) < len(report.findings):
-        tell(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
+        print_stdout(f"{len(report.findings) - len(shown)} more claims, all proved (--json has all)")
     if not verbose:
-        # What a reader of the short table wants to know next: hypotheses, further evidence, witnesses.
+        # The short table lacks hypotheses, further evidence and witnesses.
         hypotheses = list(dict.fromkeys(text for f in shown for text in f.evidence.data.get("hypotheses", ())))
         if hypotheses:
             more = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
-            tell(f"verified: {'; '.join(hypotheses[:8])}{more}")
+            print_stdout(f"verified: {'; '.join(hypotheses[:8])}{more}")
         also = dict.fromkeys(evidence.summary for f in shown if not f.control for evidence in f.also)
         for summary in list(also)[:4]:
-            tell(f"also: {summary}")
+            print_stdout(f"also: {summary}")
         for finding in shown:
             if finding.witness is not None:
-                tell(f"{lib.verdict_text(finding)}: {finding.claim}")
+                print_stdout(f"{lib.verdict_text(finding)}: {finding.claim}")
                 for line in lib.witness_lines(finding.witness, NUMBER_WIDTH):
-                    tell(f"  {line}")
+                    print_stdout(f"  {line}")
     for note in report.notes:
-        tell(f"note: {note}")
-    tell(f"verdict\t{report.verdict}", 9)
+        print_stdout(f"note: {note}")
+    print_stdout(f"verdict\t{report.verdict}", 9)
 
 
 def json_number(value: Any) -> Any:
-    """A JSON number, or the text inf, -inf or nan, which JSON has no numbers for; a complex one as its two parts."""
+    """Return a JSON number, the text inf, -inf or nan, or a complex number as a list of its two parts."""
     number = complex(value)
     if isinstance(value, complex) or getattr(value, "dtype", None) == "complex128":
         return [lib.json_float(number.real), lib.json_float(number.imag)]
@@ -126,5 +134,5 @@ def json_number(value: Any) -> Any:
 
 
 def short_float(value: Any) -> str:
-    """Three digits."""
+    """Format a number with three digits."""
     return f"{float(value):.3g}"

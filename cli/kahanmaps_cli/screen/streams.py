@@ -1,4 +1,4 @@
-"""Standard streams: never in the place of a file, and without a reader no reason to fail."""
+"""Robust standard streams: closed streams are replaced, and a pipe without a reader is no error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class _Pipe(io.FileIO):
-    """A pipe to write to; when its reader has gone (head, say), what is written is dropped."""
+    """A pipe whose writes are dropped once its reader (head, say) has closed it."""
 
     is_read = True
 
@@ -24,8 +24,8 @@ class _Pipe(io.FileIO):
         return memoryview(data).nbytes
 
 
-class _Nowhere(io.FileIO):
-    """The null device in place of a closed standard output: what is written is lost, and this is noted."""
+class _NullOutput(io.FileIO):
+    """The null device in place of a closed standard output; it records that output was lost."""
 
     has_lost = False
 
@@ -34,15 +34,17 @@ class _Nowhere(io.FileIO):
         return super().write(data)
 
 
-def have_standard_streams() -> None:
-    """Have all three of them, and the status of a command not depend on who reads what it prints.
+def prepare_standard_streams() -> None:
+    """Replace closed streams by the null device, and make the exit status independent of the reader of a pipe.
 
-    Where one is closed (`>&-`) the null device takes its place, or the next file opened would. Where the encoding of a
-    stream lacks a character, the character is spelt out.
+    If a stream were left closed (`>&-`), the next file opened would take its number. Characters that the encoding of a
+    stream lacks are written as escapes.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            raw = (_Nowhere if name == "stdout" else io.FileIO)(os.devnull, mode)  # open as long as the process lives
+            raw = (_NullOutput if name == "stdout" else io.FileIO)(
+                os.devnull, mode
+            )  # open as long as the process lives
             buffer = io.BufferedReader(raw) if mode == "r" else io.BufferedWriter(raw)
             setattr(sys, name, io.TextIOWrapper(buffer, encoding="utf-8"))
     for stream in (sys.stdout, sys.stderr):
@@ -60,19 +62,19 @@ def have_standard_streams() -> None:
 
 
 def is_read() -> bool:
-    """Whether somebody may still read what is printed; it is known when a buffer was full, or has been flushed."""
+    """Whether standard output still has a reader, as known from the last time a buffer was written."""
     raw = _raw_output()
     return not isinstance(raw, _Pipe) or raw.is_read
 
 
 def output_was_lost() -> bool:
-    """Whether something was printed though standard output was closed when the program began; once it is flushed."""
+    """Whether something was printed to a standard output that was closed from the beginning; flush it first."""
     raw = _raw_output()
-    return isinstance(raw, _Nowhere) and raw.has_lost
+    return isinstance(raw, _NullOutput) and raw.has_lost
 
 
-def leave_nothing_to_flush() -> None:
-    """Let go of what a stream still holds and cannot write: Python would fail on it once more, and exit with 120."""
+def discard_unwritable_output() -> None:
+    """Discard what a stream still holds and cannot write: Python would fail on it again at exit, with status 120."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -82,5 +84,5 @@ def leave_nothing_to_flush() -> None:
 
 
 def _raw_output() -> Any:
-    """What is below the buffers of standard output."""
+    """The raw stream below the buffers of standard output."""
     return getattr(getattr(sys.stdout, "buffer", None), "raw", None)

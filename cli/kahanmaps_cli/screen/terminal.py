@@ -1,8 +1,7 @@
-"""What a terminal gets and a pipe does not: colours, and lines broken at words with what follows indented.
+"""Output on a terminal: colors, and lines broken at words with a hanging indent.
 
-A pipe gets every line as it is, with tabs. Colours go to a terminal, or wherever --color says, and say nothing that
-words do not say as well. They are the named ones of the terminal that can be read on light and on dark ground: no
-yellow, no blue, no grey, no dim.
+A pipe gets unbroken lines with tabs. Colors go to a terminal, or as --color says, and carry no information that the
+text does not. Only named colors are used that are legible on light and on dark backgrounds: no yellow, blue or gray.
 """
 
 from __future__ import annotations
@@ -16,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps.displayed import shorten as shorten
+from kahanmaps.display_protocols import shorten as shorten
 from kahanmaps.errors import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
+VERDICT_COLORS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
 # On a terminal long numbers are shortened to this many characters.
 NUMBER_WIDTH = 40
-_LABEL = 12
+_LABEL_WIDTH = 12
 _WHEN = {"auto": None, "always": True, "never": False}
 
 
@@ -40,8 +39,8 @@ def columns() -> int:
     return max(20, shutil.get_terminal_size().columns)
 
 
-def is_coloured() -> bool:
-    """Whether standard output gets colours: --color decides, NO_COLOR, FORCE_COLOR, CLICOLOR_FORCE, a terminal."""
+def is_colored() -> bool:
+    """Whether standard output is colored: by --color, NO_COLOR, FORCE_COLOR, CLICOLOR_FORCE, or on a terminal."""
     context = click.get_current_context(silent=True)
     if context is not None and context.color is not None:
         return context.color
@@ -53,38 +52,38 @@ def is_coloured() -> bool:
 
 
 def paint(text: str, style: str) -> str:
-    """The text in a style such as "bold green", where colours are wanted."""
+    """Return the text in a style such as "bold green" where output is colored."""
     words = style.split()
-    if not words or not is_coloured():
+    if not words or not is_colored():
         return text
-    colour = next((word for word in words if word != "bold"), None)
-    return click.style(text, fg=colour, bold="bold" in words or None)
+    color = next((word for word in words if word != "bold"), None)
+    return click.style(text, fg=color, bold="bold" in words or None)
 
 
 def console() -> Console:
-    """Where rich prints tables: no markup in texts, and no escape sequence at all where colours are not wanted."""
+    """Return a console of rich that reads no markup, and writes no escape sequences where output is not colored."""
     from rich.console import Console
 
-    coloured = is_coloured()
+    colored = is_colored()
     return Console(
         markup=False,
         emoji=False,
         highlight=False,
-        force_terminal=coloured,
-        color_system="standard" if coloured else None,
+        force_terminal=colored,
+        color_system="standard" if colored else None,
         width=columns(),
     )
 
 
 def formula(text: str, width: int = 400) -> str:
-    """A long formula is shortened on a terminal only."""
+    """Shorten a long formula on a terminal; a pipe gets all of it."""
     return shorten(text, width) if on_terminal() else text
 
 
-def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
-    """Print lines of cells separated by tabs; on a terminal the first cell is a label, and the others stand beside it.
+def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
+    """Print lines of cells separated by tabs; on a terminal the first cell is a label in front of the others.
 
-    Verdicts are coloured, lines that start with # are headings. `hang` is the column of what stands beside a label.
+    Verdicts are colored, and lines that start with # are headings. `hang` is the column behind the label.
     """
     for line in printable(text).split("\n"):
         cells = line.split("\t")
@@ -98,46 +97,46 @@ def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
         if style or line.startswith("# "):
             shown = "\n".join(paint(piece, style or "bold") if piece else "" for piece in shown.split("\n"))
         for cell in cells[:2]:
-            if cell in COLOURS and not style:
-                shown = shown.replace(cell, paint(cell, COLOURS[cell]), 1)
-        click.echo(shown, color=is_coloured())
+            if cell in VERDICT_COLORS and not style:
+                shown = shown.replace(cell, paint(cell, VERDICT_COLORS[cell]), 1)
+        click.echo(shown, color=is_colored())
 
 
-def echo(text: str, end: str = "\n") -> None:
-    """Print text on standard output as it is, but for what a terminal would obey; others may have written it."""
+def print_raw(text: str, end: str = "\n") -> None:
+    """Print text on standard output unbroken; control characters are escaped, since it may come from a file."""
     click.echo(printable(text) + end, nl=False)
 
 
 def styled(text: str, style: str = "") -> Text:
-    """Text for a table of rich, with nothing in it that a terminal would obey."""
+    """Return text for a table of rich, with control characters escaped."""
     from rich.text import Text
 
     return Text(printable(text), style=style)
 
 
-def tell_entry(head: str, text: str, style: str = "") -> None:
-    """Print an entry of a list whose heads have the same length; on a terminal its text goes on below itself."""
+def print_entry(head: str, text: str, style: str = "") -> None:
+    """Print an entry of a list whose heads have equal lengths; on a terminal continuation lines are indented."""
     head, text = printable(head), printable(text)
     lines = _filled(text, head, len(head)) if on_terminal() else head + text
-    click.echo(paint(lines[: len(head)], style) + lines[len(head) :], color=is_coloured())
+    click.echo(paint(lines[: len(head)], style) + lines[len(head) :], color=is_colored())
 
 
 def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
-    """Columns on a terminal, tabs elsewhere; the first `words` columns are texts, the others numbers.
+    """Print columns on a terminal and tabs elsewhere; the first `words` columns are texts, the others numbers.
 
-    A broken number looks like two: a terminal that is too narrow for the numbers gets tabs as well.
+    A terminal too narrow for the numbers gets tabs as well, since a broken number would look like two.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     least = sum(min(width, 10) for width in widths[:words]) + sum(widths[words:]) + 3 * len(widths) + 1
     if not on_terminal() or least > columns():
         for row in rows:
-            echo("\t".join(row))
+            print_raw("\t".join(row))
         return
     from rich.table import Table
 
     table = Table(header_style="bold")
     for k, heading in enumerate(rows[0]):
-        header, side = styled(heading, COLOURS.get(heading, "")), "left" if k < words else "right"
+        header, side = styled(heading, VERDICT_COLORS.get(heading, "")), "left" if k < words else "right"
         table.add_column(header, justify=side, overflow="fold", no_wrap=k >= words)  # type: ignore[arg-type]
     for row in rows[1:]:
         table.add_row(*map(styled, row))
@@ -145,13 +144,13 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
 
 
 def _filled(text: str, first: str, hang: int) -> str:
-    """The text behind `first`, in lines of the terminal's width that are broken at blanks and hang below the text."""
+    """Break `first` and the text at blanks into lines of the terminal's width, with a hanging indent."""
     margins = {"initial_indent": first, "subsequent_indent": " " * hang}
     return fill(text, columns(), **margins, replace_whitespace=False, break_on_hyphens=False) or first  # type: ignore[arg-type]
 
 
-def colour_option() -> click.Option:
-    """The option --color auto|always|never."""
+def color_option() -> click.Option:
+    """Return the option --color auto|always|never."""
 
     def choose(context: click.Context, parameter: click.Parameter, value: Any) -> None:
         if value is not None:
@@ -164,5 +163,5 @@ def colour_option() -> click.Option:
         callback=choose,
         expose_value=False,
         is_eager=True,
-        help="Colours: auto (the default), always or never.",
+        help="Color the output: auto (default; on a terminal), always or never.",
     )

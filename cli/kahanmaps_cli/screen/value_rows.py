@@ -1,4 +1,4 @@
-"""Parameters with ranges of values: -p a=-2..2 or -p a=-2..2:1/4, all combinations of them, and tables over these."""
+"""Tables over ranges of parameter values: -p a=-2..2 or -p a=-2..2:1/4, in all combinations."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import KahanmapsError
 from kahanmaps_cli.options import load_system
-from kahanmaps_cli.screen.progress import SearchProgress, say
+from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
-from kahanmaps_cli.screen.terminal import tell
+from kahanmaps_cli.screen.terminal import print_stdout
 
-_MOST = 10_000
+_MAX_ROWS = 10_000
 
 Row = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What was found for one combination of values: in a line, as JSON, all of it, and why it is not decided."""
+    """The result for one combination of values: as a line, as JSON and in full, and why it is undecided."""
 
     line: str
     record: Callable[[], dict[str, Any]]
@@ -33,24 +33,26 @@ class Cell:
     undecided: str = ""
 
 
-def table(system: str | None, options: dict[str, Any], found: Callable[[lib.SystemFile, SearchProgress], Cell]) -> int:
-    """A line for each combination of values, without a range all that was found; in JSON a record each.
+def table(
+    system: str | None, options: dict[str, Any], compute: Callable[[lib.SystemFile, SearchProgress], Cell]
+) -> int:
+    """Print a line, or with --json a record, for each combination of values; without ranges, the full result.
 
-    A combination at which there is an error is told of on standard error, and the others go on; one everywhere is
-    raised. Returns the exit status. --seconds is for all of them.
+    An error at one combination is printed on standard error, and the others continue; an error at all of them is
+    raised. --seconds limits the total time. Returns the exit status.
     """
     quiet, began = options["quiet"], time.monotonic()
     rows = rows_of(options["parameters"], system)
     if rows is None:
         file = load_system(system, options)
         with SearchProgress(options) as search:
-            cell = found(file, search)
+            cell = compute(file, search)
         if options["as_json"]:
             print_json(cell.record())
         else:
             cell.show()
         if cell.undecided and not quiet and not search.is_over:
-            say(cell.undecided)
+            print_stderr(cell.undecided)
         return 3 if cell.undecided or search.is_over else 0
     done, refused = 0, list[tuple[str, KahanmapsError]]()
     for row in rows:
@@ -58,28 +60,28 @@ def table(system: str | None, options: dict[str, Any], found: Callable[[lib.Syst
         try:
             file = load_system(system, {**options, "parameters": row, "quiet": True})
             with SearchProgress(options, began) as search:
-                cell = found(file, search)
+                cell = compute(file, search)
         except KahanmapsError as error:
             refused.append((name, error))
             continue
         if options["as_json"]:
             print_json(cell.record())
         else:
-            tell(f"{name}\t{cell.line}")
+            print_stdout(f"{name}\t{cell.line}")
         if search.is_over:
             return 3
         done += not cell.undecided
     if len(refused) == len(rows):
         raise refused[0][1]
     for name, reason in refused:
-        say(f"{name}: {reason}")
+        print_stderr(f"{name}: {reason}")
     if done < len(rows) and not quiet:
-        say(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
+        print_stderr(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
     return 0 if done == len(rows) else 3
 
 
 def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:
-    """The parameters for each combination of values, the last range running fastest; None without a range."""
+    """Return the parameters of each combination, the last range varying fastest; None without a range."""
     if not any(lib.is_range(value) for _, value in parameters):
         return None
     if system == "-":
@@ -90,8 +92,8 @@ def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[R
         axes.append(
             lib.RationalRange.from_text(f"{text} step {step}" if colon else text) if lib.is_range(value) else [value]
         )
-    if (size := prod(map(len, axes))) > _MOST:
-        raise click.UsageError(f"found {size} combinations of values, expected at most {_MOST}")
+    if (size := prod(map(len, axes))) > _MAX_ROWS:
+        raise click.UsageError(f"found {size} combinations of values, expected at most {_MAX_ROWS}")
     names = [name for name, _ in parameters]
     return [
         tuple((name, x if isinstance(x, str) else lib.format_number(x)) for name, x in zip(names, row, strict=True))

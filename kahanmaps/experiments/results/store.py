@@ -34,7 +34,7 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from kahanmaps.atomic_files import resolved
-from kahanmaps.displayed import Displayed
+from kahanmaps.display_protocols import HtmlDisplay
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, note_source, quoted
 from kahanmaps.experiments.results.records import (
     KEY_LENGTH,
@@ -177,7 +177,7 @@ class StoredTask(NamedTuple):
     attempts: int
 
 
-class Store(Displayed):
+class Store(HtmlDisplay):
     """A database of results. Make one with `Store.open`, and close it, best by `with`.
 
     >>> from tempfile import TemporaryDirectory
@@ -247,7 +247,7 @@ class Store(Displayed):
         if not exists and not create:
             raise StoreError(f"there is no database {self.name}: check the name, or run the batch to make it")
         if not self.path.parent.is_dir():
-            raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; make it first")
+            raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; create it first")
         mode = "rwc" if create else "rw"
         if self._is_readonly:
             # Reading has to write where a killed writer left a journal. Where no process may write, none does.

@@ -16,7 +16,7 @@ from fractions import Fraction
 from math import isfinite
 from typing import Any, NamedTuple
 
-from kahanmaps.displayed import Displayed, shorten
+from kahanmaps.display_protocols import HtmlDisplay, shorten
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.export import Entry, entries, is_number, known, names_of, nearest, plain
 from kahanmaps.experiments.results.records import KEPT, VERDICTS, Row, canonical, system_words
@@ -59,7 +59,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Summary(Displayed):
+class Summary(HtmlDisplay):
     """Groups in the order of their values, numbers as numbers before texts, and None (not known) at the end."""
 
     by: tuple[str, ...]

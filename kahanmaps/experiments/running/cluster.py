@@ -68,7 +68,7 @@ class ClusterWorkers(Executor):
 
     `command` is what a worker runs for a group, by default this module with the interpreter `python`, which the workers
     have to find at the same path as we do. A group takes about `group_seconds`, by what the last tasks of the same kind
-    took, and has at most 200 jobs. `talk` is told what is being waited for.
+    took, and has at most 200 jobs. `on_message` gets messages about what is being waited for.
 
     At most two groups for each thread of the workers are under way, so that memory here does not depend on the number
     of tasks. What a group leaves undone is tried a few times more, each job alone, before it is lost.
@@ -82,13 +82,13 @@ class ClusterWorkers(Executor):
         command: Sequence[str] | None = None,
         python: str | None = None,
         group_seconds: float = GROUP_SECONDS,
-        talk: Callable[[str], None] | None = None,
+        on_message: Callable[[str], None] | None = None,
         connect_seconds: float = 10.0,
     ) -> None:
         self.address = address
         self._documents = documents
         self._group_seconds = group_seconds
-        self._talk = talk or (lambda text: None)
+        self._talk = on_message or (lambda text: None)
         # `env=` of subprocess.run would replace all that the worker has instead.
         passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
         self._command = ["/usr/bin/env", *passed, *(command or [python or sys.executable, "-m", MODULE])]
@@ -102,7 +102,7 @@ class ClusterWorkers(Executor):
         self._client = connect(address, connect_seconds)
         self._results = import_module("distributed").as_completed(loop=self._client.loop)
         self._lost: str | None = None  # why the scheduler is lost
-        self._threads, self._looked, self._is_told = 0, -LOOK_EVERY, False
+        self._threads, self._looked, self._is_reported = 0, -LOOK_EVERY, False
         self._look()
 
     @property
@@ -180,9 +180,9 @@ class ClusterWorkers(Executor):
         self._looked = time.monotonic()
         with suppress(Exception):  # a scheduler that is lost meanwhile
             self._threads = sum(self._client.nthreads().values())
-            if not self._threads and not self._is_told:
+            if not self._threads and not self._is_reported:
                 self._talk(f"waiting for workers: the scheduler at {self.address} has none")
-            self._is_told = not self._threads
+            self._is_reported = not self._threads
 
     def _send_open(self) -> None:
         if self._open:
@@ -190,7 +190,7 @@ class ClusterWorkers(Executor):
             self._send(jobs)
 
     def _send(self, jobs: list[Job]) -> None:
-        """Hand a group to the scheduler. One that is gone is told by `wait`."""
+        """Hand a group to the scheduler. A lost scheduler is reported by `wait`."""
         documents = {name: self._documents(name) for job in jobs for name in job.task.documents}
         group = {"documents": documents, "jobs": [{"task": j.task.text, "limits": asdict(j.limits)} for j in jobs]}
         times = [job.limits.time for job in jobs]
@@ -209,7 +209,7 @@ class ClusterWorkers(Executor):
                     key=f"kahanmaps-{uuid.uuid4().hex}",
                 )
             except Exception as error:  # the client has closed itself after losing the scheduler
-                self._lost = self._lost or told(error)
+                self._lost = self._lost or on_one_line(error)
                 return
         self._groups[future] = jobs
         self._results.add(future)
@@ -232,10 +232,10 @@ class ClusterWorkers(Executor):
             message = f"the worker's command did not end within {error.timeout:g} s"
         except Exception as error:
             if future.status != "error":  # no error of the command's, but of the way to it
-                self._lost = self._lost or told(error)
+                self._lost = self._lost or on_one_line(error)
                 return []
             output, is_unfit = None, "KilledWorker" not in type(error).__name__
-            message = f"the worker could not run its command: {told(error)}"
+            message = f"the worker could not run its command: {on_one_line(error)}"
         del self._groups[future]
         with suppress(Exception):
             future.release()
@@ -287,7 +287,7 @@ def record_on(line: bytes) -> Record | None:
         return None
 
 
-def told(error: BaseException | None) -> str:
+def on_one_line(error: BaseException | None) -> str:
     """An exception on one line."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
@@ -333,7 +333,7 @@ def connect(address: str, timeout: float) -> Any:
         return made.result(timeout + 1)
     except Exception as error:
         raise InputError(
-            f"no dask scheduler answers at {address} within {timeout:g} s ({told(error)}): "
+            f"no dask scheduler answers at {address} within {timeout:g} s ({on_one_line(error)}): "
             "is the address right, and does `dask scheduler` run there?"
         ) from error
 

@@ -191,8 +191,8 @@ class LocalWorkers:
             return _record_of({**found, "outcome": Outcome.TIMEOUT, "message": message})
         ended = f"the child {ending(status)}"
         if not is_ready and not is_from_outside(status):
-            told = printed or "it says nothing"
-            raise WorkersError(f"a worker process cannot start (it {ending(status)}): {told}")
+            output = printed or "no output"
+            raise WorkersError(f"a worker process cannot start (it {ending(status)}): {output}")
         if is_from_outside(status):
             attempt.tries += 1
             if attempt.tries < self._tries:

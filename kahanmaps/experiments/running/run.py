@@ -39,7 +39,7 @@ class Batch:
 
     @property
     def was_interrupted(self) -> bool:
-        """Whether somebody asked for the end."""
+        """Whether the end was requested."""
         return self._until is not None
 
     def interrupt(self) -> None:
@@ -96,18 +96,18 @@ def executor_for(
     scheduler: str | None = None,
     python: str | None = None,
     group_seconds: float = GROUP_SECONDS,
-    talk: Callable[[str], None] | None = None,
+    on_message: Callable[[str], None] | None = None,
 ) -> Executor:
     """`jobs` child processes here, or the workers of a dask scheduler ("tcp://host:port" or its scheduler file).
 
     Short tasks are done in groups of about `group_seconds`. `python` is the interpreter on the workers, if it is
-    another one; `talk` is told what the cluster is waiting for.
+    another one; `on_message` gets messages about what the cluster is waiting for.
     """
     if scheduler is None:
         return LocalWorkers(jobs, documents, group_seconds=group_seconds)
     from kahanmaps.experiments.running.cluster import ClusterWorkers
 
-    return ClusterWorkers(scheduler, documents, python=python, group_seconds=group_seconds, talk=talk)
+    return ClusterWorkers(scheduler, documents, python=python, group_seconds=group_seconds, on_message=on_message)
 
 
 def run(

@@ -30,7 +30,7 @@ from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.printing import attributes, format_number
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import Growth
@@ -65,7 +65,7 @@ _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to n
 
 
 @dataclass(frozen=True)
-class DegreeGrowth(Printed):
+class DegreeGrowth(PrintableResult):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and what they say of its complexity.
 
     `eps` is None for generic eps (a random residue for each line). `patterns` is what the singularities say, None where

@@ -18,7 +18,7 @@ from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.printing import attributes, format_point
 from kahanmaps.algebra.work import Budget
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.hard_stop import TimeLimit
@@ -60,7 +60,7 @@ class SurveyedOrbit:
 
 
 @dataclass(frozen=True)
-class HeightSurvey(Printed):
+class HeightSurvey(PrintableResult):
     """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where the budget
     or a TimeLimit ended it.
 

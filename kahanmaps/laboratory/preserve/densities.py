@@ -20,7 +20,7 @@ from kahanmaps.algebra.printing import attributes, format_factored
 from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.theorems import product_density_invariant
-from kahanmaps.displayed import latex
+from kahanmaps.display_protocols import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.defaults import budget_for

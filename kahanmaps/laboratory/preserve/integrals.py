@@ -21,7 +21,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, degree, ring, substi
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
-from kahanmaps.displayed import latex
+from kahanmaps.display_protocols import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import normalized

@@ -29,7 +29,7 @@ from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.displayed import latex
+from kahanmaps.display_protocols import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.invariants.phase_functions import normalized, orbit_about

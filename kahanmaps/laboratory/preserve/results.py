@@ -8,7 +8,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_told
@@ -18,7 +18,7 @@ _CLOSES_WITHIN = 64  # points of an orbit: as many as relations of some degree t
 
 
 @dataclass(frozen=True)
-class Search(Printed):
+class Search(PrintableResult):
     """What was asked: the map of a file, the symbols that formulas contain, and eps, None for every eps.
 
     With `flow` it is the differential equation that was asked for. Random points were taken modulo the `primes`.

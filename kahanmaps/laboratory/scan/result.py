@@ -11,7 +11,7 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import InputError, counted
@@ -93,7 +93,7 @@ def _listed(texts: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Scan(Printed):
+class Scan(PrintableResult):
     """What a scan found: components, the ones with the slowest growth first.
 
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is

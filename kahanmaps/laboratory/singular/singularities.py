@@ -25,7 +25,7 @@ from kahanmaps.algebra.polynomial_work import counted_product, factored
 from kahanmaps.algebra.printing import all_fields, attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import Budget, count
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.defaults import budget_for
@@ -87,7 +87,7 @@ class TooLongFormula(InputError):
 
 
 @dataclass(frozen=True)
-class SingularityRun(Printed):
+class SingularityRun(PrintableResult):
     """The singularities of a Kahan map at one exact eps, half the time step.
 
     `denominator` is det(I - eps f'(x)) as text, "?" for a composition of which it is too large; `critical_degree` the

@@ -35,7 +35,7 @@ from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Finding, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError
 from kahanmaps.family.tensor import GENERATOR, over_algebra
 from kahanmaps.laboratory.defaults import budget_for
@@ -106,7 +106,7 @@ class CommutingFamily:
 
 
 @dataclass
-class CommutingSystems(Printed):
+class CommutingSystems(PrintableResult):
     """What was found. `complete` says that there are no other rational g of that shape.
 
     `dimension` is that of the space of g with [f, g] = 0; `irrational` tells of solutions outside Q; `discarded` counts

@@ -22,7 +22,7 @@ from kahanmaps.algebra.polynomials import coefficients_in, linear_combinations, 
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import SolutionComponent, solve_system
 from kahanmaps.algebra.work import Budget, count
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
@@ -93,7 +93,7 @@ class Infinitesimal:
 
 
 @dataclass
-class Symmetries(Printed):
+class Symmetries(PrintableResult):
     """What was found. `complete` says that each search in `searched` came to its end.
 
     `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;

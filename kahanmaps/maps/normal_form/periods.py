@@ -25,7 +25,7 @@ from flint import fmpq, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, f
 
 from kahanmaps.algebra.fields import GF, QQ, integer
 from kahanmaps.algebra.printing import all_fields
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
@@ -77,7 +77,7 @@ class PlanePeriod:
 
 
 @dataclass(frozen=True)
-class OrbitPeriod(Printed):
+class OrbitPeriod(PrintableResult):
     """The period of an orbit, continued through poles: the least common multiple over the planes.
 
     `status` is "periodic", "aperiodic" (proved), "undefined" (a plane starts where the map has no value and cannot be

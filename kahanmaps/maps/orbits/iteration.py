@@ -18,7 +18,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field, integer
-from kahanmaps.displayed import Displayed, shorten
+from kahanmaps.display_protocols import HtmlDisplay, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import Map, det_of
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -106,7 +106,7 @@ class _GivenUp(Exception):
     """Raised by `Orbit.interrupt` in the thread that computes an iterate directly."""
 
 
-class Orbit(Displayed):
+class Orbit(HtmlDisplay):
     """The orbit of `start` under a map, or some iterates of it: iterate over it once, then look at `end`.
 
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came

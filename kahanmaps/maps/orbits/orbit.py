@@ -17,7 +17,7 @@ from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
 from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.printing import json_float
 from kahanmaps.atomic_files import open_append
-from kahanmaps.displayed import data_frame
+from kahanmaps.display_protocols import data_frame
 from kahanmaps.errors import BadPrime, InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.convention import eps_record, resolve_eps

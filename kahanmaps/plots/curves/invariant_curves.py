@@ -30,7 +30,7 @@ from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transformed
 
 MAX_POINTS = 1_000_000
-MAX_STARTS = 7  # as many colours as there are
+MAX_STARTS = 7  # as many colors as there are
 BITS = 256
 _POLE_BITS = 96
 _PROGRESS_EVERY = 2_000  # steps

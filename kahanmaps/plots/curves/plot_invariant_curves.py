@@ -1,6 +1,6 @@
-"""Draws the planes of a member: in each the cubic and the orbit on it, every step in one colour in all of them.
+"""Draws the planes of a member: in each the cubic and the orbit on it, every step in one color in all of them.
 
-Dots of one colour are the planar parts of one point. That each of them runs along its own curve, at its own pace, while
+Dots of one color are the planar parts of one point. That each of them runs along its own curve, at its own pace, while
 the point itself wanders through a cloud, is the product structure. Shown is a window around most of the dots, or all of
 the projective plane as a disc.
 """
@@ -18,9 +18,9 @@ from kahanmaps.errors import InputError
 from kahanmaps.plots.curves.invariant_curves import InvariantCurves, InvariantPlane
 from kahanmaps.plots.curves.level_sets import zero_curves
 from kahanmaps.plots.curves.plane_cubics import THREE_LINES, Floats, PlaneCubic
-from kahanmaps.plots.figures import RASTERISE_ABOVE, beside, drawing, label_of, new_figure, plain
+from kahanmaps.plots.figures import MAX_VECTOR_POINTS, drawing, label_of, new_figure, plain, write_beside
 from kahanmaps.plots.portraits.windows import Window, outside, window_of
-from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOUR_MAP, COLOURS, MARKS, Style
+from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOR_MAP, COLORS, MARKS, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,7 +54,7 @@ def plot_invariant_curves(
     letter = style.font_size * CENTIMETRES_PER_INCH / 72  # in centimetres
     columns = min(columns, max(1, int(style.width / (12 * letter))))  # or letters fill the panels
     rows = ceil(count / columns)
-    # The panels are squares, with room for letters and a colour bar.
+    # The panels are squares, with room for letters and a color bar.
     side = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
     height = rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter
     with drawing(style):
@@ -65,7 +65,7 @@ def plot_invariant_curves(
 
         figure = new_figure(style, height / style.width)
         steps = max(len(x) for x in found.originals) - 1
-        # One orbit is coloured by step, several have a colour and a mark each.
+        # One orbit is colored by step, several have a color and a mark each.
         pen = _Pen(Normalize(0, max(1, steps)) if len(found.originals) == 1 else None, style)
         grid = iter(figure.subplots(rows, columns, squeeze=False).flat)
         if original is not None:
@@ -73,7 +73,7 @@ def plot_invariant_curves(
             clouds = [(x[:, original[0]], x[:, original[1]]) for x in found.originals]
             x, y = (label_of(found.variables[k]) for k in original)
             Rectangle.around(clouds).prepare(axes, (x, y))
-            axes.set_title("the orbit itself")
+            axes.set_title("orbit")
             for number, cloud in enumerate(clouds):
                 pen.orbit(axes, *cloud, number, None)
         for place, plane, column in panels:
@@ -84,15 +84,16 @@ def plot_invariant_curves(
             names = [labels[k] if k < len(labels) else f"start {k + 1}" for k in range(len(found.poles))]
             ends = ["" if pole is None else f" (a pole at step {pole})" for pole in found.poles]
             handles = [
-                Line2D([], [], linestyle="none", marker=MARKS[k], color=COLOURS[k], label=plain(name) + end)
+                Line2D([], [], linestyle="none", marker=MARKS[k], color=COLORS[k], label=plain(name) + end)
                 for k, (name, end) in enumerate(zip(names, ends, strict=True))
             ]
             figure.legend(handles=handles, loc="outside lower center", ncols=2)
         elif steps:
             how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
-            bar = figure.colorbar(ScalarMappable(pen.scale, COLOUR_MAP), ax=figure.axes, **how)
+            bar = figure.colorbar(ScalarMappable(pen.scale, COLOR_MAP), ax=figure.axes, **how)
             pole = found.poles[0]
-            bar.set_label("step" if pole is None else f"step (a pole at step {pole} ends the orbit)")
+            ending = "" if pole is None else f"; a pole at step {pole} ends the orbit"
+            bar.set_label(f"step $n$ (rings mark steps 0 to {min(_NUMBERED - 1, steps)}{ending})")
             bar.outline.set_linewidth(0.4)
             bar.locator = MaxNLocator(nbins=6, integer=True)
     return figure
@@ -112,7 +113,7 @@ def panels_of(found: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
 
 
 class _Pen:
-    """How dots are drawn: by step with a `scale` of colours, where there is one orbit, otherwise by orbit."""
+    """How dots are drawn: by step with a `scale` of colors, where there is one orbit, otherwise by orbit."""
 
     def __init__(self, scale: Any, style: Style) -> None:
         self.scale, self.style = scale, style
@@ -120,10 +121,10 @@ class _Pen:
     def orbit(self, axes: Axes, x: Floats, y: Floats, number: int, normals: Floats | None) -> None:
         count = len(x)
         size = 11.0 if count <= 120 else 6.0 if count <= 500 else 2.0 if count <= 5_000 else 0.6
-        how: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
+        how: dict[str, Any] = {"color": COLORS[number], "marker": MARKS[number]}
         if self.scale is not None:
-            how = {"c": np.arange(count), "norm": self.scale, "cmap": COLOUR_MAP}
-        axes.scatter(x, y, s=size, linewidths=0, zorder=2, rasterized=count > RASTERISE_ABOVE, **how)
+            how = {"c": np.arange(count), "norm": self.scale, "cmap": COLOR_MAP}
+        axes.scatter(x, y, s=size, linewidths=0, zorder=2, rasterized=count > MAX_VECTOR_POINTS, **how)
         if self.scale is None:
             return
         for k in range(min(_NUMBERED, count)):
@@ -137,7 +138,7 @@ class _Pen:
             if np.any(np.abs(places[k] + 2 * _CROWDED * aside - 0.5) > 0.5):  # there is the edge of the panel
                 aside = -aside
             how = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
-            beside(axes, str(k), (x[k], y[k]), tuple(8 * aside), 1.5, zorder=4, **how)
+            write_beside(axes, str(k), (x[k], y[k]), tuple(8 * aside), 1.5, zorder=4, **how)
 
 
 def _draw_plane(

@@ -24,15 +24,17 @@ from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.plots.drifts.drift_functions import WatchedFunction
 from kahanmaps.plots.figures import (
+    LETTER_WIDTH,
     drawing,
     label_number,
     legend_above,
     legend_height,
+    letter_count,
     log_scale_with_zero,
     new_figure,
     wrapped,
 )
-from kahanmaps.plots.style import COLOURS, LINES, Style
+from kahanmaps.plots.style import COLORS, LINES, Style
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 if TYPE_CHECKING:
@@ -243,7 +245,7 @@ def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
         panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
         aspect = panel * rows + legend_height(labels, style, title=True)
         figure = new_figure(style, aspect)
-        room = 0.75 / rows * 72 * style.inches(aspect)[1]  # for what stands beside a panel, in points
+        height = 0.75 / rows * 72 * style.inches(aspect)[1]  # of a panel, in points
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for axes, name in zip(panels, survey.labels, strict=False):
             curves = [curve for curve in survey.curves if curve.function == name]
@@ -267,10 +269,15 @@ def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
                     axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
                 elif len(heights) and not survey.ends[curve.method].is_whole:
                     axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)
-            # A line is broken before the name, and never within: the name may be a formula with blanks in it.
-            named = survey.labels[name].replace(" ", "\N{NO-BREAK SPACE}")
-            label = f"{'relative' if survey.relative[name] else 'absolute'} error of {named}"
-            axes.set_ylabel(label if label.endswith("$") else wrapped(label, room, style.font_size, most=2))
+            # Break the line before the name only: the name may be a formula that contains spaces.
+            function, kind = survey.labels[name], "relative" if survey.relative[name] else "absolute"
+            if "$" in function:
+                is_long = letter_count(f"{kind} error of {function}") * LETTER_WIDTH * style.font_size > height
+                label = f"{kind} error of{chr(10) if is_long else ' '}{function}"
+            else:
+                label = f"{kind} error of " + function.replace(" ", "\N{NO-BREAK SPACE}")
+                label = wrapped(label, height, style.font_size, max_lines=2)
+            axes.set_ylabel(label)
         for k, axes in enumerate(panels):
             if k >= count:
                 axes.set_visible(False)
@@ -294,4 +301,4 @@ def clipped_from(survey: DriftSurvey, name: str) -> float:
 
 def _look(method: str) -> dict[str, Any]:
     k = list(METHODS).index(method)
-    return {"color": COLOURS[k], "linestyle": LINES[k]}
+    return {"color": COLORS[k], "linestyle": LINES[k]}

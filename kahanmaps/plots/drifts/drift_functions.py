@@ -114,7 +114,7 @@ def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
     return [every[name] for name in dict.fromkeys(chosen)]
 
 
-def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
+def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
     """The functions that (name, text) pairs ask for: "known", one of `functions_of` by name, or an expression.
 
     Expressions may contain eps. Raises InputError for text that cannot be read, for a name that comes twice, and where
@@ -137,13 +137,13 @@ def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, s
     return found
 
 
-def asked_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
+def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
     """One of `functions_of` by its name, or an expression; without `eps` none that contains it."""
     known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
-    return asked_axis(file, eps, text) if known is None else known
+    return requested_axis(file, eps, text) if known is None else known
 
 
-def asked_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
+def requested_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
     """The same, but for integrals in which the image of the point occurs: they are no rational functions in doubles."""
     known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
     named = {name: one.function for name, one in known.items() if isinstance(one, PointFunction)}

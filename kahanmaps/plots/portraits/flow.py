@@ -24,7 +24,7 @@ from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for
 from kahanmaps.plots.portraits.windows import Window, window_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-SADDLE, CENTRE, FOCUS, NODE, DEGENERATE = "saddle", "centre", "focus", "node", "degenerate equilibrium"
+SADDLE, CENTER, FOCUS, NODE, DEGENERATE = "saddle", "center", "focus", "node", "degenerate equilibrium"
 _NEWTON_STARTS, _NEWTON_STEPS = 60, 40
 _MAX_DIMENSION = 20  # in which more than the origin and (1, ..., 1) are taken as starts
 _ZERO = 1e-7  # parts of eigenvalues, relative to the largest
@@ -49,7 +49,7 @@ class Equilibrium:
 
     @property
     def kind(self) -> str:
-        """What the eigenvalues say: a centre is one of the linear part, and terms of degree 2 may undo it."""
+        """What the eigenvalues say: a center is one of the linear part, and terms of degree 2 may undo it."""
         values, real = self.values, self.values.real
         least = _ZERO * max(float(np.abs(values).max()), _ZERO)
         if (np.abs(values) <= least).any():
@@ -57,7 +57,7 @@ class Equilibrium:
         if (real > least).any() and (real < -least).any():
             return SADDLE
         if (np.abs(real) <= least).all():
-            return CENTRE
+            return CENTER
         if (np.abs(real) <= least).any():
             return DEGENERATE
         return FOCUS if (np.abs(values.imag) > least).any() else NODE
@@ -68,7 +68,7 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> sorted((one.point.round(6).tolist(), one.kind) for one in equilibria(pendulum))
-    [([0.0, 0.0], 'saddle'), ([1.0, 0.0], 'centre')]
+    [([0.0, 0.0], 'saddle'), ([1.0, 0.0], 'center')]
     """
     n = system.dim
     f = VectorField(system)
@@ -205,12 +205,12 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
 
 
 COUNT = 16
-_CENTRES = 4  # equilibria tried
+_CENTERS = 4  # equilibria tried
 _SIZES = 24
 _SHRINK = 0.8
 _STEPS = 300
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-_FAR = 4.0  # an orbit stays if it is never farther from the centre than so many times the largest start
+_FAR = 4.0  # an orbit stays if it is never farther from the center than so many times the largest start
 
 
 def automatic_starts(
@@ -230,17 +230,17 @@ def automatic_starts(
     plane = [index for index in plane if index < system.dim][:2]
     # Equilibria, those first at which the field expands least, then those without negative coordinates; the origin.
     order = sorted(equilibria(system), key=lambda one: (one.expansion, bool((one.point < 0).any())))
-    centres = [one.point for one in order[:_CENTRES]]
-    if all(centre.any() for centre in centres):
-        centres.append(np.zeros(system.dim))
+    centers = [one.point for one in order[:_CENTERS]]
+    if all(center.any() for center in centers):
+        centers.append(np.zeros(system.dim))
     others = [index for index in range(system.dim) if index not in plane]
     found: list[tuple[int, FloatArray]] = []
-    for centre in centres:
+    for center in centers:
         # Around the origin of a homogeneous field a smaller size is only a slower motion.
-        is_scaled = system.is_homogeneous and not centre.any()
+        is_scaled = system.is_homogeneous and not center.any()
         for k in range(1 if is_scaled else _SIZES):
-            size = (3 * float(np.abs(centre[plane]).max()) or 1.5) * _SHRINK**k
-            starts = np.tile(centre, (COUNT, 1))
+            size = (3 * float(np.abs(center[plane]).max()) or 1.5) * _SHRINK**k
+            starts = np.tile(center, (COUNT, 1))
             if is_scaled and len(plane) == 2:
                 angles = (np.arange(COUNT) + 0.5) * _GOLDEN_ANGLE  # so that no symmetry takes one start to another
                 starts[:, plane] += size * np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -254,9 +254,9 @@ def automatic_starts(
             ensemble = ensemble_for(system, eps, starts, _STEPS, backward=backward)
             points = np.concatenate(list(ensemble.records(_STEPS, 1)))
             with np.errstate(all="ignore"):
-                distance = np.abs(points - centre).max(axis=2)
+                distance = np.abs(points - center).max(axis=2)
                 moves = np.abs(points[-1] - starts).max(axis=1) > 1e-9 * np.abs(starts).max()
-            stays = (distance <= _FAR * np.abs(starts - centre).max()).all(axis=0)
+            stays = (distance <= _FAR * np.abs(starts - center).max()).all(axis=0)
             if (stays & moves).all():
                 return starts
             found.append((int((stays & moves).sum()), starts))

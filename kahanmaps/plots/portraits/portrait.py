@@ -1,6 +1,6 @@
-"""A phase portrait: orbits projected to two or three axes, with a colour for each point; drawn as dots or lines.
+"""A phase portrait: orbits projected to two or three axes, with a color for each point; drawn as dots or lines.
 
-The flow and level curves are below the orbits, a bar for the colours beside them.
+The flow and level curves are below the orbits, a bar for the colors beside them.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.curves.level_sets import Levels
-from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, legend_above, new_figure, points
+from kahanmaps.plots.figures import MAX_VECTOR_POINTS, dot_size, draw_points, drawing, legend_above, new_figure
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.plots.portraits.flow import CENTRE, DEGENERATE, FOCUS, NODE, SADDLE, Flow
+from kahanmaps.plots.portraits.flow import CENTER, DEGENERATE, FOCUS, NODE, SADDLE, Flow
 from kahanmaps.plots.portraits.trajectories import Trajectories
 from kahanmaps.plots.portraits.windows import Window, inside, main_range, outside, window_of
-from kahanmaps.plots.style import COLOUR_MAP, COLOURS, MARKS, Style
+from kahanmaps.plots.style import COLOR_MAP, COLORS, MARKS, Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,8 +43,8 @@ class Portrait:
     """What a portrait shows.
 
     `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN where there is no point; `labels` and
-    `window` are one for each axis. `values` (records, orbits) colour the points by `value_label`; None is by orbit.
-    `left_out` counts the points outside the window, `undefined` those of living orbits where an axis or the colour has
+    `window` are one for each axis. `values` (records, orbits) color the points by `value_label`; None is by orbit.
+    `left_out` counts the points outside the window, `undefined` those of living orbits where an axis or the color has
     a pole. `euler` are points (records, orbits, 2 or 3) of explicit Euler, `levels` curves and `flow` what is drawn of
     the differential equation, below the points. `joined` are, for each orbit, pairs (count, 2) of records that are
     neighbours on its curve; successive ones where it is None.
@@ -73,14 +73,14 @@ def portrait_of(
     found: Trajectories,
     axes: Sequence[PointFunction | str],
     *,
-    colour: WatchedFunction | str = ORBIT,
+    color: WatchedFunction | str = ORBIT,
     window: Window | None = None,
     euler: Trajectories | None = None,
     join: bool = False,
 ) -> Portrait:
     """Project orbits to two or three axes: functions of the point, or the word "step".
 
-    `colour` is "orbit", "step" or a function of the point; the window is chosen if none is given. `join` looks for the
+    `color` is "orbit", "step" or a function of the point; the window is chosen if none is given. `join` looks for the
     neighbours of each point on the curve of its orbit, unless an axis is the step. Raises InputError for another number
     of axes.
 
@@ -93,13 +93,13 @@ def portrait_of(
         raise InputError(f"found {len(axes)} axes, expected 2 or 3")
     points = _projected(found, axes)
     values, label = None, ""
-    if not isinstance(colour, str):
-        flat = colour(found.points.reshape(-1, found.points.shape[2]))
-        values, label = flat.reshape(found.points.shape[:2]), colour.label
-    elif colour == STEP:
+    if not isinstance(color, str):
+        flat = color(found.points.reshape(-1, found.points.shape[2]))
+        values, label = flat.reshape(found.points.shape[:2]), color.label
+    elif color == STEP:
         values, label = _steps(found), STEP
-    elif colour != ORBIT:
-        raise InputError(f"found the colour {quoted(colour)}, expected orbit, step or a function")
+    elif color != ORBIT:
+        raise InputError(f"found the color {quoted(color)}, expected orbit, step or a function")
     there = ~np.isnan(found.points).any(axis=2)
     shown = ~np.isnan(points).any(axis=2)
     if values is not None:
@@ -169,10 +169,11 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
 
 
 _ASPECT = 0.75
-_EULER, _LEVEL = "#BBBBBB", {"colors": "#999999", "linewidths": 0.5}
+_EULER = "#BBBBBB"
+_LEVEL: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5}
 _MAX_JOINED = 1_000_000  # points: ten seconds, half a gigabyte
-_MAX_RINGS = 40  # starts that are marked: more of them would cover the picture
-_MAX_MARKED = 60  # points of an orbit, up to which each is worth a mark of its orbit's own
+_MAX_INITIAL = 40  # orbits, up to which the initial points are marked: more marks would cover the picture
+_MAX_MARKED = 60  # points of an orbit, up to which all of them have the mark of their orbit
 _EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 _ARROWS: dict[str, Any] = {"color": "#C4C4C4", "width": 0.0018, "headwidth": 4, "headlength": 4, "headaxislength": 3.5}
@@ -180,9 +181,11 @@ _SEPARATRIX = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2, 1, 
 _SOLUTION = {"color": "#888888", "linewidth": 0.5}
 _FILLED: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
 _OPEN: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}
+# No equilibrium and no orbit has this mark.
+_INITIAL: dict[str, Any] = {"marker": ">", "markersize": 3.5, "markeredgecolor": "black", "markeredgewidth": 0.5}
 _EQUILIBRIA: dict[str, dict[str, Any]] = {
     SADDLE: {"marker": "x", "markeredgecolor": "black", "markeredgewidth": 1.2, "markersize": 5},
-    CENTRE: {"marker": "o", "markersize": 5, **_OPEN},
+    CENTER: {"marker": "o", "markersize": 5, **_OPEN},
     FOCUS: {"marker": "D", "markersize": 4.5, **_OPEN},
     NODE: {"marker": "s", "markersize": 5, **_FILLED},
     DEGENERATE: {"marker": "*", "markersize": 7, **_FILLED},
@@ -201,57 +204,74 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
     with drawing(style):
         import matplotlib as mpl
         from matplotlib.collections import LineCollection
+        from matplotlib.lines import Line2D
 
         aspect = _ASPECT
         if in_space:
             aspect = 0.9 if found.values is None else 0.8
-        elif equal:  # height over width as the window asks for it, a colour bar beside it
+        elif equal:  # height over width as the window asks for it, a color bar beside it
             (x0, x1), (y0, y1) = found.window
             aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if found.values is not None else 1.0)))
         figure = new_figure(style, aspect)
         if in_space:
             mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
+        handles: dict[str, Any] = {}  # of the legend, by their texts
         if found.flow is not None:
-            # What is drawn of the differential equation below the orbits, its equilibria above them, and a legend.
-            flow, handles = found.flow, dict[str, Any]()
+            # Arrows and curves of the differential equation are drawn below the orbits, its equilibria above them.
+            flow = found.flow
             if len(flow.places):
                 axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
-            looks = (("separatrix", flow.separatrices, _SEPARATRIX), ("flow", flow.solutions, _SOLUTION))
+                arrow: dict[str, Any] = {"marker": r"$\rightarrow$", "markersize": 9, "linestyle": "none"}
+                handles["vector field"] = Line2D([], [], color="#999999", markeredgewidth=0, **arrow)
+            looks = (("separatrix", flow.separatrices, _SEPARATRIX), ("solution", flow.solutions, _SOLUTION))
             for word, curve, look in ((word, curve, look) for word, curves, look in looks for curve in curves):
                 seen = _inside(curve[:, None], found.window)[:, 0] if in_space else curve
                 (handles[word],) = axes.plot(*seen.T, zorder=1.2, **look)
             for kind, point in flow.equilibria:
                 mark = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIA[kind]}
                 (handles[kind],) = axes.plot(*point[:, None], **mark)
-            if handles:
-                legend_above(figure, list(handles.values()), list(handles), style)
-        if found.levels is not None:
-            pieces = [piece for pieces in found.levels for piece in pieces]
+        pieces = [piece for pieces in found.levels or () for piece in pieces]
+        if pieces:
             axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
+            handles["level curve"] = Line2D([], [], color=_LEVEL["colors"], linewidth=_LEVEL["linewidths"])
         if found.euler is not None:
             # In the plane lines go on to the edge; what is far beyond it may be too large to draw.
             around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in found.window)
-            # Dashes, for in a grey copy the colours say less.
-            dashes: dict[str, Any] = {"linewidth": 0.6, "linestyle": (0, (5, 2)), "rasterized": count > RASTERISE_ABOVE}
+            # Dashes, for in a gray copy the colors say less.
+            dashes: dict[str, Any] = {
+                "linewidth": 0.6,
+                "linestyle": (0, (5, 2)),
+                "rasterized": count > MAX_VECTOR_POINTS,
+            }
             for orbit in _inside(found.euler, found.window if in_space else around).swapaxes(0, 1):
                 if lines:
                     axes.plot(*orbit.T, color=_EULER, zorder=1.5, **dashes)
                 else:
-                    points(axes, *orbit.T, color=_EULER, zorder=1.5, of=count)
+                    draw_points(axes, *orbit.T, color=_EULER, zorder=1.5, total=count)
+            dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
+            handles["explicit Euler"] = Line2D([], [], color=_EULER, **(dashes if lines else dot))
         # Axes in space do not cut off what lies outside of them.
         shown = _inside(found.points, found.window) if in_space else found.points
-        if found.values is None and shown.shape[1] <= len(COLOURS):
+        if found.values is None and shown.shape[1] <= len(COLORS):
             _draw_few(axes, shown, lines, found)
         elif found.values is None:
             _draw_many(axes, shown, lines, found)
         else:
             seen = found.values[~np.isnan(_inside(shown, found.window)).any(axis=2)]
             low, high = main_range(seen)
-            drawn = _draw_coloured(axes, shown, found.values, range(shown.shape[1]), (low, high), lines, found)
+            drawn = _draw_colored(axes, shown, found.values, range(shown.shape[1]), (low, high), lines, found)
             beyond = bool((seen < low).any()), bool((seen > high).any())
             how: dict[str, Any] = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[beyond]}
             figure.colorbar(drawn, ax=axes, **how).set_label(found.value_label)
+        if found.values is None and shown.shape[1] <= _MAX_INITIAL:
+            for k in range(shown.shape[1]):
+                fill = COLORS[k] if shown.shape[1] <= len(COLORS) else "white"
+                axes.plot(*shown[0, k][:, None], linestyle="none", markerfacecolor=fill, zorder=3, **_INITIAL)
+            if shown.shape[1]:
+                handles["initial point"] = Line2D([], [], linestyle="none", markerfacecolor="white", **_INITIAL)
+        if handles:
+            legend_above(figure, list(handles.values()), list(handles), style)
         for side, label, limits in zip("xyz", found.labels, found.window, strict=False):
             axes.set(**{f"{side}label": label, f"{side}lim": limits})
         if note:
@@ -264,27 +284,24 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
 
 
 def _draw_few(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
-    """A colour and a mark for each orbit; where there are many dots only the start gets the mark."""
+    """Draw each orbit in its own color, and with its own mark where it has few points."""
     count = shown.shape[0] * shown.shape[1]
     for k, orbit in enumerate(shown.swapaxes(0, 1)):
-        how: dict[str, Any] = {"color": COLOURS[k], "zorder": 2}
-        is_marked = not lines and len(orbit) <= _MAX_MARKED
+        how: dict[str, Any] = {"color": COLORS[k], "zorder": 2}
         if lines:
             pairs = found.pairs(k)
             path = orbit
             if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between the lines: plot takes many of them at once
                 ends = orbit[pairs]
                 path = np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, orbit.shape[1])
-            axes.plot(*path.T, linewidth=0.6, rasterized=count > RASTERISE_ABOVE, **how)
+            axes.plot(*path.T, linewidth=0.6, rasterized=count > MAX_VECTOR_POINTS, **how)
         else:
-            points(axes, *orbit.T, **how, **({"markersize": 3.0, "marker": MARKS[k]} if is_marked else {}), of=count)
-        if not is_marked:
-            start = {"marker": MARKS[k], "markersize": 4.0, "markeredgecolor": "white", "markeredgewidth": 0.5}
-            axes.plot(*orbit[:1].T, linestyle="none", **start, **{**how, "zorder": 3})
+            mark = {"markersize": 3.0, "marker": MARKS[k]} if len(orbit) <= _MAX_MARKED else {}
+            draw_points(axes, *orbit.T, **how, **mark, total=count)
 
 
 def _draw_many(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
-    """Orbits in the colours of the map, the widest below, so that those inside are seen; a ring is a start."""
+    """Draw orbits in the colors of the color map, the widest first, so that those inside stay visible."""
     orbits = shown.shape[1]
     with np.errstate(all="ignore"):
         extent = np.nanmax(shown, axis=0, initial=-np.inf) - np.nanmin(shown, axis=0, initial=np.inf)
@@ -292,13 +309,10 @@ def _draw_many(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> No
         scale = extent.max(axis=0, initial=0)
         order = np.argsort(-(extent / np.where(scale > 0, scale, 1)).max(axis=1), kind="stable")
     numbers = np.broadcast_to(np.arange(orbits, dtype=np.float64), shown.shape[:2])
-    _draw_coloured(axes, shown, numbers, order, (0.0, orbits - 1.0), lines, found)
-    if orbits <= _MAX_RINGS:
-        how = {"markeredgecolor": "black", "markeredgewidth": 0.5, "markerfacecolor": "white", "zorder": 3}
-        axes.plot(*shown[0].T, linestyle="none", marker="o", markersize=2.6, **how)
+    _draw_colored(axes, shown, numbers, order, (0.0, orbits - 1.0), lines, found)
 
 
-def _draw_coloured(
+def _draw_colored(
     axes: Any,
     shown: FloatArray,
     values: FloatArray,
@@ -307,15 +321,15 @@ def _draw_coloured(
     lines: bool,
     found: Portrait,
 ) -> Any:
-    """Dots of the orbits in this order, or the lines that join them, in the colours of the values."""
+    """Dots of the orbits in this order, or the lines that join them, in the colors of the values."""
     import matplotlib as mpl
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize
 
     # Without the lightest part of the map: dots are small, and paper is white.
-    colours = ListedColormap(mpl.colormaps[COLOUR_MAP](np.linspace(0, 0.78, 256)))
-    is_image = shown.shape[0] * shown.shape[1] > RASTERISE_ABOVE
-    how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colours, "rasterized": is_image, "zorder": 2}
+    colors = ListedColormap(mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, 256)))
+    is_image = shown.shape[0] * shown.shape[1] > MAX_VECTOR_POINTS
+    how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colors, "rasterized": is_image, "zorder": 2}
     in_space = shown.shape[2] == 3
     if not lines:
         first = list(order)

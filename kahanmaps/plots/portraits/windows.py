@@ -1,4 +1,4 @@
-"""Which part of the plane or of space a picture shows, and from which side, where nobody says."""
+"""The default window and projection of a picture."""
 
 from __future__ import annotations
 

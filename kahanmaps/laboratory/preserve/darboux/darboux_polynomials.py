@@ -20,7 +20,7 @@ from kahanmaps.algebra.printing import attributes, format_polynomial, format_rat
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.displayed import latex
+from kahanmaps.display_protocols import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory, certified

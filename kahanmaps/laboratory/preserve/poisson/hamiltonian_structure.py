@@ -35,7 +35,7 @@ from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.printing import all_fields, format_polynomial, plain
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count as count_work
-from kahanmaps.displayed import Printed
+from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, counted
 from kahanmaps.invariants.phase_functions import modified
 from kahanmaps.laboratory.modular_points import ModularMap, Point
@@ -49,7 +49,7 @@ _GRID = 2000  # points at which a Pfaffian is shown to vanish identically
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantStructures(Printed):
+class ConstantStructures(PrintableResult):
     """What `constant_structures` found; every form, function and matrix is exact.
 
     forms: a basis of the skew K for which K f is a gradient (invertible or not), of coprime integers.

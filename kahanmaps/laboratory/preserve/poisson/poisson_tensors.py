@@ -30,7 +30,7 @@ from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
-from kahanmaps.displayed import latex
+from kahanmaps.display_protocols import latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
 from kahanmaps.invariants.phase_functions import at_eps

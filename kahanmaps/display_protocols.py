@@ -1,7 +1,7 @@
-"""What a notebook asks a value for, and JSON a formula: how it looks. The answers are in kahanmaps.display.
+"""Base classes of values that can be printed and displayed: `__str__`, `_repr_html_` and `_repr_latex_`.
 
-That folder knows all values and stands above them, so that no value knows HTML or LaTeX. It is imported when somebody
-looks, by its name: this is the one file where imports point up.
+The files of kahanmaps.display register the text, HTML and LaTeX of each class, so that the classes themselves contain
+none of it. They are imported by name on first use: this is the only file that imports from a higher layer.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any
 from kahanmaps.errors import InputError
 
 
-class Displayed:
-    """A value that notebooks show as HTML."""
+class HtmlDisplay:
+    """Base class of values that notebooks display as HTML."""
 
     __slots__ = ()
 
@@ -25,7 +25,10 @@ class Displayed:
 
 
 class WithoutTruthValue:
-    """A result of which `if result:` is an error: it would be true for a refuted claim and an empty search as well."""
+    """Base class of results for which `if result:` raises TypeError.
+
+    A refuted claim and an empty search would otherwise count as true.
+    """
 
     __slots__ = ()
 
@@ -39,8 +42,8 @@ class WithoutTruthValue:
         raise TypeError(f"the truth value of {article} {name} is ambiguous: {hint}")
 
 
-class Printed(Displayed, WithoutTruthValue):
-    """A result that `print` shows as the lines of its command too."""
+class PrintableResult(HtmlDisplay, WithoutTruthValue):
+    """Base class of results that `print` shows as the output of their command."""
 
     __slots__ = ()
 
@@ -50,22 +53,22 @@ class Printed(Displayed, WithoutTruthValue):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls.__repr__ = Printed.__repr__  # type: ignore[method-assign]  # a dataclass would write all of its data
+        cls.__repr__ = PrintableResult.__repr__  # type: ignore[method-assign]  # that of a dataclass prints all fields
 
     def __repr__(self) -> str:
-        """The first line of what `print` shows."""
+        """Return the class name and the first line of the text."""
         first = str(self).partition("\n")[0].replace("\t", " ")
         return f"<{type(self).__name__}: {shorten(first, 100)}>"
 
     def to_pandas(self) -> Any:
-        """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed, or has no rows."""
+        """Return `rows()` as a DataFrame. Raises InputError where pandas is not installed or the result is no table."""
         if not hasattr(self, "rows"):
-            raise InputError(f"a {type(self).__name__} is no table: print shows it")
+            raise InputError(f"a {type(self).__name__} is not a table: use print")
         return data_frame(self.rows())
 
 
 def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
-    """A table of pandas. Raises InputError where it is not installed."""
+    """Return rows as a DataFrame. Raises InputError where pandas is not installed."""
     try:
         pandas = import_module("pandas")
     except ImportError as error:
@@ -73,8 +76,8 @@ def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
     return pandas.DataFrame(rows)
 
 
-class DisplayedAsFormula:
-    """A value that notebooks show as a formula."""
+class LatexDisplay:
+    """Base class of values that notebooks display as a formula."""
 
     __slots__ = ()
 
@@ -83,13 +86,13 @@ class DisplayedAsFormula:
 
 
 def latex(value: object) -> str:
-    """A system, a map, a polynomial or a rational function in LaTeX."""
+    """Return a system, a map, a polynomial or a rational function as LaTeX."""
     _load(value)
     return latex_form(value)
 
 
 def shorten(text: str, width: int) -> str:
-    """A long number with its middle left out and its length told: 12345...67890 (1234 characters)."""
+    """Shorten a long text to its two ends and its length: 12345...67890 (1234 chars)."""
     if len(text) <= width:
         return text
     keep = max(4, (width - 18) // 2)
@@ -98,29 +101,29 @@ def shorten(text: str, width: int) -> str:
 
 @singledispatch
 def html_form(value: object) -> str:
-    """The value as HTML: the files of kahanmaps.display register what they know."""
-    raise TypeError(f"no file of kahanmaps.display says how a {type(value).__name__} looks as HTML")
+    """Return the value as HTML; the files of kahanmaps.display register a function for each class."""
+    raise TypeError(f"no HTML is registered in kahanmaps.display for the class {type(value).__name__}")
 
 
 @singledispatch
 def text_form(value: object) -> str:
-    """The value as `print` shows it: the files of kahanmaps.display register what a command prints."""
+    """Return the text that `print` shows; the files of kahanmaps.display register a function for each class."""
     return object.__repr__(value)
 
 
 @singledispatch
 def latex_form(value: object) -> str:
-    """The value as LaTeX: the files of kahanmaps.display register what they know."""
-    raise TypeError(f"no file of kahanmaps.display says how a {type(value).__name__} looks as a formula")
+    """Return the value as LaTeX; the files of kahanmaps.display register a function for each class."""
+    raise TypeError(f"no LaTeX is registered in kahanmaps.display for the class {type(value).__name__}")
 
 
 _FILES = {"documents": "systems", "family": "systems", "maps": "systems"}
 
 
 def _load(value: object) -> None:
-    """Import the file that knows this kind of value: it is called like the folder of the kind, or as `_FILES` says."""
-    for kind in type(value).__mro__:  # what a user made from one of ours looks like ours
-        top, *folders = kind.__module__.split(".")
+    """Import the file of kahanmaps.display for this class: named after the folder of the class, or as in `_FILES`."""
+    for base in type(value).__mro__:  # subclasses defined by a user are displayed like ours
+        top, *folders = base.__module__.split(".")
         if top in ("kahanmaps", "flint"):
             is_formula = top == "flint" or folders[0] == "algebra"
             import_module(f"kahanmaps.display.{'latex' if is_formula else _FILES.get(folders[0], folders[0])}")
