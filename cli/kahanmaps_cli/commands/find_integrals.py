@@ -117,7 +117,7 @@ def command(system: str | None, **options: Any) -> int:
 def _count(found: Any) -> str:
     if not found.profile.nullities and not found.codimension:
         return "orbits\tnot measured"
-    return f"found\t{found.found} functionally independent; {found.count_text}"
+    return f"found\t{found.formula_count} functionally independent; {found.count_text}"
 
 
 def _darboux(system: str | None, options: dict[str, Any]) -> int:

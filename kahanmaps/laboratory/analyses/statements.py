@@ -128,7 +128,7 @@ def of_densities(found: Findings) -> Iterator[Statement]:
             times = f"any function of {_listed(names)}" if names else "any integral"
             yield Statement(NOTE, f"so is dx/phi for this phi times {times}")
     else:
-        yield Statement(MEASURED if search.none_there else UNDECIDED, search.reason)
+        yield Statement(MEASURED if search.shows_none else UNDECIDED, search.reason)
     if search.anti_invariant is not None:
         text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.anti_invariant.text}"
         yield Statement(search.anti_invariant.verdict, text)

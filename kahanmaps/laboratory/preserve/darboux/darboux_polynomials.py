@@ -40,7 +40,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.limit.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.products import constants_of
 from kahanmaps.laboratory.preserve.results import Search
-from kahanmaps.laboratory.preserve.search import bases_of
+from kahanmaps.laboratory.preserve.search import interpolate_bases
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -216,7 +216,7 @@ def _written(
     for together in [spaces, spaces[:1]][len(spaces) == 1 :]:
         step = SearchStep("cofactor", spaces[0].degree, product, text, up_to_numbers=True)
         search = SpaceSearch([step], [list(together)], cofactors)
-        bases, reason = bases_of(laboratory, laboratory.primes[0], search, budget)
+        bases, reason = interpolate_bases(laboratory, laboratory.primes[0], search, budget)
         if bases:
             break
     else:

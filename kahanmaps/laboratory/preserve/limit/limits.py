@@ -159,7 +159,7 @@ class FlowAndMap:
         if self.density is not None:
             found.append((str(self.density.verdict), f"the flow keeps dx/phi, phi = {self.density.text}"))
         elif self.density_search is not None and self.reason:
-            known = "measured" if self.density_search.none_there else "undecided"
+            known = "measured" if self.density_search.shows_none else "undecided"
             found.append((known, f"of the flow: {self.reason}"))
         if self.polynomials:
             told = ", ".join(map(format_polynomial, self.polynomials))

@@ -336,7 +336,7 @@ def _tensors(
     if not model.basis:
         return [], f"no tensor of degree at most {degree} is preserved (measured modulo a prime)"
     if len(other.basis) != len(model.basis):
-        return [], "what was found at one eps was not found at another"
+        return [], "the tensors found at one eps do not exist at another"
     support = frozenset(model.support)
     variables = laboratory.map.variables
     prefix = "d_"
