@@ -105,7 +105,7 @@ def of_integrals(found: Findings) -> Iterator[Statement]:
         yield Statement(PROVED, f"{number}, as a member of the commuting family")
     if found.pencil is not None:
         growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-        against = found.pencil.against(growth)
+        against = found.pencil.contradiction(growth)
         follows = f"but {against}" if against else found.pencil.motion(growth)
         text = "; ".join(filter(None, [found.pencil.text, follows]))
         yield Statement(UNDECIDED if against else MEASURED, text)
