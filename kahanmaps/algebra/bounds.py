@@ -65,7 +65,7 @@ def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Coeff
     equation = ONE
     for pair in pairs:
         left, right = (side.entry if isinstance(side, BoundMatrix) else field.convert(side) for side in pair)
-        equation = equation | (left - right).above
+        equation = equation | (left - right).numerator
     return equation, field.pole_degree
 
 
@@ -130,10 +130,10 @@ class BoundField(Field):
         return Bound(self, CoefficientSize(0, log2(number.p)), int(number.q), {})
 
     def convert_matrix(self, matrix: fmpq_mat) -> BoundMatrix:
-        above, below = matrix.numer_denom()
-        largest = max((abs(entry) for entry in above.entries()), default=fmpz(0))
+        numerator, denominator = matrix.numer_denom()
+        largest = max((abs(entry) for entry in numerator.entries()), default=fmpz(0))
         return BoundMatrix(
-            self, matrix.nrows(), matrix.ncols(), Bound(self, CoefficientSize(0, log2(largest)), int(below), {})
+            self, matrix.nrows(), matrix.ncols(), Bound(self, CoefficientSize(0, log2(largest)), int(denominator), {})
         )
 
     def random(self, rng: random.Random, height: int = 10) -> Bound:
@@ -143,17 +143,17 @@ class BoundField(Field):
         """The matrix with the common bound of these entries."""
         # Entries are mostly one object many times over.
         elements = [self.convert(entry) for entry in {id(entry): entry for entry in entries}.values()]
-        scale, below = 1, dict[int, int]()
+        scale, denominator = 1, dict[int, int]()
         for element in elements:
-            scale, below = math.lcm(scale, element.scale), _larger(below, element.below)
-        above = ONE
+            scale, denominator = math.lcm(scale, element.scale), _larger(denominator, element.denominator)
+        numerator = ONE
         for element in elements:
-            above = above | element.over(scale, below)
-        return BoundMatrix(self, rows, columns, Bound(self, above, scale, below))
+            numerator = numerator | element.over(scale, denominator)
+        return BoundMatrix(self, rows, columns, Bound(self, numerator, scale, denominator))
 
     def is_zero(self, element: Any) -> bool:
         """False: what is compared with zero is taken to be something else, and counts among the denominators."""
-        self.denominator(element, element.above)
+        self.denominator(element, element.numerator)
         return False
 
     def equal(self, left: Any, right: Any) -> bool:
@@ -163,42 +163,44 @@ class BoundField(Field):
 class Bound(Element):
     """The bound of one rational function, or (`is_common`) of each entry of a matrix."""
 
-    __slots__ = ("above", "below", "is_common", "scale")
+    __slots__ = ("denominator", "is_common", "numerator", "scale")
 
     field: BoundField
 
-    def __init__(self, field: BoundField, above: CoefficientSize, scale: int, below: Mapping[int, int]) -> None:
+    def __init__(
+        self, field: BoundField, numerator: CoefficientSize, scale: int, denominator: Mapping[int, int]
+    ) -> None:
         self.field = field
-        self.above = above
+        self.numerator = numerator
         self.scale = scale
-        self.below = dict(below)
+        self.denominator = dict(denominator)
         self.is_common = False
 
-    def over(self, scale: int, below: Mapping[int, int]) -> CoefficientSize:
+    def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
         """The numerator over a larger denominator."""
-        missing = {number: power - self.below.get(number, 0) for number, power in below.items()}
-        return self.above * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
+        missing = {number: power - self.denominator.get(number, 0) for number, power in denominator.items()}
+        return self.numerator * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
 
     @property
     def pole_degree(self) -> int:
         """The degree of the denominator."""
-        return int(self.field.product(self.below).degree)
+        return int(self.field.product(self.denominator).degree)
 
     def _plus(self, other: Bound) -> Bound:
-        scale, below = math.lcm(self.scale, other.scale), _larger(self.below, other.below)
-        return Bound(self.field, self.over(scale, below) + other.over(scale, below), scale, below)
+        scale, denominator = math.lcm(self.scale, other.scale), _larger(self.denominator, other.denominator)
+        return Bound(self.field, self.over(scale, denominator) + other.over(scale, denominator), scale, denominator)
 
     def __neg__(self) -> Bound:
         return self
 
     def _times(self, other: Bound) -> Bound:
-        below = _together(self.below, other.below)
-        return Bound(self.field, self.above * other.above, self.scale * other.scale, below)
+        denominator = _together(self.denominator, other.denominator)
+        return Bound(self.field, self.numerator * other.numerator, self.scale * other.scale, denominator)
 
     def _over(self, other: Bound) -> Bound:
-        number = self.field.denominator(other, other.above)
-        above = self.above * self.field.product(other.below) * CoefficientSize(0, log2(other.scale))
-        return Bound(self.field, above, self.scale, _together(self.below, {number: 1}))
+        number = self.field.denominator(other, other.numerator)
+        numerator = self.numerator * self.field.product(other.denominator) * CoefficientSize(0, log2(other.scale))
+        return Bound(self.field, numerator, self.scale, _together(self.denominator, {number: 1}))
 
     def _same(self, other: Bound) -> bool:
         return self is other
@@ -245,25 +247,25 @@ class BoundMatrix:
         if self._columns != other._rows:
             raise InputError("matrices whose sizes do not fit are multiplied")
         product = self.entry * other.entry
-        product.above *= CoefficientSize(0, log2(self._columns))
+        product.numerator *= CoefficientSize(0, log2(self._columns))
         return BoundMatrix(self.field, self._rows, other._columns, product)
 
     def det(self) -> Bound:
         """The determinant: n! products of n entries."""
         n, entry = self._rows, self.entry
-        below = {number: n * power for number, power in entry.below.items()}
-        return Bound(self.field, self._minor(n), entry.scale**n, below)
+        denominator = {number: n * power for number, power in entry.denominator.items()}
+        return Bound(self.field, self._minor(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
         """Cramer's rule: with entries N/d the solution is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
         number = self.field.denominator(self, self._minor(n))
-        d = self.field.product(entry.below) * CoefficientSize(0, log2(entry.scale))
+        d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))
         inverse = Bound(self.field, self._minor(n - 1) * CoefficientSize(0, log2(n)) * d, 1, {number: 1})
         return BoundMatrix(self.field, n, right._columns, inverse * right.entry)
 
     def _minor(self, size: int) -> CoefficientSize:
-        return self.entry.above**size * CoefficientSize(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
+        return self.entry.numerator**size * CoefficientSize(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
 
 
 def log2(value: fmpz | int) -> float:

@@ -86,20 +86,20 @@ class FunctionField(Field):
         return Function(self, self.context.constant(rational(value)), self._one)
 
     def format(self, element: Function) -> str:
-        return format_rational_function(RationalFunction(element.above, element.below))
+        return format_rational_function(RationalFunction(element.numerator, element.denominator))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> FunctionMatrix:
         return FunctionMatrix(self, rows, columns, [self.convert(entry) for entry in entries])
 
     def is_zero(self, element: Function) -> bool:
-        return self.vanishes(element.above)
+        return self.vanishes(element.numerator)
 
     def vanishes(self, polynomial: fmpq_mpoly) -> bool:
         """Whether a polynomial is zero here."""
         return bool(polynomial.is_zero() or (self.modulus is not None and (polynomial % self.modulus).is_zero()))
 
     def equal(self, left: Function, right: Function) -> bool:
-        return self.vanishes((left - right).above)
+        return self.vanishes((left - right).numerator)
 
     def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
         """A product of polynomials, paid from the budget before it is computed. Raises BudgetExceeded."""
@@ -118,16 +118,16 @@ class FunctionField(Field):
         if sum(len(left) * len(right) + 1 for left, right in pairs) > self.budget:
             self.pay(self.budget + 1)
 
-    def fraction(self, above: fmpq_mpoly, below: fmpq_mpoly) -> Function:
+    def fraction(self, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> Function:
         """above / below, in lowest terms if this field reduces."""
-        if self.reduces and not below.is_constant():
-            if above.is_zero():
+        if self.reduces and not denominator.is_constant():
+            if numerator.is_zero():
                 return self.zero
-            count(10 + (len(above) + len(below)) / 2)
-            common = above.gcd(below)
+            count(10 + (len(numerator) + len(denominator)) / 2)
+            common = numerator.gcd(denominator)
             if not common.is_constant():
-                return Function(self, above / common, below / common)
-        return Function(self, above, below)
+                return Function(self, numerator / common, denominator / common)
+        return Function(self, numerator, denominator)
 
     def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function | None:
         """The value of a polynomial over Q by Horner's rule, homogeneous in entries with a denominator in common.
@@ -138,28 +138,31 @@ class FunctionField(Field):
             return None
         columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
         used = [(point[k], powers) for k, powers in columns if any(powers)]
-        below: list[fmpq_mpoly] = []  # none of which divides another
-        for entry, _ in sorted(used, key=lambda one: -int(one[0].below.total_degree())):
-            if all(self.quotient(D, entry.below) is None for D in below) and not entry.below.is_constant():
-                below.append(entry.below)
-        missing = [[0] * len(polynomial) for _ in below]
+        denominators: list[fmpq_mpoly] = []  # none of which divides another
+        for entry, _ in sorted(used, key=lambda one: -int(one[0].denominator.total_degree())):
+            if (
+                all(self.quotient(D, entry.denominator) is None for D in denominators)
+                and not entry.denominator.is_constant()
+            ):
+                denominators.append(entry.denominator)
+        missing = [[0] * len(polynomial) for _ in denominators]
         rows = []
         for entry, powers in used:
-            factor = entry.above / entry.below.leading_coefficient()
-            if not entry.below.is_constant():
-                quotients = ((k, self.quotient(D, entry.below)) for k, D in enumerate(below))
+            factor = entry.numerator / entry.denominator.leading_coefficient()
+            if not entry.denominator.is_constant():
+                quotients = ((k, self.quotient(D, entry.denominator)) for k, D in enumerate(denominators))
                 place, quotient = next((k, quotient) for k, quotient in quotients if quotient is not None)
-                factor = self.times(entry.above, quotient)
+                factor = self.times(entry.numerator, quotient)
                 missing[place] = [a - e for a, e in zip(missing[place], powers, strict=True)]
             rows.append((factor, powers))
         tops = [-min(row) for row in missing]
-        rows += [(D, tuple(top + a for a in row)) for D, top, row in zip(below, tops, missing, strict=True)]
+        rows += [(D, tuple(top + a for a in row)) for D, top, row in zip(denominators, tops, missing, strict=True)]
         # The sum over powers of the longest factor is innermost, where the others of its products are short.
         rows.sort(key=lambda row: len(row[0]))
         terms = {tuple(powers[m] for _, powers in rows): c for m, c in enumerate(polynomial.coeffs())}
         total = self._horner(terms, [factor for factor, _ in rows])
         denominator = self._one
-        for D, top in zip(below, tops, strict=True):
+        for D, top in zip(denominators, tops, strict=True):
             for _ in range(top):
                 denominator = self.times(denominator, D)
         return self.fraction(total, denominator)
@@ -194,47 +197,47 @@ class FunctionField(Field):
 class Function(Element):
     """A quotient of two polynomials in a `FunctionField`, not reduced."""
 
-    __slots__ = ("above", "below")
+    __slots__ = ("denominator", "numerator")
 
     field: FunctionField
 
-    def __init__(self, field: FunctionField, above: fmpq_mpoly, below: fmpq_mpoly) -> None:
+    def __init__(self, field: FunctionField, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> None:
         self.field = field
-        self.above = above
-        self.below = below
+        self.numerator = numerator
+        self.denominator = denominator
 
     def _plus(self, other: Function) -> Function:
-        if self.above.is_zero():
+        if self.numerator.is_zero():
             return other
-        if other.above.is_zero():
+        if other.numerator.is_zero():
             return self
-        if self.below == other.below:
-            return self.field.fraction(self.above + other.above, self.below)
+        if self.denominator == other.denominator:
+            return self.field.fraction(self.numerator + other.numerator, self.denominator)
         times = self.field.times
         for small, large in ((self, other), (other, self)):
-            quotient = self.field.quotient(large.below, small.below)
+            quotient = self.field.quotient(large.denominator, small.denominator)
             if quotient is not None:
-                return self.field.fraction(large.above + times(small.above, quotient), large.below)
-        above = times(self.above, other.below) + times(other.above, self.below)
-        return self.field.fraction(above, times(self.below, other.below))
+                return self.field.fraction(large.numerator + times(small.numerator, quotient), large.denominator)
+        numerator = times(self.numerator, other.denominator) + times(other.numerator, self.denominator)
+        return self.field.fraction(numerator, times(self.denominator, other.denominator))
 
     def __neg__(self) -> Function:
-        return Function(self.field, -self.above, self.below)
+        return Function(self.field, -self.numerator, self.denominator)
 
     def _times(self, other: Function) -> Function:
-        if self.above.is_zero() or other.above.is_zero():
+        if self.numerator.is_zero() or other.numerator.is_zero():
             zero: Function = self.field.zero
             return zero
         times = self.field.times
-        return self.field.fraction(times(self.above, other.above), times(self.below, other.below))
+        return self.field.fraction(times(self.numerator, other.numerator), times(self.denominator, other.denominator))
 
     def _over(self, other: Function) -> Function:
-        if self.field.vanishes(other.above):
+        if self.field.vanishes(other.numerator):
             raise ZeroDivisionError("division by the zero function")
-        return self._times(Function(self.field, other.below, other.above))
+        return self._times(Function(self.field, other.denominator, other.numerator))
 
     def _same(self, other: Function) -> bool:
-        if other.above.is_zero():
+        if other.numerator.is_zero():
             return self.field.is_zero(self)
         return self.field.equal(self, other)
 
@@ -245,7 +248,7 @@ class FunctionMatrix(EntryMatrix):
     def _dot(self, row: Sequence[Function], column: Sequence[Function]) -> Function:
         total: Function = self.field.zero
         for a, b in zip(row, column, strict=True):
-            if not a.above.is_zero() and not b.above.is_zero():  # most entries are zero where there are blocks
+            if not a.numerator.is_zero() and not b.numerator.is_zero():  # most entries are zero where there are blocks
                 total = total._plus(a._times(b))
         return total
 
@@ -276,10 +279,10 @@ class FunctionMatrix(EntryMatrix):
             rows, _ = FunctionMatrix(self.field, n, n + columns, flat)._polynomial_rows()
             sign = -1 if n % 2 else 1  # the denominator is the determinant itself, as elsewhere
             for j in range(n, n + columns):
-                *above, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
+                *numerator, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
                 if self.field.vanishes(last):
                     raise ZeroDivisionError("singular matrix in solve()")
-                for i, entry in zip(block, above, strict=True):
+                for i, entry in zip(block, numerator, strict=True):
                     solution[i].append(Function(self.field, entry * -sign, last * sign))
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])
 
@@ -290,7 +293,7 @@ class FunctionMatrix(EntryMatrix):
         while waiting:
             block = [waiting.pop()]
             for i in block:  # grows while it is walked
-                near = {j for j in waiting if not self[i, j].above.is_zero() or not self[j, i].above.is_zero()}
+                near = {j for j in waiting if not self[i, j].numerator.is_zero() or not self[j, i].numerator.is_zero()}
                 waiting -= near
                 block += sorted(near)
             blocks.append(sorted(block))
@@ -303,21 +306,21 @@ class FunctionMatrix(EntryMatrix):
             row = [self[i, j] for j in range(self._columns)]
             total = self.field.zero
             for entry in row:  # the sum finds a common denominator where one divides the other
-                if entry.above.is_zero():
+                if entry.numerator.is_zero():
                     continue
-                total = total + Function(self.field, self.field.context.constant(1), entry.below)
-            below = total.below
+                total = total + Function(self.field, self.field.context.constant(1), entry.denominator)
+            denominator = total.denominator
             cleared = []
             for entry in row:
-                if entry.above.is_zero():
-                    cleared.append(entry.above)
+                if entry.numerator.is_zero():
+                    cleared.append(entry.numerator)
                     continue
-                quotient = self.field.quotient(below, entry.below)
+                quotient = self.field.quotient(denominator, entry.denominator)
                 if quotient is None:
                     raise BudgetExceeded("the denominators of a row have no simple common multiple")
-                cleared.append(self.field.times(entry.above, quotient))
+                cleared.append(self.field.times(entry.numerator, quotient))
             rows.append(cleared)
-            product = self.field.times(product, below)
+            product = self.field.times(product, denominator)
         return rows, product
 
 

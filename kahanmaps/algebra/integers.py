@@ -20,10 +20,10 @@ def over_one(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
     >>> over_one([fmpq(1, 2), fmpq(-2, 3), fmpq(5)])
     ([3, -4, 30], 6)
     """
-    pairs, below = [(number.p, number.q) for number in numbers], fmpz(1)
+    pairs, denominator = [(number.p, number.q) for number in numbers], fmpz(1)
     for _, q in pairs:
-        below = below.lcm(q)
-    return [p * (below // q) for p, q in pairs], below
+        denominator = denominator.lcm(q)
+    return [p * (denominator // q) for p, q in pairs], denominator
 
 
 def content(integers: Iterable[fmpz]) -> fmpz:

@@ -130,16 +130,16 @@ class SampledValues:
 class Shape:
     """The monomials of a numerator and of a denominator; `lead` of the latter has the coefficient 1."""
 
-    above: tuple[Exponents, ...]
-    below: tuple[Exponents, ...]
+    numerator: tuple[Exponents, ...]
+    denominator: tuple[Exponents, ...]
 
     @property
     def lead(self) -> Exponents:
-        return max(self.below)
+        return max(self.denominator)
 
     @property
     def unknowns(self) -> int:
-        return len(self.above) + len(self.below)
+        return len(self.numerator) + len(self.denominator)
 
 
 @dataclass(frozen=True)
@@ -147,14 +147,14 @@ class Quotient:
     """A fraction of two polynomials modulo a prime: coefficients in the order of the shape's monomials."""
 
     shape: Shape
-    above: tuple[int, ...]
-    below: tuple[int, ...]
+    numerator: tuple[int, ...]
+    denominator: tuple[int, ...]
 
     @classmethod
-    def of(cls, shape: Shape, above: Sequence[int], below: Sequence[int], prime: int) -> Quotient | None:
+    def of(cls, shape: Shape, numerator: Sequence[int], denominator: Sequence[int], prime: int) -> Quotient | None:
         """The fraction normalised and without its zero terms; None where no denominator is left."""
-        kept_above = {monomial: c for monomial, c in zip(shape.above, above, strict=True) if c}
-        kept_below = {monomial: c for monomial, c in zip(shape.below, below, strict=True) if c}
+        kept_above = {monomial: c for monomial, c in zip(shape.numerator, numerator, strict=True) if c}
+        kept_below = {monomial: c for monomial, c in zip(shape.denominator, denominator, strict=True) if c}
         if not kept_below:
             return None
         kept = Shape(tuple(kept_above), tuple(kept_below))
@@ -266,13 +266,15 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
             keys[i].append(str(axes[j][i][1]))
         moving = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
         for i in moving:
-            if found[i].shape.unknowns <= 2 and set(found[i].shape.above + found[i].shape.below) <= {one}:
+            if found[i].shape.unknowns <= 2 and set(found[i].shape.numerator + found[i].shape.denominator) <= {one}:
                 N, D = ([int(c) for c in polynomial.coeffs()] for polynomial in axes[j][i])
                 powers = [tuple(e if k == j else 0 for k in range(symbols)) for e in range(max(len(N), len(D)))]
                 quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, p)
                 assert quotient is not None  # D is monic
                 found[i] = quotient
-        moving = [i for i in moving if any(sum(m) != m[j] for m in (*found[i].shape.above, *found[i].shape.below))]
+        moving = [
+            i for i in moving if any(sum(m) != m[j] for m in (*found[i].shape.numerator, *found[i].shape.denominator))
+        ]
         if not moving:
             continue
         shapes = {i: _extended(found[i].shape, axes[j][i], j) for i in moving}
@@ -283,8 +285,8 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
             for i in moving:
                 keys[i].append(str(line[i][1]))
                 shapes[i] = Shape(
-                    tuple(m for m in shapes[i].above if sum(m) <= _size(line[i][0])),
-                    tuple(m for m in shapes[i].below if sum(m) <= _size(line[i][1])),
+                    tuple(m for m in shapes[i].numerator if sum(m) <= _size(line[i][0])),
+                    tuple(m for m in shapes[i].denominator if sum(m) <= _size(line[i][1])),
                 )
         groups: dict[tuple[str, ...], list[int]] = {}
         for i in moving:
@@ -367,7 +369,7 @@ def _extended(shape: Shape, pair: tuple[nmod_poly, nmod_poly], j: int) -> Shape:
         exponents = [e for e, c in enumerate(polynomial.coeffs()) if int(c)]
         return tuple((*m[:j], e, *m[j + 1 :]) for m in monomials for e in exponents)
 
-    return Shape(times(shape.above, pair[0]), times(shape.below, pair[1]))
+    return Shape(times(shape.numerator, pair[0]), times(shape.denominator, pair[1]))
 
 
 # -- the linear systems: quotients with given monomials from values modulo a prime ------------------------------------
@@ -378,7 +380,7 @@ def _extended(shape: Shape, pair: tuple[nmod_poly, nmod_poly], j: int) -> Shape:
 
 def split_group(group: list[int], numerators: Sequence[str], shapes: dict[int, Shape]) -> tuple[list[int], list[int]]:
     """Entries with one denominator, as (those that determine it, the others); equal numerators would not help."""
-    if len(shapes[group[0]].below) == 1:
+    if len(shapes[group[0]].denominator) == 1:
         return group[:1], group[1:]
     different = dict(reversed(list(zip(numerators, group, strict=True))))
     determining = sorted(different.values())[:_DETERMINING]
@@ -407,10 +409,10 @@ def fit(
             if determining[0] not in done:
                 wanted = max(wanted, _solve(values, usable, shapes, determining, None, done))
             if determining[0] in done:
-                below = done[determining[0]]
+                denominator = done[determining[0]]
                 for i in others:
                     if i not in done:
-                        wanted = max(wanted, _solve(values, usable, shapes, [i], below, done))
+                        wanted = max(wanted, _solve(values, usable, shapes, [i], denominator, done))
         if wanted == 0:
             return done
         values.samples.check(wanted)
@@ -432,24 +434,24 @@ def _solve(
     """
     p = values.prime
     values.samples.check()
-    below = shapes[members[0]].below if known is None else known.shape.below
-    widths = [len(shapes[i].above) for i in members]
+    denominator = shapes[members[0]].denominator if known is None else known.shape.denominator
+    widths = [len(shapes[i].numerator) for i in members]
     # A point more than is solved with is held out; without symbols all points are the same.
     last = usable[-1]
     rows: list[int] = []
     height = 0
     for k in usable[:-1] if values.points[0] else usable[:1]:
-        lower = values.monomials(k, below)
+        lower = values.monomials(k, denominator)
         if known is not None:
-            lower = [sum(c * m for c, m in zip(known.below, lower, strict=True)) % p]
+            lower = [sum(c * m for c, m in zip(known.denominator, lower, strict=True)) % p]
         offset = 0
         for i, width in zip(members, widths, strict=True):
             v = p - values.values[k][i]
-            rows += [0] * offset + values.monomials(k, shapes[i].above) + [0] * (sum(widths) - offset - width)
+            rows += [0] * offset + values.monomials(k, shapes[i].numerator) + [0] * (sum(widths) - offset - width)
             rows += [v * m % p for m in lower]
             offset += width
             height += 1
-    width = sum(widths) + (len(below) if known is None else 1)
+    width = sum(widths) + (len(denominator) if known is None else 1)
     if height == 0:
         return max(1, -(-(width - 1) // len(members)))
     count(20 + len(rows) * (0.5 + min(height, width) / 1500))
@@ -459,15 +461,15 @@ def _solve(
     if nullity == 0:
         raise Unlucky(f"the values modulo {p} do not fit the monomials found")
     solution = [int(kernel[i, 0]) for i in range(width)]
-    lower = solution[sum(widths) :] if known is None else [solution[-1] * c % p for c in known.below]
+    lower = solution[sum(widths) :] if known is None else [solution[-1] * c % p for c in known.denominator]
     offset = 0
     for i, size in zip(members, widths, strict=True):
-        quotient = Quotient.of(replace(shapes[i], below=below), solution[offset : offset + size], lower, p)
+        quotient = Quotient.of(replace(shapes[i], denominator=denominator), solution[offset : offset + size], lower, p)
         offset += size
         fits = quotient is not None
         if quotient is not None:
             shape, v = quotient.shape, values.values[last][i]
-            sums = ((quotient.above, shape.above), (quotient.below, shape.below))
+            sums = ((quotient.numerator, shape.numerator), (quotient.denominator, shape.denominator))
             N, D = (sum(c * m for c, m in zip(cs, values.monomials(last, ms), strict=True)) % p for cs, ms in sums)
             fits = D != 0 and (N - v * D) % p == 0
         if quotient is None or not fits:
@@ -489,12 +491,12 @@ def _lift(
     """The functions over Q. Raises Unlucky where values modulo other primes do not fit."""
     modulus = primes[-1]
     shapes = {i: quotient.shape for i, quotient in enumerate(first)}
-    residues = [[*quotient.above, *quotient.below] for quotient in first]
+    residues = [[*quotient.numerator, *quotient.denominator] for quotient in first]
     groups: dict[object, list[int]] = {}
     for i, quotient in enumerate(first):
-        groups.setdefault((quotient.shape.below, quotient.below), []).append(i)
+        groups.setdefault((quotient.shape.denominator, quotient.denominator), []).append(i)
     # Numerators up to a factor: the first coefficient made 1.
-    monic = [str([c * pow(one.above[0], -1, modulus) % modulus for c in one.above]) for one in first]
+    monic = [str([c * pow(one.numerator[0], -1, modulus) % modulus for c in one.numerator]) for one in first]
     pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
     misfits = 0
     while True:
@@ -515,9 +517,9 @@ def _lift(
                 raise
             continue
         for i, shape in shapes.items():
-            coefficients = dict(zip(found[i].shape.above, found[i].above, strict=True))
-            lower = dict(zip(found[i].shape.below, found[i].below, strict=True))
-            new = [*(coefficients.get(m, 0) for m in shape.above), *(lower.get(m, 0) for m in shape.below)]
+            coefficients = dict(zip(found[i].shape.numerator, found[i].numerator, strict=True))
+            lower = dict(zip(found[i].shape.denominator, found[i].denominator, strict=True))
+            new = [*(coefficients.get(m, 0) for m in shape.numerator), *(lower.get(m, 0) for m in shape.denominator)]
             residues[i] = chinese(residues[i], modulus, new, values.prime)
         modulus *= values.prime
 
@@ -533,9 +535,9 @@ def _recognised(
         coefficients = rational_vector(entries, modulus)
         if coefficients is None:
             return None
-        size = len(shape.above)
-        N = context.from_dict({m: c for m, c in zip(shape.above, coefficients[:size], strict=True) if c != 0})
-        D = context.from_dict({m: c for m, c in zip(shape.below, coefficients[size:], strict=True) if c != 0})
+        size = len(shape.numerator)
+        N = context.from_dict({m: c for m, c in zip(shape.numerator, coefficients[:size], strict=True) if c != 0})
+        D = context.from_dict({m: c for m, c in zip(shape.denominator, coefficients[size:], strict=True) if c != 0})
         functions.append(RationalFunction.reduced(N, D))
     return tuple(functions)
 

@@ -65,7 +65,7 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
     if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
         rows, pivots = _eliminate(field, matrix)
     elif isinstance(matrix, fmpq_mat):
-        integers, below, rank_found = _integer_rows(matrix).rref()
+        integers, denominator, rank_found = _integer_rows(matrix).rref()
         pivots = split_columns(integers, rank_found)[0]
     else:
         reduced, rank_found = matrix.rref()
@@ -76,7 +76,7 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
             vector = [field.zero] * columns
             vector[free] = field.one
             for i, pivot in enumerate(pivots):
-                vector[pivot] = -rows[i][free] if rows is not None else fmpq(-integers[i, free], below)
+                vector[pivot] = -rows[i][free] if rows is not None else fmpq(-integers[i, free], denominator)
             basis.append(tuple(vector))
     return basis
 

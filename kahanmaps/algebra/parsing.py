@@ -100,14 +100,14 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
         prefix = _START_OF_NUMBER.match(text, start, end)
         column = start if prefix is None else prefix.end()
         raise ExpressionError(f"found {quoted(text[start:end])}, {_EXPECTED}", text, column)
-    sign, above, below, whole, fraction, power = match.groups()
-    if max(len(above or ""), len(below or ""), len(whole or "") + len(fraction or "")) > digits:
+    sign, numerator, denominator, whole, fraction, power = match.groups()
+    if max(len(numerator or ""), len(denominator or ""), len(whole or "") + len(fraction or "")) > digits:
         raise ExpressionError(f"found a number of more than {digits} digits, expected at most so many", text, start)
-    if below is not None:
-        divisor = fmpz(below)
+    if denominator is not None:
+        divisor = fmpz(denominator)
         if divisor == 0:
             raise ExpressionError("found the denominator 0, expected a nonzero integer", text, match.start(3))
-        value = fmpq(fmpz(above), divisor)
+        value = fmpq(fmpz(numerator), divisor)
     else:
         value = fmpq(fmpz((whole or "") + (fraction or "")))
         shift = -len(fraction or "")
@@ -231,7 +231,7 @@ def parse_polynomial(
     """
     _check_expression(text, variables, constants)
     work = _Arithmetic(text, ring(variables), constants, limits, quotients=False)
-    return work.polynomial(_parse(work).above)
+    return work.polynomial(_parse(work).numerator)
 
 
 def parse_rational_function(
@@ -251,11 +251,11 @@ def parse_rational_function(
     """
     _check_expression(text, variables, constants)
     work = _Arithmetic(text, ring(variables), constants, limits, quotients=True)
-    above, below = _parse(work)
-    if below is None or not above.value:
-        return RationalFunction(work.polynomial(above), work.ring.constant(1))
+    numerator, denominator = _parse(work)
+    if denominator is None or not numerator.value:
+        return RationalFunction(work.polynomial(numerator), work.ring.constant(1))
     # Integer coefficients below, or bringing it to normal form would cost one lcm for each of them.
-    return RationalFunction(work.polynomial(above) * below.scale, below.value * below.scale)
+    return RationalFunction(work.polynomial(numerator) * denominator.scale, denominator.value * denominator.scale)
 
 
 def parse_constant(
@@ -322,8 +322,8 @@ class _Polynomial(NamedTuple):
 class _Quotient(NamedTuple):
     """above/below; below has degree at least 1 and leading coefficient 1, or is None for 1."""
 
-    above: _Polynomial
-    below: _Polynomial | None
+    numerator: _Polynomial
+    denominator: _Polynomial | None
 
 
 class Token(str):
@@ -487,7 +487,7 @@ class _Arithmetic:
         self.words_left = limits.words
         self.max_bits = limits.digits * 3322 // 1000 + 1
         self.names = {name: self.constant(number) for name, number in constants.items()}
-        self.one = self.constant(fmpq(1)).above
+        self.one = self.constant(fmpq(1)).numerator
         for name, variable in zip(ring.names(), ring.gens(), strict=True):
             self.names[name] = _Quotient(_Polynomial(variable, fmpz(1), 0, 1, 1), None)
 
@@ -504,7 +504,7 @@ class _Arithmetic:
         value = self.names.get(token)
         if value is None:
             raise self.unknown(str(token), token.start_pos)
-        self.check_bits(max(value.above.bits, _bits(value.above.scale)), token.start_pos)
+        self.check_bits(max(value.numerator.bits, _bits(value.numerator.scale)), token.start_pos)
         return value
 
     def sum(self, pieces: list[Any]) -> _Quotient:
@@ -516,16 +516,16 @@ class _Arithmetic:
             value: _Quotient = pieces[i]
             if i and pieces[i - 1] == "-":
                 value = self.negative(value, pieces[i - 1].start_pos)
-            if value.below is None:
-                polynomials.append(value.above)
+            if value.denominator is None:
+                polynomials.append(value.numerator)
                 continue
-            for below, terms in fractions:
-                if below.value == value.below.value:
-                    terms.append(value.above)
+            for denominator, terms in fractions:
+                if denominator.value == value.denominator.value:
+                    terms.append(value.numerator)
                     break
             else:
-                fractions.append((value.below, [value.above]))
-                degree = sum(below.degree for below, _ in fractions)
+                fractions.append((value.denominator, [value.numerator]))
+                degree = sum(denominator.degree for denominator, _ in fractions)
                 self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
 
         def total(values: list[_Polynomial]) -> _Polynomial:
@@ -538,26 +538,28 @@ class _Arithmetic:
 
         if not fractions:
             return _Quotient(total(polynomials), None)
-        common, above = fractions[0][0], total(fractions[0][1])
-        for below, terms in fractions[1:]:
+        common, numerator = fractions[0][0], total(fractions[0][1])
+        for denominator, terms in fractions[1:]:
             crossed = self.times(total(terms), common, column)
-            above = self.add(self.times(above, below, column), crossed, column)
-            common = self.times(common, below, column)
+            numerator = self.add(self.times(numerator, denominator, column), crossed, column)
+            common = self.times(common, denominator, column)
         if polynomials:
-            above = self.add(above, self.times(total(polynomials), common, column), column)
-        return _Quotient(above, common)
+            numerator = self.add(numerator, self.times(total(polynomials), common, column), column)
+        return _Quotient(numerator, common)
 
     def product(self, pieces: list[Any]) -> _Quotient:
-        above, below = self.one, None
+        numerator, denominator = self.one, None
         for i in range(0, len(pieces), 2):
             value: _Quotient = pieces[i]
             column = pieces[max(i - 1, 1)].start_pos
             if i and pieces[i - 1] == "/":
                 value = self.reciprocal(value, column)
-            above = self.times(value.above, above, column)
-            if value.below is not None:
-                below = value.below if below is None else self.times(below, value.below, column)
-        return _Quotient(above, below)
+            numerator = self.times(value.numerator, numerator, column)
+            if value.denominator is not None:
+                denominator = (
+                    value.denominator if denominator is None else self.times(denominator, value.denominator, column)
+                )
+        return _Quotient(numerator, denominator)
 
     def negated(self, signs: list[Token], value: _Quotient) -> _Quotient:
         minus = sum(sign == "-" for sign in signs) % 2
@@ -577,28 +579,30 @@ class _Arithmetic:
             base, n = self.reciprocal(base, column), -n
         if n == 0:
             return self.constant(fmpq(1))
-        above, below = base
-        return _Quotient(self.repeated(above, n, column), None if below is None else self.repeated(below, n, column))
+        numerator, denominator = base
+        return _Quotient(
+            self.repeated(numerator, n, column), None if denominator is None else self.repeated(denominator, n, column)
+        )
 
     def reciprocal(self, value: _Quotient, column: int) -> _Quotient:
-        above, below = value.above, value.below or self.one
-        if not above.value:
+        numerator, denominator = value.numerator, value.denominator or self.one
+        if not numerator.value:
             raise self.refusal("found a division by 0", column)
-        number = _constant(_Quotient(above, None))
+        number = _constant(_Quotient(numerator, None))
         if number is not None:
-            return _Quotient(self.scaled(below, 1 / number, column), None)
+            return _Quotient(self.scaled(denominator, 1 / number, column), None)
         if not self.quotients:
             raise self.refusal("found a division by something with variables in it, expected a polynomial", column)
-        leading = above.value.leading_coefficient()
+        leading = numerator.value.leading_coefficient()
         if leading == 1:
-            return _Quotient(below, above)
+            return _Quotient(denominator, numerator)
         # Leading coefficient 1, so that denominators which differ by a constant are seen to be the same.
-        self.spend(above.terms, above.bits, column)
-        monic = above._replace(value=above.value / leading, scale=abs((leading * above.scale).p))
-        return _Quotient(self.scaled(below, 1 / leading, column), monic)
+        self.spend(numerator.terms, numerator.bits, column)
+        monic = numerator._replace(value=numerator.value / leading, scale=abs((leading * numerator.scale).p))
+        return _Quotient(self.scaled(denominator, 1 / leading, column), monic)
 
     def negative(self, value: _Quotient, column: int) -> _Quotient:
-        return _Quotient(self.scaled(value.above, fmpq(-1), column), value.below)
+        return _Quotient(self.scaled(value.numerator, fmpq(-1), column), value.denominator)
 
     # Arithmetic of numbers and polynomials: estimate, refuse or compute.
 
@@ -655,7 +659,7 @@ class _Arithmetic:
 
     def counted(self, value: Any, scale: fmpz, bits: int, column: int) -> _Polynomial:
         if isinstance(value, fmpq):
-            return self.constant(value).above
+            return self.constant(value).numerator
         if len(value) > self.limits.terms:
             found = f"found a polynomial of {len(value)} terms"
             raise self.refusal(f"{found}, expected at most {self.limits.terms}", column)
@@ -702,12 +706,12 @@ class _Arithmetic:
 
 def _constant(value: _Quotient) -> fmpq | None:
     """The number that a value is, or None where variables are left in it."""
-    above = value.above.value
-    if not above:
+    numerator = value.numerator.value
+    if not numerator:
         return fmpq(0)
-    if value.below is not None or value.above.degree > 0:
+    if value.denominator is not None or value.numerator.degree > 0:
         return None
-    return above if isinstance(above, fmpq) else above.leading_coefficient()
+    return numerator if isinstance(numerator, fmpq) else numerator.leading_coefficient()
 
 
 def _bits(integer: fmpz) -> int:

@@ -118,8 +118,8 @@ def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
     >>> digits_of([x/3, 1000*y])
     4
     """
-    integers, below = over_one(coefficient for polynomial in polynomials for coefficient in polynomial.coeffs())
-    longest = max([below, *integers], key=abs)
+    integers, denominator = over_one(coefficient for polynomial in polynomials for coefficient in polynomial.coeffs())
+    longest = max([denominator, *integers], key=abs)
     return int(longest.bit_length() * 0.30103) + 1
 
 
@@ -140,10 +140,10 @@ def over_one_denominator(
         return context.constant(0 if polynomial.is_zero() else polynomial.leading_coefficient())
 
     pairs = [(moved(function.numerator), moved(function.denominator)) for function in functions]
-    below = context.constant(1)
-    for _, denominator in pairs:
-        below = below * denominator / below.gcd(denominator)
-    return [above * (below / denominator) for above, denominator in pairs], below
+    denominator = context.constant(1)
+    for _, entry_denominator in pairs:
+        denominator = denominator * entry_denominator / denominator.gcd(entry_denominator)
+    return [numerator * (denominator / entry_denominator) for numerator, entry_denominator in pairs], denominator
 
 
 def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
@@ -155,8 +155,8 @@ def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
     """
     if polynomial.is_zero():
         return fmpq(1), polynomial
-    integers, below = over_one(polynomial.coeffs())
-    factor = fmpq(content(integers), below)
+    integers, denominator = over_one(polynomial.coeffs())
+    factor = fmpq(content(integers), denominator)
     if polynomial.leading_coefficient() < 0:
         factor = -factor
     return factor, polynomial / factor
@@ -188,16 +188,16 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
         if top <= 0:
             return polynomial.leading_coefficient() if top == 0 else fmpq(0)
         X, W = over_one(point)
-        below = common_denominator(polynomial)
+        denominator = common_denominator(polynomial)
         powers: list[list[Any]] = [*([fmpz(1), entry] for entry in X), [fmpz(1), W]]
         total: Any = fmpz(0)
         for monomial, coefficient in polynomial.terms():
-            term: Any = coefficient.p * (below // coefficient.q)
+            term: Any = coefficient.p * (denominator // coefficient.q)
             for table, exponent in zip(powers, (*monomial, top - int(sum(monomial))), strict=True):
                 if exponent:
                     term = term * _power(table, exponent)
             total += term
-        return fmpq(total, below * _power(powers[-1], top))
+        return fmpq(total, denominator * _power(powers[-1], top))
     own = field.value(polynomial, point)
     if own is not None:
         return own
@@ -309,12 +309,12 @@ class RationalFunction:
 
     def value(self, field: Any, point: Sequence[Any]) -> Any:
         """The value at `point` over `field`, or None where the denominator vanishes."""
-        below = evaluate(self.denominator, field, point)
-        if field.is_zero(below):
+        denominator = evaluate(self.denominator, field, point)
+        if field.is_zero(denominator):
             return None
-        above = evaluate(self.numerator, field, point)
+        numerator = evaluate(self.numerator, field, point)
         with field.working():
-            return above / below
+            return numerator / denominator
 
 
 # Pickles.

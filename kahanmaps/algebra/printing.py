@@ -94,16 +94,16 @@ def format_rational_function(function: RationalFunction) -> str:
     """
     if not isinstance(function, RationalFunction):
         raise wrong_kind(function, "a RationalFunction", "make one with parse_rational_function")
-    above = format_polynomial(function.numerator)
+    numerator = format_polynomial(function.numerator)
     if function.numerator.is_zero() or function.denominator.is_one():
-        return above
-    below = format_polynomial(function.denominator)
+        return numerator
+    denominator = format_polynomial(function.denominator)
     if len(function.numerator) > 1:
-        above = f"({above})"
+        numerator = f"({numerator})"
     # A name or its power stands by itself; a/2*y would be a*y/2.
-    if any(sign in below for sign in "*+- "):
-        below = f"({below})"
-    return f"{above}/{below}"
+    if any(sign in denominator for sign in "*+- "):
+        denominator = f"({denominator})"
+    return f"{numerator}/{denominator}"
 
 
 def format_factored(function: RationalFunction) -> str:
@@ -152,13 +152,13 @@ def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _
         bases = [(f"({format_polynomial(g)})" if len(g) > 1 else format_polynomial(g), k) for g, k in powers]
         told = [base + (f"^{k}" if k > 1 else "") for base, k in bases]
         parts.append(([str(number)] if number > 1 else []) + told)
-    above, below = ("*".join(part) for part in parts)
+    numerator, denominator = ("*".join(part) for part in parts)
     if len(factors) == 1 and factors[0][1] == 1 and constant == 1:
         return format_polynomial(factors[0][0])
     sign = "-" if constant < 0 else ""
-    if not below:
-        return f"{sign}{above or 1}"
-    return f"{sign}{above or 1}/({below})" if len(parts[1]) > 1 else f"{sign}{above or 1}/{below}"
+    if not denominator:
+        return f"{sign}{numerator or 1}"
+    return f"{sign}{numerator or 1}/({denominator})" if len(parts[1]) > 1 else f"{sign}{numerator or 1}/{denominator}"
 
 
 def sides(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq) -> list[tuple[int, list[tuple[fmpq_mpoly, int]]]]:
@@ -248,12 +248,12 @@ class Notation:
         found = shorter_factors(function)
         if found is None:
             is_negative, *parts = above_and_below(function)
-            above, below = map(self.polynomial, parts)
+            numerator, denominator = map(self.polynomial, parts)
             is_whole = parts[1].is_one()
         else:
             is_negative, (over, under) = found[1] < 0, sides(*found)
-            above, below, is_whole = self._product(*over), self._product(*under), under == (1, [])
-        whole = above if is_whole else self.fraction(above, below)
+            numerator, denominator, is_whole = self._product(*over), self._product(*under), under == (1, [])
+        whole = numerator if is_whole else self.fraction(numerator, denominator)
         return self.row(self.signs[0] + whole) if is_negative else whole
 
     def _product(self, number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> str:
@@ -279,12 +279,12 @@ def above_and_below(function: RationalFunction) -> tuple[bool, fmpq_mpoly, fmpq_
 
     Polynomials have the denominator 1 and their own signs.
     """
-    above, below = function.numerator, function.denominator
-    if function.is_polynomial or above.is_zero():
-        return False, above, above.context().constant(1)
-    factor = fmpq(common_denominator(above))
-    signs = [1 if part.coefficient(0) > 0 else -1 for part in (above, below)]
-    return signs[0] != signs[1], above * (factor * signs[0]), below * (factor * signs[1])
+    numerator, denominator = function.numerator, function.denominator
+    if function.is_polynomial or numerator.is_zero():
+        return False, numerator, numerator.context().constant(1)
+    factor = fmpq(common_denominator(numerator))
+    signs = [1 if part.coefficient(0) > 0 else -1 for part in (numerator, denominator)]
+    return signs[0] != signs[1], numerator * (factor * signs[0]), denominator * (factor * signs[1])
 
 
 def terms_of(polynomial: fmpq_mpoly) -> Iterator[tuple[tuple[int, ...], fmpq]]:

@@ -40,11 +40,14 @@ def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
     True
     """
     bound = int(fmpz((modulus - 1) // 2).isqrt())
-    above, below = (modulus, 0), (residue % modulus, 1)
-    while below[0] > bound:
-        quotient = above[0] // below[0]
-        above, below = below, (above[0] - quotient * below[0], above[1] - quotient * below[1])
-    n, d = below
+    numerator, denominator = (modulus, 0), (residue % modulus, 1)
+    while denominator[0] > bound:
+        quotient = numerator[0] // denominator[0]
+        numerator, denominator = (
+            denominator,
+            (numerator[0] - quotient * denominator[0], numerator[1] - quotient * denominator[1]),
+        )
+    n, d = denominator
     if d == 0 or abs(d) > bound or fmpz(n).gcd(fmpz(d)) != 1:
         return None
     return fmpq(n, d)
@@ -61,12 +64,15 @@ def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
     >>> simple_fraction(10**20 * pow(7, -1, m), m, 40), simple_fraction(3**84, m, 40)
     (100000000000000000000/7, None)
     """
-    above, below = (modulus, 0), (residue % modulus, 1)
-    best = below
-    while below[0] * abs(below[1]):
-        best = min(best, below, key=lambda pair: pair[0] * abs(pair[1]))
-        quotient = above[0] // below[0]
-        above, below = below, (above[0] - quotient * below[0], above[1] - quotient * below[1])
+    numerator, denominator = (modulus, 0), (residue % modulus, 1)
+    best = denominator
+    while denominator[0] * abs(denominator[1]):
+        best = min(best, denominator, key=lambda pair: pair[0] * abs(pair[1]))
+        quotient = numerator[0] // denominator[0]
+        numerator, denominator = (
+            denominator,
+            (numerator[0] - quotient * denominator[0], numerator[1] - quotient * denominator[1]),
+        )
     n, d = best
     return fmpq(n, d) if n * abs(d) < modulus >> spare_bits else None
 
@@ -86,26 +92,26 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
     telling = [i for i, residue in enumerate(residues) if residue not in (0, 1, modulus - 1)]
     step = -(-len(telling) // _TOGETHER) or 1
     chosen = [residues[i] for i in telling[::step]]
-    below, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(chosen)
+    denominator, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(chosen)
     if k > 1:
         # The q > 0 for which q and all q r modulo `modulus` are smallest, if that is smaller than chance allows.
         rows = [[1, *chosen], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
         size, q = max(abs(int(entry)) for entry in shortest), abs(int(shortest[0]))
         if q and size ** (k + 1) << (_SPARE_BITS * (k + 1)) <= modulus**k:
-            below, bound = q, int(fmpz(modulus**k).root(k + 1)) >> _SPARE_BITS
+            denominator, bound = q, int(fmpz(modulus**k).root(k + 1)) >> _SPARE_BITS
     found = []
     for residue in residues:
-        n = residue * below % modulus
+        n = residue * denominator % modulus
         n = n - modulus if n > modulus // 2 else n
         if abs(n) > bound:
             fraction = rational_reconstruction(n, modulus)
             if fraction is None:
                 return None
-            below *= int(fraction.q)  # the others most likely need it too
-            found.append(fraction / (below // int(fraction.q)))
+            denominator *= int(fraction.q)  # the others most likely need it too
+            found.append(fraction / (denominator // int(fraction.q)))
         else:
-            found.append(fmpq(n, below))
+            found.append(fmpq(n, denominator))
     return tuple(found)
 
 

@@ -372,8 +372,8 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         return True
 
     for p in filter(None, equations):
-        below = common_denominator(p)
-        cleared = integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()})
+        denominator = common_denominator(p)
+        cleared = integers.from_dict({tuple(m): c.p * (denominator // c.q) for m, c in p.terms()})
         if not add(cleared.primitive()[1]):
             return None
     used = sum(any(lead[i] for lead in leads) for i in range(integers.nvars()))

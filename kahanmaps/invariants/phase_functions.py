@@ -127,10 +127,10 @@ def at_eps(
 
     With a `root` they are remainders, and their k-th variable stands for it.
     """
-    above, below = function.numerator, function.denominator
+    numerator, denominator = function.numerator, function.denominator
     if eps is not None:
-        above, below = substitute(above, {"eps": eps}), substitute(below, {"eps": eps})
-    return (above, below) if root is None else (root.remainder(above, k), root.remainder(below, k))
+        numerator, denominator = substitute(numerator, {"eps": eps}), substitute(denominator, {"eps": eps})
+    return (numerator, denominator) if root is None else (root.remainder(numerator, k), root.remainder(denominator, k))
 
 
 def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
@@ -276,8 +276,8 @@ class ClaimedIntegral(ClaimedFunction):
         super().__init__(name, function, root, map_)
         dim = len(function.names) - 1 - (root is not None)
         self.condition = integral_condition(function, dim, eps, root)
-        above, below = at_eps(function, eps, root, dim)
-        self.is_constant = not below.is_zero() and is_constant(above, below, dim, root)
+        numerator, denominator = at_eps(function, eps, root, dim)
+        self.is_constant = not denominator.is_zero() and is_constant(numerator, denominator, dim, root)
 
 
 def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
@@ -298,17 +298,20 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
     ['where 10*eps - 1 is not 0']
     ['']
     """
-    _, below = at_eps(integral, eps, root, dim)
-    return "" if below.is_zero() else where(dim, below)
+    _, denominator = at_eps(integral, eps, root, dim)
+    return "" if denominator.is_zero() else where(dim, denominator)
 
 
-def is_constant(above: fmpq_mpoly, below: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
+def is_constant(numerator: fmpq_mpoly, denominator: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
     """Whether the quotient of two polynomials does not depend on the first `dim` variables; `below` is not 0."""
-    monomial, coefficients = below.monoms()[0][:dim], list[fmpq_mpoly]()
-    for part in (above, below):  # of that monomial in the first variables: polynomials in the others, in the same ring
+    monomial, coefficients = denominator.monoms()[0][:dim], list[fmpq_mpoly]()
+    for part in (
+        numerator,
+        denominator,
+    ):  # of that monomial in the first variables: polynomials in the others, in the same ring
         terms = {(*(0,) * dim, *m[dim:]): value for m, value in part.terms() if m[:dim] == monomial}
         coefficients.append(part.context().from_dict(terms))
-    difference = above * coefficients[1] - below * coefficients[0]
+    difference = numerator * coefficients[1] - denominator * coefficients[0]
     return bool((difference if root is None else root.remainder(difference, dim)).is_zero())
 
 
@@ -367,17 +370,17 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     ['where a is not 0']
     ['']
     """
-    above, below = at_eps(phi, eps, root, dim)
-    if above.is_zero():
+    numerator, denominator = at_eps(phi, eps, root, dim)
+    if numerator.is_zero():
         text = format_rational_function(phi)
-        what = "0/0" if below.is_zero() else "identically 0"
+        what = "0/0" if denominator.is_zero() else "identically 0"
         at = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
         which = f", which is {what} at {at}" if text != "0" else ""
         raise InputError(
             f"found the density {quoted(text) if which else text}{which}, expected a function that is not zero: "
             "the measure is dx/phi"
         )
-    return where(dim, above) if below.is_zero() else where(dim, above, below)
+    return where(dim, numerator) if denominator.is_zero() else where(dim, numerator, denominator)
 
 
 def jacobian_determinant_sides(kahan: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
@@ -386,13 +389,13 @@ def jacobian_determinant_sides(kahan: Map, x: Sequence[Any], image: Sequence[Any
     Of a map with several factors the products of theirs.
     """
     factors, points = zip(*kahan.stages(x), strict=True)
-    above = [
+    numerator = [
         det(one.numerator_matrix(here, there))
         for one, here, there in zip(factors, points, (*points[1:], image), strict=True)
     ]
-    below = [one.determinant(here) for one, here in zip(factors, points, strict=True)]
+    denominator = [one.determinant(here) for one, here in zip(factors, points, strict=True)]
     with kahan.field.working():
-        return reduce(mul, above), reduce(mul, below)
+        return reduce(mul, numerator), reduce(mul, denominator)
 
 
 @dataclass(frozen=True)
@@ -450,9 +453,9 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     while True:
         count(20 + len(P) + len(Q))
         # A factor that is free of x does not help to conserve anything.
-        above, below = _content(P, dim), _content(Q, dim)
-        P, Q = P / above, Q / below
-        alpha, beta, gamma = alpha * below, beta * below, gamma * above
+        numerator, denominator = _content(P, dim), _content(Q, dim)
+        P, Q = P / numerator, Q / denominator
+        alpha, beta, gamma = alpha * denominator, beta * denominator, gamma * numerator
         p, q = _lowest(P), _lowest(Q)
         common = p.gcd(q)
         p, q = p / common, q / common

@@ -158,7 +158,7 @@ class MatrixPoissonTensor(PoissonTensor):
     def brackets(self) -> dict[tuple[str, str], RationalFunction]:
         """The brackets {x_i, x_j} = P_ij for i < j that are not 0."""
         names = self.rows[0][0].names if self.rows else ()
-        return {(names[i], names[j]): entry for (i, j), entry in self._above.items()}
+        return {(names[i], names[j]): entry for (i, j), entry in self._upper.items()}
 
     @property
     def formula(self) -> str:  # type: ignore[override]
@@ -173,8 +173,8 @@ class MatrixPoissonTensor(PoissonTensor):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():
             place = (*point, field.convert(eps))
-            above = {pair: entry.value(field, place) for pair, entry in self._above.items()}
-            return None if None in above.values() else self._matrix(field, above)
+            upper = {pair: entry.value(field, place) for pair, entry in self._upper.items()}
+            return None if None in upper.values() else self._matrix(field, upper)
 
     def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
         with field.working():
@@ -184,17 +184,17 @@ class MatrixPoissonTensor(PoissonTensor):
                 terms = [v * evaluate(P, field, place) for v, P in zip(direction, parts, strict=False) if len(P)]
                 return sum(terms[1:], terms[0]) if terms else field.zero
 
-            above = {}
-            for pair, entry in self._above.items():
+            upper = {}
+            for pair, entry in self._upper.items():
                 numerator, denominator = self._slopes[pair]
                 N, D = evaluate(entry.numerator, field, place), evaluate(entry.denominator, field, place)
-                above[pair] = slope(numerator) / D
+                upper[pair] = slope(numerator) / D
                 if not entry.is_polynomial:
-                    above[pair] = above[pair] - N * slope(denominator) / (D * D)
-            return self._matrix(field, above)
+                    upper[pair] = upper[pair] - N * slope(denominator) / (D * D)
+            return self._matrix(field, upper)
 
     @cached_property
-    def _above(self) -> dict[tuple[int, int], RationalFunction]:
+    def _upper(self) -> dict[tuple[int, int], RationalFunction]:
         return {
             (i, j): entry
             for i, row in enumerate(self.rows)
@@ -204,12 +204,12 @@ class MatrixPoissonTensor(PoissonTensor):
 
     @cached_property
     def _slopes(self) -> dict[tuple[int, int], tuple[Any, Any]]:
-        return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._above.items()}
+        return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._upper.items()}
 
-    def _matrix(self, field: Field, above: Mapping[tuple[int, int], Any]) -> Any:
+    def _matrix(self, field: Field, upper: Mapping[tuple[int, int], Any]) -> Any:
         n, zero = self.dim, field.zero
         entries = [
-            above[i, j] if (i, j) in above else -above[j, i] if (j, i) in above else zero
+            upper[i, j] if (i, j) in upper else -upper[j, i] if (j, i) in upper else zero
             for i in range(n)
             for j in range(n)
         ]
@@ -237,13 +237,13 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
     ['']
     """
     entries = [at_eps(entry, eps) for entry in tensor.brackets.values()]
-    numerators = [above for above, _ in entries if not above.is_zero()]
-    if any(below.is_zero() for _, below in entries):
+    numerators = [numerator for numerator, _ in entries if not numerator.is_zero()]
+    if any(denominator.is_zero() for _, denominator in entries):
         return ""  # then P has no values, of which the verdict tells
     if not numerators:
         which = f"{quoted(tensor.formula)}, which is identically 0 at eps = {eps}" if entries else tensor.formula
         raise InputError(f"found the tensor {which}, expected one that is not zero: every map preserves 0")
-    return where(tensor.dim, numerators, *(below for _, below in entries))
+    return where(tensor.dim, numerators, *(denominator for _, denominator in entries))
 
 
 def transformation_sides(

@@ -27,7 +27,7 @@ def beside(name, *symbols):
 
 
 def order_in_eps(function):
-    above, below = (min(int(m[-1]) for m in part.monoms()) for part in (function.above, function.below))
+    above, below = (min(int(m[-1]) for m in part.monoms()) for part in (function.numerator, function.denominator))
     return above - below
 
 

@@ -512,7 +512,7 @@ class _Collected:
                 value = inherited.modified(k - affine, field, eps, field.variables[:-1])
             except BudgetExceeded:
                 continue  # too long to expand
-            function = RationalFunction.reduced(value.above, value.below)
+            function = RationalFunction.reduced(value.numerator, value.denominator)
             is_hamiltonian = inherited.forms[k - affine].rank() == len(inherited.quotient.free)
             form = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
             summary = f"{form} a constant skew matrix {'J' if is_hamiltonian else 'K'}"

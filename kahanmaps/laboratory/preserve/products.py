@@ -140,7 +140,7 @@ def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str
             sides += jacobian_determinant_sides(local, x[:n], local.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
-    return _irreducible((part for side in sides for part in (side.above, side.below)), n, eps)
+    return _irreducible((part for side in sides for part in (side.numerator, side.denominator)), n, eps)
 
 
 class _Line:

@@ -286,7 +286,7 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
             for j in range(n)
         ]
         try:
-            if FunctionMatrix(field, n, n, entries).det().above.is_zero():
+            if FunctionMatrix(field, n, n, entries).det().numerator.is_zero():
                 return outcome
         except BudgetExceeded:
             return "undecided"

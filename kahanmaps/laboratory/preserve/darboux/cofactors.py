@@ -105,7 +105,7 @@ def determinant_polynomial(map_: MapFamily) -> fmpq_mpoly | None:
     one, n = field.context.constant(1), map_.dim
     try:
         entries = [Function(field, entry, one) for row in map_.matrix for entry in row]
-        D: fmpq_mpoly = FunctionMatrix(field, n, n, entries).det().above
+        D: fmpq_mpoly = FunctionMatrix(field, n, n, entries).det().numerator
     except (BudgetExceeded, TooLarge):
         return None
     return D
@@ -128,9 +128,9 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
         D = None
     if D is None:
         return (Cofactor("det dPhi", n, None),)
-    degree_of_map = max(degree_in(part, n) for entry in image for part in (entry.above, entry.below))
+    degree_of_map = max(degree_in(part, n) for entry in image for part in (entry.numerator, entry.denominator))
     cofactors = []
-    for kind, polynomials in (("factor", [J.above]), ("pole", [J.below, D])):
+    for kind, polynomials in (("factor", [J.numerator]), ("pole", [J.denominator, D])):
         factors = {str(factor): factor for polynomial in polynomials for factor, _ in irreducible_factors(polynomial)}
         for factor in factors.values():
             if weight := -(-degree_in(factor, n) // max(1, degree_of_map)):

@@ -307,7 +307,7 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
                 continue
             remainder = I - Function(field, leading.numerator, leading.denominator)
             order, second = 0, None
-            if not remainder.above.is_zero():
+            if not remainder.numerator.is_zero():
                 order, content, second = _leading(remainder)
                 second = RationalFunction(second.numerator * content, second.denominator)
         except (BudgetExceeded, _NoLimit):
@@ -382,10 +382,10 @@ def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
 
     Raises _NoLimit for I = 0.
     """
-    if I.above.is_zero():
+    if I.numerator.is_zero():
         raise _NoLimit("an integral is a function of others")
     lowest = []
-    for P in (I.above, I.below):
+    for P in (I.numerator, I.denominator):
         order = min(int(monomial[-1]) for monomial in P.monoms())
         terms = {(*monomial[:-1], 0): c for monomial, c in P.terms() if monomial[-1] == order}
         lowest.append((order, P.context().from_dict(terms)))

@@ -68,7 +68,7 @@ def casimir_candidates(
             value = evaluate(candidate.numerator, field, arguments) / evaluate(candidate.denominator, field, arguments)
         except BudgetExceeded:
             continue
-        yield format_rational_function(candidate), RationalFunction.reduced(value.above, value.below)
+        yield format_rational_function(candidate), RationalFunction.reduced(value.numerator, value.denominator)
 
 
 def _products(
