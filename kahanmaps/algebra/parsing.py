@@ -133,7 +133,7 @@ def require_text(text: object, what: str, hint: str) -> None:
 def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
     """The error to raise for a value of another type: what it is, what was `expected`, and what to do."""
     if isinstance(value, float):
-        return InexactNumber(f"found the machine number {value!s}, expected {expected}: {hint}")
+        return InexactNumber(f"found the floating-point number {value!s}, expected {expected}: {hint}")
     return InputError(f"found a value of type {type(value).__name__}, expected {expected}: {hint}")
 
 
