@@ -92,7 +92,7 @@ class BoundField(Field):
         return Bound(self, CoefficientSize(1, 0.0), 1, {})
 
     def polynomial(self, degree: int, bits: float) -> Bound:
-        """Return the bound of an integer polynomial of this degree with coefficients of sum at most 2^bits."""
+        """Return the bound of an integer polynomial with this degree and this log2 of the sum of |coefficients|."""
         return Bound(self, CoefficientSize(degree, bits), 1, {})
 
     @property
