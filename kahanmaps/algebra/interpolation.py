@@ -255,7 +255,7 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
     anchor = values.points[0]
     one: Exponents = (0,) * symbols
     entries = range(len(values.values[0]))
-    found = [Quotient(Shape((one,) if v else (), (one,)), (v,) if v else (), (1,)) for v in values.values[0]]
+    quotients = [Quotient(Shape((one,) if v else (), (one,)), (v,) if v else (), (1,)) for v in values.values[0]]
     axes = []
     for j in range(symbols):
         direction = tuple(int(i == j) for i in range(symbols))
@@ -269,18 +269,22 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
             keys[i].append(str(axes[j][i][1]))
         moving = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
         for i in moving:
-            if found[i].shape.unknowns <= 2 and set(found[i].shape.numerator + found[i].shape.denominator) <= {one}:
+            if quotients[i].shape.unknowns <= 2 and set(
+                quotients[i].shape.numerator + quotients[i].shape.denominator
+            ) <= {one}:
                 N, D = ([int(c) for c in polynomial.coeffs()] for polynomial in axes[j][i])
                 powers = [tuple(e if k == j else 0 for k in range(symbols)) for e in range(max(len(N), len(D)))]
                 quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, p)
                 assert quotient is not None  # D is monic
-                found[i] = quotient
+                quotients[i] = quotient
         moving = [
-            i for i in moving if any(sum(m) != m[j] for m in (*found[i].shape.numerator, *found[i].shape.denominator))
+            i
+            for i in moving
+            if any(sum(m) != m[j] for m in (*quotients[i].shape.numerator, *quotients[i].shape.denominator))
         ]
         if not moving:
             continue
-        shapes = {i: _extended(found[i].shape, axes[j][i], j) for i in moving}
+        shapes = {i: _extended(quotients[i].shape, axes[j][i], j) for i in moving}
         bound = max(sum(_size(axes[a][i][0]) + _size(axes[a][i][1]) for a in active) + 2 for i in moving)
         if max(shape.unknowns for shape in shapes.values()) > bound:
             direction = tuple(rng.randrange(1, p) if i in active else 0 for i in range(symbols))
@@ -298,8 +302,8 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
         pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
         fixed = {i: anchor[i] for i in order[stage + 1 :]}
         for i, quotient in fit(values, shapes, pairs, symbols, rng, fixed).items():
-            found[i] = quotient
-    return found
+            quotients[i] = quotient
+    return quotients
 
 
 def _size(polynomial: nmod_poly) -> int:
@@ -328,24 +332,24 @@ def _along_line(
     entries = range(len(values.values[0]))
     vanishing = nmod_poly([-start, 1], p)
     through = [nmod_poly([v], p) for v in values.values[0]]
-    found: list[tuple[nmod_poly, nmod_poly] | None] = [None for _ in entries]
+    fractions: list[tuple[nmod_poly, nmod_poly] | None] = [None for _ in entries]
     n = 1
-    while any(pair is None for pair in found):
+    while any(pair is None for pair in fractions):
         if n > 2 * max_degree + 2:
             raise Stop(f"not the values of a rational function of degree at most {max_degree} along a line")
         values.take(draw)
         t, n = where[-1], n + 1
         slope = 1 / vanishing(t)
         for i in entries:
-            if found[i] is None:
+            if fractions[i] is None:
                 values.samples.check()
                 count(5 + n * (1 + n / 100))
                 through[i] += vanishing * ((values.values[-1][i] - through[i](t)) * slope)
         vanishing *= nmod_poly([-t, 1], p)
         for i in entries:
-            if found[i] is None:
-                found[i] = _least_fraction(through[i], vanishing, n)
-    return [pair for pair in found if pair is not None]
+            if fractions[i] is None:
+                fractions[i] = _least_fraction(through[i], vanishing, n)
+    return [pair for pair in fractions if pair is not None]
 
 
 def _least_fraction(through: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:

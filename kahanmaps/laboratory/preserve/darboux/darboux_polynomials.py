@@ -150,9 +150,9 @@ def darboux_polynomials(
         if flow_result.degree < degree:
             reason = f"degrees above {flow_result.degree} are not settled: {flow_result.reason}"
     if flow or laboratory.defect:
-        names = () if laboratory.defect else tuple(one.name for one in cofactors)
+        names = () if laboratory.defect else tuple(cofactor.name for cofactor in cofactors)
         return DarbouxSearch(*laboratory.asked, degree, names, tuple(spaces), reason, flow=flow)
-    names, map_, requested = tuple(one.name for one in cofactors), laboratory.maps[0], degree
+    names, map_, requested = tuple(cofactor.name for cofactor in cofactors), laboratory.maps[0], degree
     while comb(map_.dim + degree, degree) > _MAX_TERMS:
         degree -= 1
     if degree < requested:
