@@ -416,7 +416,7 @@ class _Balls(Field):
         if element.is_zero():
             return True
         if element.contains(0):
-            raise PrecisionLost(f"a number with {self.bits} bits cannot be told from zero any more: ask for more bits")
+            raise PrecisionLost(f"a number with {self.bits} bits cannot be distinguished from zero: use more bits")
         return False
 
     def equal(self, left: Any, right: Any) -> bool:

@@ -32,7 +32,7 @@ def solve(matrix: Any, right: Any) -> Any:
         return matrix.solve(right)
     except ZeroDivisionError as error:
         if isinstance(matrix, arb_mat | acb_mat) and not matrix.det().is_zero():
-            raise PrecisionLost("the determinant cannot be told from zero: ask for more bits") from error
+            raise PrecisionLost("the determinant cannot be distinguished from zero: use more bits") from error
         raise SingularMatrix("the matrix is singular") from error
 
 
