@@ -420,8 +420,8 @@ class _Balls(Field):
         return False
 
     def equal(self, left: Any, right: Any) -> bool:
-        if not (left.is_finite() and right.is_finite()):  # it overlaps everything, nan as well
-            raise PrecisionLost(f"of a number nothing is known with {self.bits} bits any more: ask for more bits")
+        if not (left.is_finite() and right.is_finite()):  # infinite balls and nan overlap everything
+            raise PrecisionLost(f"a ball with {self.bits} bits has become infinite: use more bits")
         return bool(left.overlaps(right))
 
     def working(self) -> AbstractContextManager[Any]:

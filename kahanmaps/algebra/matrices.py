@@ -218,7 +218,7 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
             if hasattr(rows[best][column], "abs_lower"):  # for balls choose the one farthest from zero
                 best = max(others, key=lambda k: rows[k][column].abs_lower())
                 if rows[best][column].contains(0):
-                    raise PrecisionLost("the rank cannot be decided with balls this wide: ask for more bits")
+                    raise PrecisionLost("the rank cannot be decided with balls this wide: use more bits")
             rows[top], rows[best] = rows[best], rows[top]
             lead = rows[top][column]
             rows[top] = [entry / lead for entry in rows[top]]
