@@ -23,24 +23,24 @@ def true_size(polynomial: fmpq_mpoly) -> tuple[int, float]:
 
 def primitive(polynomial: fmpq_mpoly) -> fmpq_mpoly:
     """The multiple with coprime integer coefficients."""
-    below, content = 1, 0
+    denominator, content = 1, 0
     for _, coefficient in polynomial.terms():
-        below = math.lcm(below, int(coefficient.q))
+        denominator = math.lcm(denominator, int(coefficient.q))
     for _, coefficient in polynomial.terms():
-        content = math.gcd(content, int(coefficient.p) * (below // int(coefficient.q)))
-    return polynomial * fmpq(below, content or 1)
+        content = math.gcd(content, int(coefficient.p) * (denominator // int(coefficient.q)))
+    return polynomial * fmpq(denominator, content or 1)
 
 
 def lowest(function):
     """Numerator and denominator in lowest terms, coefficients coprime integers."""
-    common = function.above.gcd(function.below)
-    return primitive(function.above / common), primitive(function.below / common)
+    common = function.numerator.gcd(function.denominator)
+    return primitive(function.numerator / common), primitive(function.denominator / common)
 
 
 def covers(bound, function):
     """Whether the bound of a rational function is one: degrees of numerator and denominator in lowest terms."""
-    above, below = lowest(function)
-    return true_size(above)[0] <= bound.above.degree and true_size(below)[0] <= bound.pole_degree
+    numerator, denominator = lowest(function)
+    return true_size(numerator)[0] <= bound.numerator.degree and true_size(denominator)[0] <= bound.pole_degree
 
 
 def covers_polynomial(size: CoefficientSize, polynomial: fmpq_mpoly) -> bool:
@@ -64,8 +64,8 @@ def polynomials(draw):
 
 
 def numerator(element):
-    assert element.below == 1
-    return element.above
+    assert element.denominator == 1
+    return element.numerator
 
 
 def written(identity):
@@ -82,7 +82,7 @@ def written(identity):
 def differences(identity):
     """Numerator and denominator, in lowest terms, of the difference of the sides in each entry that differs."""
     found = (left - right for left, right in written(identity))
-    return [lowest(difference) for difference in found if not difference.above.is_zero()]
+    return [lowest(difference) for difference in found if not difference.numerator.is_zero()]
 
 
 def check(identity, *, differs=False):
@@ -94,8 +94,8 @@ def check(identity, *, differs=False):
     equation, poles = identity.bound
     found = differences(identity)
     assert bool(found) or not differs
-    for above, below in found:
-        assert true_size(above)[0] <= equation.degree
-        assert true_size(above)[1] <= equation.bits + equation.degree
-        assert sum(true_size(factor)[0] for factor, _ in below.factor_squarefree()[1]) <= poles
+    for numerator, denominator in found:
+        assert true_size(numerator)[0] <= equation.degree
+        assert true_size(numerator)[1] <= equation.bits + equation.degree
+        assert sum(true_size(factor)[0] for factor, _ in denominator.factor_squarefree()[1]) <= poles
     return equation, poles

@@ -92,7 +92,10 @@ NO_NUMBERS = [
     (np.True_, "found True, expected a number"),
     (np.array([3]), r"found array\(\[3\]\) of numpy, expected one exact number"),
     (np.timedelta64(3, "s"), "of numpy, expected one exact number"),
-    *((value, "found the machine number 3.*expected an exact one") for value in (3.0, np.float32(3), np.array(3.0))),
+    *(
+        (value, "found the floating-point number 3.*expected an exact one")
+        for value in (3.0, np.float32(3), np.array(3.0))
+    ),
 ]
 EXACT = {
     "rational numbers": lambda value: km.QQ.convert(value),
@@ -246,7 +249,7 @@ REFUSED = [
     ('km.orbit("euler_top", [1, 2, 3], "1/10")', "expected a number of steps"),
     ('km.orbit(FISH, [1, 2], "1/10", at=3)', r"found at = 3, expected a sequence of steps, at=\[3\]"),
     ('km.orbit(FISH, None, "1/5", 2)', "found the start None"),
-    ('km.orbit(FISH, [0.5, 1], "1/5", 2)', "found the machine number"),
+    ('km.orbit(FISH, [0.5, 1], "1/5", 2)', "found the floating-point number"),
     ('km.orbit(FISH, [float("nan"), 0.0], "1/5", 3, arithmetic="float")', "expected finite numbers"),
     ('km.orbit(FISH, [1, 2], "1/5", 2, arithmetic=complex)', "expected exact, float"),
     ('km.orbit(FISH, [1, 2], "1/5", 2, arithmetic=DualField(km.QQ))', r"found the arithmetic DualField\(QQ\)"),
@@ -299,5 +302,5 @@ def test_floats_are_refused_inside_of_formulas(given):
         lambda: km.System({x: y, y: given * x**2}),
         lambda: km.check_integrals("weierstrass", given * x),
     ):
-        with pytest.raises(InexactNumber, match=r"found the machine number 0\.5"):
+        with pytest.raises(InexactNumber, match=r"found the floating-point number 0\.5"):
             make()

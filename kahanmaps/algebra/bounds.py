@@ -1,10 +1,10 @@
-"""Bounds for degrees and coefficients, as a field: whatever is computed with field operations bounds itself.
+"""Bounds for degrees and coefficients as a field: a computation with field operations over it bounds its own result.
 
-An element stands for a rational function N / (s D_1^k_1 D_2^k_2 ...): N a polynomial with integer coefficients of which
-the `Size` is kept, s a positive integer, D_1, D_2, ... what was divided by on the way, with their sizes. Sums are taken
-over a common denominator. A matrix has one bound for all its entries, and a linear system is solved by Cramer's rule.
-Run over this field, a claim tells the degree and the coefficients of the polynomial equation that it amounts to
-(`bound_of`).
+An element represents a rational function N / (s D_1^k_1 D_2^k_2 ...). N is a polynomial with integer coefficients, of
+which only the `CoefficientSize` is stored; s is a positive integer; D_1, D_2, ... are the divisors of the computation,
+with their sizes. Sums are taken over a common denominator. A matrix has one bound for all its entries, and a linear
+system is solved by Cramer's rule. Evaluating a claim over this field gives bounds for the degree and the coefficients
+of the polynomial equation that is equivalent to it (`bound_of`).
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from kahanmaps.errors import InputError
 
 @dataclass(frozen=True)
 class CoefficientSize:
-    """A bound on an integer polynomial: total degree, and log2 of the sum of the absolute coefficients.
+    """A bound on an integer polynomial: total degree, and log2 of the sum of the absolute values of its coefficients.
 
-    That sum is submultiplicative and subadditive, so that bounds follow a computation step by step.
+    This sum is submultiplicative and subadditive, so that bounds can be computed operation by operation.
 
     >>> CoefficientSize(2, 1.0) * CoefficientSize(3, 0.5)
     CoefficientSize(degree=5, bits=1.5)
@@ -48,7 +48,7 @@ class CoefficientSize:
         return CoefficientSize(self.degree * exponent, self.bits * exponent)
 
     def __or__(self, other: CoefficientSize) -> CoefficientSize:
-        """A bound for either polynomial."""
+        """Return a bound that holds for both polynomials."""
         return CoefficientSize(max(self.degree, other.degree), max(self.bits, other.bits))
 
 
@@ -56,16 +56,16 @@ ONE = CoefficientSize(0, 0.0)
 
 
 def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[CoefficientSize, int]:
-    """What pairs of elements, or of matrices, amount to that are to be equal, all computed over `field`.
+    """Bound the polynomial equations equivalent to equality of pairs of elements, or matrices, over `field`.
 
     Returns:
-        A bound for each of the polynomials that vanish where the pairs are equal, and the degree of the product of all
-        that must not be zero for them to have values: of what was divided by, and of what was compared with zero.
+        A bound for each polynomial that vanishes if the pairs are equal, and the degree of the product of everything
+        that must not be zero: of the divisors, and of the elements compared with zero.
     """
     equation = ONE
     for pair in pairs:
         left, right = (side.entry if isinstance(side, BoundMatrix) else field.convert(side) for side in pair)
-        equation = equation | (left - right).above
+        equation = equation | (left - right).numerator
     return equation, field.pole_degree
 
 
@@ -88,11 +88,11 @@ class BoundField(Field):
         return Bound(self, ONE, 1, {})
 
     def variable(self) -> Bound:
-        """A variable."""
+        """Return the bound of a variable."""
         return Bound(self, CoefficientSize(1, 0.0), 1, {})
 
     def polynomial(self, degree: int, bits: float) -> Bound:
-        """A polynomial with integer coefficients of this degree, the sum of their absolute values below 2^bits."""
+        """Return the bound of an integer polynomial with this degree and this log2 of the sum of |coefficients|."""
         return Bound(self, CoefficientSize(degree, bits), 1, {})
 
     @property
@@ -101,21 +101,21 @@ class BoundField(Field):
         return sum(size.degree for size in self._denominators)
 
     def denominator(self, of: Any, size: CoefficientSize) -> int:
-        """The number of the denominator that belongs to the object `of`; one object has one denominator.
+        """Return the index of the denominator that belongs to the object `of`; the same object has the same index.
 
-        Not so the common bound of the entries of a matrix, which stands for another one each time.
+        The common bound of the entries of a matrix gets a new index each time, since it represents different entries.
         """
         if isinstance(of, Bound) and of.is_common:
             self._denominators.append(size)
             return len(self._denominators) - 1
         known = self._number_of.get(id(of))
         if known is None:
-            known = self._number_of[id(of)] = (of, len(self._denominators))  # `of` is kept, so its id stays its own
+            known = self._number_of[id(of)] = (of, len(self._denominators))  # storing `of` keeps its id unique
             self._denominators.append(size)
         return known[1]
 
     def product(self, powers: Mapping[int, int]) -> CoefficientSize:
-        """The size of a product of denominators."""
+        """Return the size of a product of denominators."""
         total = ONE
         for number, power in powers.items():
             total = total * self._denominators[number] ** power
@@ -124,36 +124,36 @@ class BoundField(Field):
     def convert(self, value: Any) -> Bound:
         if isinstance(value, Bound):
             if value.field is not self:
-                raise InputError("found a bound of another field of bounds, whose denominators have other numbers")
+                raise InputError("found an element of another field of bounds, expected one of this field")
             return value
         number = rational(value)
         return Bound(self, CoefficientSize(0, log2(number.p)), int(number.q), {})
 
     def convert_matrix(self, matrix: fmpq_mat) -> BoundMatrix:
-        above, below = matrix.numer_denom()
-        largest = max((abs(entry) for entry in above.entries()), default=fmpz(0))
+        numerator, denominator = matrix.numer_denom()
+        largest = max((abs(entry) for entry in numerator.entries()), default=fmpz(0))
         return BoundMatrix(
-            self, matrix.nrows(), matrix.ncols(), Bound(self, CoefficientSize(0, log2(largest)), int(below), {})
+            self, matrix.nrows(), matrix.ncols(), Bound(self, CoefficientSize(0, log2(largest)), int(denominator), {})
         )
 
     def random(self, rng: random.Random, height: int = 10) -> Bound:
         return self.variable()
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> BoundMatrix:
-        """The matrix with the common bound of these entries."""
-        # Entries are mostly one object many times over.
+        """Return the matrix with a common bound of these entries."""
+        # Most entries are the same object, so remove duplicates first.
         elements = [self.convert(entry) for entry in {id(entry): entry for entry in entries}.values()]
-        scale, below = 1, dict[int, int]()
+        scale, denominator = 1, dict[int, int]()
         for element in elements:
-            scale, below = math.lcm(scale, element.scale), _larger(below, element.below)
-        above = ONE
+            scale, denominator = math.lcm(scale, element.scale), _lcm(denominator, element.denominator)
+        numerator = ONE
         for element in elements:
-            above = above | element.over(scale, below)
-        return BoundMatrix(self, rows, columns, Bound(self, above, scale, below))
+            numerator = numerator | element.over(scale, denominator)
+        return BoundMatrix(self, rows, columns, Bound(self, numerator, scale, denominator))
 
     def is_zero(self, element: Any) -> bool:
-        """False: what is compared with zero is taken to be something else, and counts among the denominators."""
-        self.denominator(element, element.above)
+        """Return False: an element compared with zero is assumed to be nonzero, and counts as a denominator."""
+        self.denominator(element, element.numerator)
         return False
 
     def equal(self, left: Any, right: Any) -> bool:
@@ -163,49 +163,51 @@ class BoundField(Field):
 class Bound(Element):
     """The bound of one rational function, or (`is_common`) of each entry of a matrix."""
 
-    __slots__ = ("above", "below", "is_common", "scale")
+    __slots__ = ("denominator", "is_common", "numerator", "scale")
 
     field: BoundField
 
-    def __init__(self, field: BoundField, above: CoefficientSize, scale: int, below: Mapping[int, int]) -> None:
+    def __init__(
+        self, field: BoundField, numerator: CoefficientSize, scale: int, denominator: Mapping[int, int]
+    ) -> None:
         self.field = field
-        self.above = above
+        self.numerator = numerator
         self.scale = scale
-        self.below = dict(below)
+        self.denominator = dict(denominator)
         self.is_common = False
 
-    def over(self, scale: int, below: Mapping[int, int]) -> CoefficientSize:
-        """The numerator over a larger denominator."""
-        missing = {number: power - self.below.get(number, 0) for number, power in below.items()}
-        return self.above * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
+    def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
+        """Return the size of the numerator over a larger denominator."""
+        missing = {number: power - self.denominator.get(number, 0) for number, power in denominator.items()}
+        return self.numerator * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
 
     @property
     def pole_degree(self) -> int:
         """The degree of the denominator."""
-        return int(self.field.product(self.below).degree)
+        return int(self.field.product(self.denominator).degree)
 
     def _plus(self, other: Bound) -> Bound:
-        scale, below = math.lcm(self.scale, other.scale), _larger(self.below, other.below)
-        return Bound(self.field, self.over(scale, below) + other.over(scale, below), scale, below)
+        scale, denominator = math.lcm(self.scale, other.scale), _lcm(self.denominator, other.denominator)
+        return Bound(self.field, self.over(scale, denominator) + other.over(scale, denominator), scale, denominator)
 
     def __neg__(self) -> Bound:
         return self
 
     def _times(self, other: Bound) -> Bound:
-        below = _together(self.below, other.below)
-        return Bound(self.field, self.above * other.above, self.scale * other.scale, below)
+        denominator = _product(self.denominator, other.denominator)
+        return Bound(self.field, self.numerator * other.numerator, self.scale * other.scale, denominator)
 
     def _over(self, other: Bound) -> Bound:
-        number = self.field.denominator(other, other.above)
-        above = self.above * self.field.product(other.below) * CoefficientSize(0, log2(other.scale))
-        return Bound(self.field, above, self.scale, _together(self.below, {number: 1}))
+        number = self.field.denominator(other, other.numerator)
+        numerator = self.numerator * self.field.product(other.denominator) * CoefficientSize(0, log2(other.scale))
+        return Bound(self.field, numerator, self.scale, _product(self.denominator, {number: 1}))
 
     def _same(self, other: Bound) -> bool:
         return self is other
 
 
 class BoundMatrix:
-    """A matrix of which a common bound for all entries is known."""
+    """A matrix, represented by a common bound of all its entries."""
 
     def __init__(self, field: BoundField, rows: int, columns: int, entry: Bound) -> None:
         self.field = field
@@ -230,7 +232,7 @@ class BoundMatrix:
 
     def __add__(self, other: BoundMatrix) -> BoundMatrix:
         if (self._rows, self._columns) != (other._rows, other._columns):
-            raise InputError("matrices of different sizes are added")
+            raise InputError("found matrices of different sizes in a sum, expected equal sizes")
         return BoundMatrix(self.field, self._rows, self._columns, self.entry + other.entry)
 
     def __sub__(self, other: BoundMatrix) -> BoundMatrix:
@@ -243,31 +245,31 @@ class BoundMatrix:
         if not isinstance(other, BoundMatrix):
             return BoundMatrix(self.field, self._rows, self._columns, self.entry * self.field.convert(other))
         if self._columns != other._rows:
-            raise InputError("matrices whose sizes do not fit are multiplied")
+            raise InputError("found matrices of incompatible sizes in a product")
         product = self.entry * other.entry
-        product.above *= CoefficientSize(0, log2(self._columns))
+        product.numerator *= CoefficientSize(0, log2(self._columns))
         return BoundMatrix(self.field, self._rows, other._columns, product)
 
     def det(self) -> Bound:
-        """The determinant: n! products of n entries."""
+        """Bound the determinant: n! products of n entries."""
         n, entry = self._rows, self.entry
-        below = {number: n * power for number, power in entry.below.items()}
-        return Bound(self.field, self._minor(n), entry.scale**n, below)
+        denominator = {number: n * power for number, power in entry.denominator.items()}
+        return Bound(self.field, self._minor(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
-        """Cramer's rule: with entries N/d the solution is d adj(N) right / det N."""
+        """Bound the solution by Cramer's rule: with entries N/d it is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
         number = self.field.denominator(self, self._minor(n))
-        d = self.field.product(entry.below) * CoefficientSize(0, log2(entry.scale))
+        d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))
         inverse = Bound(self.field, self._minor(n - 1) * CoefficientSize(0, log2(n)) * d, 1, {number: 1})
         return BoundMatrix(self.field, n, right._columns, inverse * right.entry)
 
     def _minor(self, size: int) -> CoefficientSize:
-        return self.entry.above**size * CoefficientSize(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
+        return self.entry.numerator**size * CoefficientSize(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
 
 
 def log2(value: fmpz | int) -> float:
-    """log2 of the absolute value of an integer, rounded up a little; 0 for 0.
+    """Return log2 of the absolute value of an integer, rounded up; 0 for 0.
 
     >>> log2(-8) < 3.001, log2(0)
     (True, 0.0)
@@ -279,11 +281,11 @@ def log2(value: fmpz | int) -> float:
     return math.log2((number >> shift) + (1 if shift else 0)) + shift + 1e-9
 
 
-def _larger(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """The least common multiple of two products of denominators."""
+def _lcm(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
+    """Return the least common multiple of two products of denominators."""
     return {number: max(left.get(number, 0), right.get(number, 0)) for number in {*left, *right}}
 
 
-def _together(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """The product of two products of denominators."""
+def _product(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
+    """Return the product of two products of denominators."""
     return {number: left.get(number, 0) + right.get(number, 0) for number in {*left, *right}}

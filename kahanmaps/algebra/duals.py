@@ -1,8 +1,8 @@
-"""Dual numbers K[d]/(d^2) over any field K: the exact derivative of whatever is computed with field operations.
+"""Dual numbers K[d]/(d^2) over any field K: exact derivatives of computations with field operations.
 
-A function of x + d v has the value f(x) + d f'(x) v, so its slope is the derivative at x along v. K may be a ring of
-dual numbers itself; f((x + v d) + (w + 0 d) e) then carries the second derivative as the slope of its slope. Matrices
-are M0 + d M1 with two matrices over K, FLINT's own where K has them, so that products and solutions stay FLINT's.
+f(x + d v) = f(x) + d f'(x) v, so the slope is the derivative at x in direction v. K may be a ring of dual numbers
+itself: the slope of the slope of f((x + v d) + (w + 0 d) e) is then the second derivative. Matrices are M0 + d M1 with
+two matrices over K, so that products and linear systems are computed by FLINT if K has FLINT matrices.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from kahanmaps.errors import InputError, PrecisionLost, SingularMatrix
 class DualField(Field):
     """The dual numbers over `base`. Elements are `Dual`, matrices `DualMatrix`.
 
-    It has the protocol of a field, but is none: an element divides only where its value does, and one with
-    value 0 need not be zero. `convert` takes what `base` takes, as a constant.
+    It implements the protocol of a field, but is not a field: an element is invertible only if its value is, and an
+    element with value 0 need not be zero. `convert` accepts what `base` accepts, and returns constants.
 
     >>> from kahanmaps.algebra.fields import QQ
     >>> x = DualField(QQ).dual(3, 1)
@@ -35,7 +35,7 @@ class DualField(Field):
         self.exact = base.exact
 
     def dual(self, value: Any, slope: Any) -> Dual:
-        """The element value + d slope."""
+        """Return the element value + d slope."""
         return Dual(self, self.base.convert(value), self.base.convert(slope))
 
     @property
@@ -52,7 +52,7 @@ class DualField(Field):
         return Dual(self, self.base.convert(value), self.base.zero)
 
     def format(self, element: Dual) -> str:
-        """`value + d*(slope)`, each as `base` writes it."""
+        """Return `value + d*(slope)`, both in the format of `base`."""
         return f"{self.base.format(element.value)} + d*({self.base.format(element.slope)})"
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> DualMatrix:
@@ -64,7 +64,7 @@ class DualField(Field):
         )
 
     def lift_matrix(self, matrix: Any) -> DualMatrix:
-        """A matrix over `base` as a constant matrix."""
+        """Return a matrix over `base` as a constant matrix."""
         rows, columns = matrix.nrows(), matrix.ncols()
         return DualMatrix(self, matrix, self.base.matrix(rows, columns, [self.base.zero] * (rows * columns)))
 
@@ -107,7 +107,7 @@ class Dual(Element):
         return Dual(self.field, self.value * other.value, self.value * other.slope + self.slope * other.value)
 
     def _over(self, other: Dual) -> Dual:
-        if self.field.base.is_zero(other.value):  # asked, since FLINT's balls divide by zero without a word
+        if self.field.base.is_zero(other.value):  # FLINT's balls divide by zero without an error
             raise ZeroDivisionError("division by a dual number with value 0")
         value = self.value / other.value
         return Dual(self.field, value, (self.slope - value * other.slope) / other.value)
@@ -174,9 +174,9 @@ class DualMatrix:
         return self.__mul__(other)
 
     def det(self) -> Dual:
-        """The determinant: det M0 (1 + d tr(M0^{-1} M1)), or column by column where M0 has no inverse."""
+        """Compute det M0 (1 + d tr(M0^{-1} M1)), or the slope column by column if M0 has no inverse."""
         value = self.value.det()
-        if isinstance(self.value, EntryMatrix):  # where a division costs more than another determinant
+        if isinstance(self.value, EntryMatrix):  # there a linear system is slower than further determinants
             return Dual(self.field, value, self._slope_of_det())
         try:
             ratio = solve(self.value, self.slope)
@@ -185,7 +185,7 @@ class DualMatrix:
         return Dual(self.field, value, value * trace(ratio))
 
     def _slope_of_det(self) -> Any:
-        """The sum over all columns of det M0 with that column taken from M1; right for every M0."""
+        """Return the sum over all columns of det M0 with this column replaced by that of M1; valid for every M0."""
         n, total = self.nrows(), self.field.base.zero
         value, slope = self.value.entries(), self.slope.entries()
         for k in range(n):
@@ -194,7 +194,7 @@ class DualMatrix:
         return total
 
     def solve(self, right: DualMatrix) -> DualMatrix:
-        """The solution X of self X = right. Raises SingularMatrix (a ZeroDivisionError) where M0 has no inverse."""
+        """Solve self X = right. Raises SingularMatrix (a ZeroDivisionError) if M0 has no inverse."""
         self._require_same_field(right)
         value = solve(self.value, right.value)
         return DualMatrix(self.field, value, solve(self.value, right.slope - self.slope * value))

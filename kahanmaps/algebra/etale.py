@@ -1,8 +1,8 @@
-"""The algebra Q[t]/chi for a squarefree chi: all roots of chi at once, without a field that contains them.
+"""The algebra Q[t]/chi for a squarefree chi: computation with all roots of chi at once, without a splitting field.
 
-An identity that holds for the class of t holds for every root of chi in any field, and conversely. The algebra is a
-product of fields, one for each irreducible factor of chi; an element that vanishes in some of them and not in others is
-a zero divisor, and neither zero nor invertible.
+An identity holds for the class of t if and only if it holds for every root of chi in any field. The algebra is a
+product of fields, one for each irreducible factor of chi; an element that vanishes in some but not all of them is a
+zero divisor, neither zero nor invertible.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from kahanmaps.algebra.matrices import EntryMatrix, trace
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
-# Bits of coefficients from which on a quotient is a linear system rather than Euclid's algorithm, and those from which
-# on products are made here.
+# For longer coefficients (in bits) a quotient uses a linear system instead of Euclid's algorithm, and a product uses
+# `_product` instead of FLINT, if there are few coefficients.
 _LONG, _LONG_PRODUCT = 2000, 8000
-_FEW = 6  # coefficients up to which these are faster than FLINT's
+_MAX_COEFFICIENTS = 6
 
 
 class EtaleAlgebra(Field):
     """Q[t]/chi for a monic squarefree `chi`. Elements are `EtaleElement`, matrices `EtaleMatrix`.
 
-    It has the protocol of a field, but is one only for irreducible chi.
+    It implements the protocol of a field, but is a field only for irreducible chi.
 
     >>> K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
     >>> t = K.generator
@@ -62,7 +62,7 @@ class EtaleAlgebra(Field):
         return self.convert(fmpq_poly([0, 1]))
 
     def convert(self, value: Any) -> EtaleElement:
-        """The element that an exact number, a polynomial in t or an element stands for."""
+        """Convert an exact number, a polynomial in t or an element to an element."""
         if isinstance(value, EtaleElement):
             if value.field == self:
                 return value
@@ -81,14 +81,14 @@ class EtaleAlgebra(Field):
         return bool(element.polynomial.is_zero())
 
     def trace(self, element: EtaleElement) -> fmpq:
-        """The sum of the element's values at the roots of chi."""
+        """Return the sum of the values of the element at the roots of chi."""
         total = fmpq(0)
         for coefficient, power_sum in zip(element.polynomial.coeffs(), self._power_sums, strict=False):
             total += coefficient * power_sum
         return total
 
     def norm(self, element: EtaleElement) -> fmpq:
-        """The product of the element's values at the roots of chi."""
+        """Return the product of the values of the element at the roots of chi."""
         return self.chi.resultant(element.polynomial)
 
     @cached_property
@@ -134,9 +134,9 @@ class EtaleElement(Element):
 
     def _times(self, other: EtaleElement) -> EtaleElement:
         first, second = self.polynomial, other.polynomial
-        # One coefficient tells how long the others are, but for rare ones: then the product takes a little longer.
+        # Check the length of one coefficient only: in the rare case that others differ, the product is a bit slower.
         is_long = first[0].p.bit_length() > _LONG_PRODUCT and second[0].p.bit_length() > _LONG_PRODUCT
-        product = _product(first, second) if is_long and self.field.degree <= _FEW else first * second
+        product = _product(first, second) if is_long and self.field.degree <= _MAX_COEFFICIENTS else first * second
         return EtaleElement(self.field, product % self.field.chi)
 
     def _over(self, other: EtaleElement) -> EtaleElement:
@@ -158,13 +158,13 @@ class EtaleElement(Element):
 
 
 def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
-    """The product of polynomials with few long coefficients.
+    """Multiply polynomials with few long coefficients.
 
-    FLINT multiplies each of few coefficients by each; with
+    FLINT multiplies each coefficient by each other one, two products for each pair; with
 
         a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j
 
-    it is one product for each pair.
+    one product for each pair suffices (Karatsuba).
     """
     count = max(first.length(), second.length())
     a, b = ([numerator[k] for k in range(count)] for numerator in (first.numer(), second.numer()))
@@ -181,7 +181,7 @@ class EtaleMatrix(EntryMatrix):
     """A matrix over an `EtaleAlgebra`. No elimination: a pivot that is not zero may be a zero divisor."""
 
     def det(self) -> EtaleElement:
-        """The determinant, by Faddeev and LeVerrier's recursion, which divides by integers only."""
+        """Compute the determinant by the Faddeev-LeVerrier recursion, which divides by integers only."""
         n = self._rows
         if n != self._columns:
             raise ValueError("matrix must be square")
@@ -196,9 +196,9 @@ class EtaleMatrix(EntryMatrix):
         return coefficient if n % 2 else -coefficient
 
     def solve(self, right: EtaleMatrix) -> EtaleMatrix:
-        """The solution X of self X = right: FLINT solves the linear system over Q that this is.
+        """Solve self X = right as a linear system over Q.
 
-        Raises ZeroDivisionError where the determinant is not a unit.
+        Raises ZeroDivisionError if the determinant is not a unit.
         """
         if self._rows != self._columns or self._rows != right._rows:
             raise ValueError("matrix must be square, and the right side of the same height")
@@ -208,9 +208,9 @@ class EtaleMatrix(EntryMatrix):
             blocks = [entry.matrix.tolist() for entry in row]
             big += [number for k in range(degree) for block in blocks for number in block[k]]
         sides = [entry.polynomial[k] for row in right.tolist() for k in range(degree) for entry in row]
-        found = fmpq_mat(size, size, big).solve(fmpq_mat(size, columns, sides))
+        coefficients = fmpq_mat(size, size, big).solve(fmpq_mat(size, columns, sides))
         solution = [
-            EtaleElement(self.field, fmpq_poly([found[i * degree + k, j] for k in range(degree)]))
+            EtaleElement(self.field, fmpq_poly([coefficients[i * degree + k, j] for k in range(degree)]))
             for i in range(self._rows)
             for j in range(columns)
         ]

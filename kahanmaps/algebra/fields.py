@@ -1,10 +1,10 @@
 """The fields of numbers: the rationals QQ, the prime fields GF(p), real balls RR(bits) and complex balls CC(bits).
 
-One protocol, `Field`, serves them and those of the files beside this one (duals.py, etale.py, functions.py, bounds.py),
-so that the Kahan map is written once. Elements are here FLINT's own numbers (`fmpq`, `nmod` for p < 2^63, `fmpz_mod`
-for larger p, `arb`, `acb`) and use the ordinary operators; what FLINT does not do under one name stands here. `convert`
-is the door to exactness: text, integers and fractions come in, machine floats do not. `Element` gives the operators to
-elements that FLINT does not have.
+They and the fields in duals.py, etale.py, functions.py and bounds.py implement one protocol, `Field`, so that the Kahan
+map is written once for all of them. Elements of the fields here are FLINT's own numbers with the ordinary operators
+(`fmpq`, `nmod` for p < 2^63, `fmpz_mod` for larger p, `arb`, `acb`); the methods of a field are the operations for
+which FLINT has no common name. `convert` accepts exact numbers only: text, integers and fractions, not floats.
+`Element` is the base class of elements that are not FLINT's.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from kahanmaps.algebra.parsing import parse_number
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 
-# FLINT proves primality of 512 bits in about 0.1 s; the cost grows steeply beyond.
+# FLINT proves primality of 512 bits in about 0.1 s; for more bits the cost grows steeply.
 MAX_PRIME_BITS = 512
 MAX_BALL_BITS = 1_000_000
 
 
 def rational(value: Any) -> fmpq:
-    """The exact rational number that `value` stands for.
+    """Convert a value to an exact rational number.
 
-    Accepts int, Fraction, text (`"1/3"`, `"0.1"`), fmpz and fmpq, and all that Python's `numbers` calls rational:
-    numbers of SymPy, integers of numpy. Raises `InexactNumber` for floats, whose decimal look is not their value.
+    Accepts int, Fraction, text (`"1/3"`, `"0.1"`), fmpz and fmpq, and every `numbers.Rational`: also numbers of SymPy
+    and integers of numpy. Raises `InexactNumber` for floats, whose value differs from the decimal that is printed.
 
     >>> rational("0.1")
     1/10
     >>> rational(0.1)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    kahanmaps.errors.InexactNumber: found the machine number 0.1, expected an exact one: write an integer, ...
+    kahanmaps.errors.InexactNumber: found the floating-point number 0.1, expected an exact one: write an integer, ...
     """
     if isinstance(value, fmpq):
         return value
@@ -59,20 +59,20 @@ def rational(value: Any) -> fmpq:
     if isinstance(value, Rational):
         return fmpq(int(value.numerator), int(value.denominator))
     if isinstance(value, float | complex) or kind:
-        example = str(value)  # unless it spells no number, as nan, inf and 1j
+        example = str(value)  # not for nan, inf and 1j, which are no exact numbers
         try:
             parse_number(example)
         except InputError:
             example = "1/10"
         raise InexactNumber(
-            f"found the machine number {value!s}, expected an exact one: "
+            f"found the floating-point number {value!s}, expected an exact one: "
             f'write an integer, p/q or a decimal as text, e.g. "{example}"'
         )
     raise InputError(f"found {value!r} of type {type(value).__name__}, expected an exact number")
 
 
 def integer(value: Any, name: str) -> int:
-    """An integer of Python, FLINT, numpy or SymPy as an int; `name` says in the message of InputError what it is.
+    """Convert an integer of Python, FLINT, numpy or SymPy to int; `name` is its name in the message of InputError.
 
     >>> integer(7, "m")
     7
@@ -90,7 +90,7 @@ def integer(value: Any, name: str) -> int:
 
 
 def _numpy_kind(value: Any) -> str:
-    """The kind of a number of numpy: b, i, u, f, c, O or another; "array" of an array, nothing of anything else."""
+    """Return the kind of a numpy scalar (b, i, u, f, c, O, ...), "array" for an array, "" for other objects."""
     if not hasattr(value, "dtype") or not hasattr(value, "ndim"):
         return ""
     return str(value.dtype.kind) if value.ndim == 0 else "array"
@@ -115,34 +115,34 @@ class Field(ABC):
 
     @abstractmethod
     def convert(self, value: Any) -> Any:
-        """The element that an exact number (int, Fraction, text, fmpz, fmpq) or an element stands for."""
+        """Convert an exact number (int, Fraction, text, fmpz, fmpq), or an element, to an element."""
 
     def format(self, element: Any) -> str:
-        """The element as text; `convert` reads that of an exact number back."""
+        """Return the element as text, which `convert` accepts for exact fields."""
         return str(element)
 
     def random(self, rng: random.Random, height: int = 10) -> Any:
-        """A random rational number, `height` bounding numerator and denominator; of residues any one."""
+        """Return a random element: a rational number of this height, or any residue."""
         return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
     def value(self, polynomial: Any, point: Sequence[Any]) -> Any:
-        """The value of a polynomial at a point, where the field has a way of its own; None elsewhere."""
+        """Evaluate a polynomial if the field has its own method; None otherwise (see `polynomials.evaluate`)."""
         return None
 
     @abstractmethod
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
-        """The matrix over this field from its entries, row by row: FLINT's, or an `EntryMatrix`."""
+        """Return the matrix over this field with these entries, row by row: FLINT's type, or an `EntryMatrix`."""
 
     def column(self, entries: Sequence[Any]) -> Any:
-        """The entries as a matrix of one column."""
+        """Return the entries as a matrix with one column."""
         return self.matrix(len(entries), 1, entries)
 
     def identity(self, size: int) -> Any:
-        """The identity matrix."""
+        """Return the identity matrix."""
         return self.matrix(size, size, [self.one if i == j else self.zero for i in range(size) for j in range(size)])
 
     def convert_matrix(self, matrix: fmpq_mat) -> Any:
-        """A matrix of rationals carried into this field."""
+        """Convert a matrix of rational numbers to this field."""
         return self.matrix(matrix.nrows(), matrix.ncols(), [self.convert(entry) for entry in matrix.entries()])
 
     def is_zero(self, element: Any) -> bool:
@@ -150,11 +150,11 @@ class Field(ABC):
         return bool(element == 0)
 
     def equal(self, left: Any, right: Any) -> bool:
-        """Whether two elements are equal (for balls: whether they may be, that is, overlap)."""
+        """Whether two elements are equal (for balls: whether they overlap, so that they may be equal)."""
         return bool(left == right)
 
     def working(self) -> AbstractContextManager[Any]:
-        """The context in which this field's arithmetic has to run (balls: the precision)."""
+        """Return the context in which the arithmetic of this field has to run (for balls: the precision)."""
         return nullcontext()
 
     def __repr__(self) -> str:
@@ -162,7 +162,7 @@ class Field(ABC):
 
 
 def operand(field: Field, value: Any) -> Any:
-    """The element of `field` that one side of an operator stands for, or None if it is not one: text, a matrix, ...
+    """Convert an operand of an operator to an element of `field`, or return None (for text, matrices and the like).
 
     Raises `InexactNumber` and `BadPrime` as `convert` does.
     """
@@ -177,9 +177,9 @@ def operand(field: Field, value: Any) -> Any:
 
 
 class Element(ABC):
-    """An element of a field that FLINT does not have: all operators, from sum, product and quotient.
+    """An element of a field that FLINT does not have: defines all operators from sum, product and quotient.
 
-    The other side of an operator may be any number or element that `field.convert` takes, but not text.
+    The other operand may be any number or element that `field.convert` accepts, but not text.
     """
 
     __slots__ = ("field",)
@@ -188,15 +188,15 @@ class Element(ABC):
 
     @abstractmethod
     def _plus(self, other: Self) -> Self:
-        """The sum of two elements of one field."""
+        """Return the sum of two elements of one field."""
 
     @abstractmethod
     def _times(self, other: Self) -> Self:
-        """The product of two elements of one field."""
+        """Return the product of two elements of one field."""
 
     @abstractmethod
     def _over(self, other: Self) -> Self:
-        """The quotient of two elements of one field. Raises ZeroDivisionError."""
+        """Return the quotient of two elements of one field. Raises ZeroDivisionError."""
 
     @abstractmethod
     def _same(self, other: Self) -> bool:
@@ -206,13 +206,15 @@ class Element(ABC):
     def __neg__(self) -> Self: ...
 
     def _pair(self, other: Any) -> tuple[Self, Self] | None:
-        """Both sides of an operator as elements of one field, that of either side; None if there is none."""
+        """Convert both operands to the field of one of them; None if that is impossible."""
         if isinstance(other, type(self)) and other.field is self.field:
             return self, other
         right = operand(self.field, other)
         if right is not None:
             return self, right
-        left = operand(other.field, self) if isinstance(other, type(self)) else None  # Python asks only one of a kind
+        left = (
+            operand(other.field, self) if isinstance(other, type(self)) else None
+        )  # Python calls no reflected method for equal types
         return None if left is None else (left, other)
 
     def __add__(self, other: Any) -> Self:
@@ -265,7 +267,7 @@ class Element(ABC):
             return NotImplemented
         return NotImplemented if pair is None else pair[0]._same(pair[1])
 
-    __hash__ = None  # type: ignore[assignment]  # elements are equal to numbers, whose hashes they do not know
+    __hash__ = None  # type: ignore[assignment]  # elements may equal numbers, which have other hashes
 
     def __repr__(self) -> str:
         text: str = self.field.format(self)
@@ -282,7 +284,7 @@ class RationalField(Field):
     name = "QQ"
 
     def __reduce__(self) -> str:
-        return "QQ"  # the one field that is asked for by `is`
+        return "QQ"  # unpickles to the same object, since code tests `field is QQ`
 
     characteristic = 0
 
@@ -341,7 +343,7 @@ class PrimeField(Field):
             raise InputError(f"found an element of another field, expected one of {self.name}")
         if isinstance(value, fmpz_mod):
             try:
-                return value + self._zero  # FLINT refuses to mix moduli, and offers no way to ask for one
+                return value + self._zero  # raises for another modulus, which FLINT gives no way to read
             except (TypeError, ValueError) as error:
                 raise InputError(f"found an element of another field, expected one of {self.name}") from error
         if isinstance(value, int | fmpz) and not isinstance(value, bool):
@@ -366,7 +368,7 @@ class PrimeField(Field):
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
         if self._large is not None:
             return fmpz_mod_mat(rows, columns, [self.convert(entry) for entry in entries], self._large)
-        p, convert = self.prime, self.convert  # a loop in which large systems spend much of their time
+        p, convert = self.prime, self.convert  # large systems spend much of their time in the next loop
         elements = [e if type(e) is nmod and e.modulus() == p else convert(e) for e in entries]
         return nmod_mat(rows, columns, elements, p)
 
@@ -378,9 +380,10 @@ class PrimeField(Field):
 
 
 class _Balls(Field):
-    """What real and complex balls have in common: every result encloses the true number.
+    """The common base of real and complex balls: every result encloses the true number.
 
-    A ball that contains zero without being zero is neither zero nor invertible: `is_zero` raises `PrecisionLost`.
+    A ball that contains zero but other numbers as well is neither zero nor invertible: `is_zero` raises
+    `PrecisionLost`.
     """
 
     exact = False
@@ -405,7 +408,7 @@ class _Balls(Field):
         return self._matrix(rows, columns, [self.convert(entry) for entry in entries])
 
     def format(self, element: Any) -> str:
-        """Midpoint and radius, `[0.333333 +/- 1.0e-6]`."""
+        """Return midpoint and radius as text, e.g. `[0.333333 +/- 1.0e-6]`."""
         with self.working():
             return str(element.str(max(1, int(self.bits * 0.30103))))
 
@@ -413,12 +416,12 @@ class _Balls(Field):
         if element.is_zero():
             return True
         if element.contains(0):
-            raise PrecisionLost(f"a number with {self.bits} bits cannot be told from zero any more: ask for more bits")
+            raise PrecisionLost(f"a number with {self.bits} bits cannot be distinguished from zero: use more bits")
         return False
 
     def equal(self, left: Any, right: Any) -> bool:
-        if not (left.is_finite() and right.is_finite()):  # it overlaps everything, nan as well
-            raise PrecisionLost(f"of a number nothing is known with {self.bits} bits any more: ask for more bits")
+        if not (left.is_finite() and right.is_finite()):  # infinite balls and nan overlap everything
+            raise PrecisionLost(f"a ball with {self.bits} bits has become infinite: use more bits")
         return bool(left.overlaps(right))
 
     def working(self) -> AbstractContextManager[Any]:

@@ -1,9 +1,9 @@
-"""The field of rational functions Q(x1, ..., xn): where an identity can be expanded, and so be proved.
+"""The field of rational functions Q(x1, ..., xn), in which an identity can be expanded and so be proved.
 
 FLINT has no fraction field of polynomials. Elements here are quotients. By default they are never reduced by a gcd:
-sums and comparisons look for a common denominator only where one divides the other. That is right for expanding an
-identity of few terms once. A field that reduces cancels a gcd after every sum and product instead: dearer a step, but
-quotients of many factors stay small. Work is counted beforehand and bounded by a budget.
+sums and comparisons use a common denominator only if one divides the other. This is fast for expanding an identity of
+few terms once. A field with `reduces` cancels a gcd after every sum and product instead: each operation is slower, but
+quotients with many factors stay small. Work is counted in advance and bounded by a budget.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from kahanmaps.algebra.work import count, counted
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
-_MOST_KEPT, _MOST_KEPT_TERMS = 100, 500_000  # matrices whose minors are kept, and terms: 30 MB
-_BY_MINORS = 7  # rows: products with single entries, of which there are 2^n n/2, are cheaper than those of elimination
+_MAX_CACHED, _MAX_CACHED_TERMS = 100, 500_000  # matrices whose minors are cached, and terms of these: 30 MB
+_MAX_ROWS_BY_MINORS = 7  # up to this size 2^n n/2 products with single entries are faster than elimination
 
 _TOO_MANY = "expanding the identity would take too many products of terms"
-_Key = bytes | tuple[bytes, int]  # of a matrix, with the budget where this was too small
-_kept: dict[_Key, tuple[list[fmpq_mpoly] | None, int, int]] = {}  # minors, products of terms that they took, and units
-_keeping = Lock()
+_Key = bytes | tuple[bytes, int]  # hash of a matrix; together with the budget if this was too small
+_cache: dict[_Key, tuple[list[fmpq_mpoly] | None, int, int]] = {}  # minors, their products of terms, and their work
+_cache_lock = Lock()
 
 
 class BudgetExceeded(KahanmapsError):
@@ -40,11 +40,10 @@ class BudgetExceeded(KahanmapsError):
 
 
 class FunctionField(Field):
-    """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds the products of terms in all.
+    """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds all products of terms together.
 
-    `reduces` says whether quotients are reduced to lowest terms. With `modulus`, the coefficients of an irreducible
-    polynomial in the last name, that name is a root of it: what the polynomial divides is then zero, and nothing may be
-    divided by it.
+    `reduces` says whether quotients are reduced to lowest terms. `modulus` are the coefficients of an irreducible
+    polynomial of which the last name is a root: multiples of this polynomial are then 0.
 
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
@@ -86,86 +85,89 @@ class FunctionField(Field):
         return Function(self, self.context.constant(rational(value)), self._one)
 
     def format(self, element: Function) -> str:
-        return format_rational_function(RationalFunction(element.above, element.below))
+        return format_rational_function(RationalFunction(element.numerator, element.denominator))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> FunctionMatrix:
         return FunctionMatrix(self, rows, columns, [self.convert(entry) for entry in entries])
 
     def is_zero(self, element: Function) -> bool:
-        return self.vanishes(element.above)
+        return self.vanishes(element.numerator)
 
     def vanishes(self, polynomial: fmpq_mpoly) -> bool:
         """Whether a polynomial is zero here."""
         return bool(polynomial.is_zero() or (self.modulus is not None and (polynomial % self.modulus).is_zero()))
 
     def equal(self, left: Function, right: Function) -> bool:
-        return self.vanishes((left - right).above)
+        return self.vanishes((left - right).numerator)
 
     def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
-        """A product of polynomials, paid from the budget before it is computed. Raises BudgetExceeded."""
+        """Multiply two polynomials; the budget is charged in advance. Raises BudgetExceeded."""
         self.pay(len(left) * len(right) + 1)
         return left * right
 
     def pay(self, products: int) -> None:
-        """Take so many products of terms from the budget. Raises BudgetExceeded where it has not as many."""
+        """Charge so many products of terms to the budget. Raises BudgetExceeded if it is too small."""
         self.budget -= products
         if self.budget < 0:
             raise BudgetExceeded(_TOO_MANY)
         count(1 + products / 100)
 
     def require(self, pairs: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
-        """Raise BudgetExceeded where the budget cannot pay for the products of all these pairs: none need be begun."""
+        """Raise BudgetExceeded at once if the budget is too small for the products of all these pairs."""
         if sum(len(left) * len(right) + 1 for left, right in pairs) > self.budget:
             self.pay(self.budget + 1)
 
-    def fraction(self, above: fmpq_mpoly, below: fmpq_mpoly) -> Function:
-        """above / below, in lowest terms if this field reduces."""
-        if self.reduces and not below.is_constant():
-            if above.is_zero():
+    def fraction(self, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> Function:
+        """Return numerator / denominator, in lowest terms if this field reduces."""
+        if self.reduces and not denominator.is_constant():
+            if numerator.is_zero():
                 return self.zero
-            count(10 + (len(above) + len(below)) / 2)
-            common = above.gcd(below)
+            count(10 + (len(numerator) + len(denominator)) / 2)
+            common = numerator.gcd(denominator)
             if not common.is_constant():
-                return Function(self, above / common, below / common)
-        return Function(self, above, below)
+                return Function(self, numerator / common, denominator / common)
+        return Function(self, numerator, denominator)
 
     def value(self, polynomial: fmpq_mpoly, point: Sequence[Function]) -> Function | None:
-        """The value of a polynomial over Q by Horner's rule, homogeneous in entries with a denominator in common.
+        """Evaluate a polynomial over Q by Horner's rule, over a common denominator of the entries.
 
-        None in a field that reduces: there every term is put into lowest terms before it is added.
+        Returns None in a field that reduces, where the general evaluation reduces each term before adding it.
         """
         if self.reduces:
             return None
         columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
         used = [(point[k], powers) for k, powers in columns if any(powers)]
-        below: list[fmpq_mpoly] = []  # none of which divides another
-        for entry, _ in sorted(used, key=lambda one: -int(one[0].below.total_degree())):
-            if all(self.quotient(D, entry.below) is None for D in below) and not entry.below.is_constant():
-                below.append(entry.below)
-        missing = [[0] * len(polynomial) for _ in below]
+        denominators: list[fmpq_mpoly] = []  # none of which divides another
+        for entry, _ in sorted(used, key=lambda one: -int(one[0].denominator.total_degree())):
+            if (
+                all(self.quotient(D, entry.denominator) is None for D in denominators)
+                and not entry.denominator.is_constant()
+            ):
+                denominators.append(entry.denominator)
+        missing = [[0] * len(polynomial) for _ in denominators]
         rows = []
         for entry, powers in used:
-            factor = entry.above / entry.below.leading_coefficient()
-            if not entry.below.is_constant():
-                quotients = ((k, self.quotient(D, entry.below)) for k, D in enumerate(below))
+            factor = entry.numerator / entry.denominator.leading_coefficient()
+            if not entry.denominator.is_constant():
+                quotients = ((k, self.quotient(D, entry.denominator)) for k, D in enumerate(denominators))
                 place, quotient = next((k, quotient) for k, quotient in quotients if quotient is not None)
-                factor = self.times(entry.above, quotient)
+                factor = self.times(entry.numerator, quotient)
                 missing[place] = [a - e for a, e in zip(missing[place], powers, strict=True)]
             rows.append((factor, powers))
         tops = [-min(row) for row in missing]
-        rows += [(D, tuple(top + a for a in row)) for D, top, row in zip(below, tops, missing, strict=True)]
-        # The sum over powers of the longest factor is innermost, where the others of its products are short.
+        rows += [(D, tuple(top + a for a in row)) for D, top, row in zip(denominators, tops, missing, strict=True)]
+        # The longest factor comes last: in the innermost sum the other operands of its products are short.
         rows.sort(key=lambda row: len(row[0]))
         terms = {tuple(powers[m] for _, powers in rows): c for m, c in enumerate(polynomial.coeffs())}
         total = self._horner(terms, [factor for factor, _ in rows])
         denominator = self._one
-        for D, top in zip(below, tops, strict=True):
+        for D, top in zip(denominators, tops, strict=True):
             for _ in range(top):
                 denominator = self.times(denominator, D)
         return self.fraction(total, denominator)
 
     def _horner(self, terms: dict[tuple[int, ...], fmpq], factors: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-        """The sum of coefficients times powers of the factors, by their exponents."""
+        """Return the sum of coefficients times powers of the factors; `terms` has the coefficients by exponents."""
         if not factors:
             return self.context.constant(sum(terms.values(), fmpq(0)))
         by_power: dict[int, dict[tuple[int, ...], fmpq]] = {}
@@ -179,7 +181,7 @@ class FunctionField(Field):
         return total
 
     def quotient(self, large: fmpq_mpoly, small: fmpq_mpoly) -> fmpq_mpoly | None:
-        """large / small where that is a polynomial, else None; paid for like a product."""
+        """Return large / small if it is a polynomial, else None; the budget is charged as for a product."""
         if small.is_constant():
             return large / small.leading_coefficient()
         if large.total_degree() < small.total_degree():
@@ -194,47 +196,47 @@ class FunctionField(Field):
 class Function(Element):
     """A quotient of two polynomials in a `FunctionField`, not reduced."""
 
-    __slots__ = ("above", "below")
+    __slots__ = ("denominator", "numerator")
 
     field: FunctionField
 
-    def __init__(self, field: FunctionField, above: fmpq_mpoly, below: fmpq_mpoly) -> None:
+    def __init__(self, field: FunctionField, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> None:
         self.field = field
-        self.above = above
-        self.below = below
+        self.numerator = numerator
+        self.denominator = denominator
 
     def _plus(self, other: Function) -> Function:
-        if self.above.is_zero():
+        if self.numerator.is_zero():
             return other
-        if other.above.is_zero():
+        if other.numerator.is_zero():
             return self
-        if self.below == other.below:
-            return self.field.fraction(self.above + other.above, self.below)
+        if self.denominator == other.denominator:
+            return self.field.fraction(self.numerator + other.numerator, self.denominator)
         times = self.field.times
         for small, large in ((self, other), (other, self)):
-            quotient = self.field.quotient(large.below, small.below)
+            quotient = self.field.quotient(large.denominator, small.denominator)
             if quotient is not None:
-                return self.field.fraction(large.above + times(small.above, quotient), large.below)
-        above = times(self.above, other.below) + times(other.above, self.below)
-        return self.field.fraction(above, times(self.below, other.below))
+                return self.field.fraction(large.numerator + times(small.numerator, quotient), large.denominator)
+        numerator = times(self.numerator, other.denominator) + times(other.numerator, self.denominator)
+        return self.field.fraction(numerator, times(self.denominator, other.denominator))
 
     def __neg__(self) -> Function:
-        return Function(self.field, -self.above, self.below)
+        return Function(self.field, -self.numerator, self.denominator)
 
     def _times(self, other: Function) -> Function:
-        if self.above.is_zero() or other.above.is_zero():
+        if self.numerator.is_zero() or other.numerator.is_zero():
             zero: Function = self.field.zero
             return zero
         times = self.field.times
-        return self.field.fraction(times(self.above, other.above), times(self.below, other.below))
+        return self.field.fraction(times(self.numerator, other.numerator), times(self.denominator, other.denominator))
 
     def _over(self, other: Function) -> Function:
-        if self.field.vanishes(other.above):
+        if self.field.vanishes(other.numerator):
             raise ZeroDivisionError("division by the zero function")
-        return self._times(Function(self.field, other.below, other.above))
+        return self._times(Function(self.field, other.denominator, other.numerator))
 
     def _same(self, other: Function) -> bool:
-        if other.above.is_zero():
+        if other.numerator.is_zero():
             return self.field.is_zero(self)
         return self.field.equal(self, other)
 
@@ -245,19 +247,19 @@ class FunctionMatrix(EntryMatrix):
     def _dot(self, row: Sequence[Function], column: Sequence[Function]) -> Function:
         total: Function = self.field.zero
         for a, b in zip(row, column, strict=True):
-            if not a.above.is_zero() and not b.above.is_zero():  # most entries are zero where there are blocks
+            if not a.numerator.is_zero() and not b.numerator.is_zero():  # most entries are zero where there are blocks
                 total = total._plus(a._times(b))
         return total
 
     def det(self) -> Function:
-        """The determinant, of rows cleared of denominators, block by block."""
+        """Compute the determinant block by block, from rows with denominators cleared."""
         total: Function = self.field.one
         for block in self._blocks():
             n = len(block)
             rows, cleared = FunctionMatrix(
                 self.field, n, n, [self[i, j] for i in block for j in block]
             )._polynomial_rows()
-            if len(rows) > _BY_MINORS:
+            if len(rows) > _MAX_ROWS_BY_MINORS:
                 value = _bareiss(self.field, rows)
             else:
                 minor = _minors(self.field, [[*row, self.field.context.constant(0)] for row in rows])[-1]
@@ -266,74 +268,74 @@ class FunctionMatrix(EntryMatrix):
         return total
 
     def solve(self, right: FunctionMatrix) -> FunctionMatrix:
-        """The solution X of self X = right by minors, block by block. Raises ZeroDivisionError if singular."""
+        """Solve self X = right by minors, block by block. Raises ZeroDivisionError if the matrix is singular."""
         columns = right._columns
         solution: list[list[Function]] = [[] for _ in range(self._rows)]
         for block in self._blocks():
             n = len(block)
-            wide = [[*(self[i, j] for j in block), *(right[i, j] for j in range(columns))] for i in block]
-            flat = [entry for row in wide for entry in row]
+            augmented = [[*(self[i, j] for j in block), *(right[i, j] for j in range(columns))] for i in block]
+            flat = [entry for row in augmented for entry in row]
             rows, _ = FunctionMatrix(self.field, n, n + columns, flat)._polynomial_rows()
-            sign = -1 if n % 2 else 1  # the denominator is the determinant itself, as elsewhere
+            sign = -1 if n % 2 else 1  # makes the denominator equal to the determinant
             for j in range(n, n + columns):
-                *above, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
+                *numerator, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
                 if self.field.vanishes(last):
                     raise ZeroDivisionError("singular matrix in solve()")
-                for i, entry in zip(block, above, strict=True):
+                for i, entry in zip(block, numerator, strict=True):
                     solution[i].append(Function(self.field, entry * -sign, last * sign))
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])
 
     def _blocks(self) -> list[list[int]]:
-        """The finest partition of the indices into blocks that the matrix does not mix."""
+        """Return the finest partition of the indices for which the matrix is block diagonal."""
         waiting = set(range(self._rows))
         blocks = []
         while waiting:
             block = [waiting.pop()]
-            for i in block:  # grows while it is walked
-                near = {j for j in waiting if not self[i, j].above.is_zero() or not self[j, i].above.is_zero()}
-                waiting -= near
-                block += sorted(near)
+            for i in block:  # the list grows during the loop
+                linked = {j for j in waiting if not (self[i, j].numerator.is_zero() and self[j, i].numerator.is_zero())}
+                waiting -= linked
+                block += sorted(linked)
             blocks.append(sorted(block))
         return blocks
 
     def _polynomial_rows(self) -> tuple[list[list[fmpq_mpoly]], fmpq_mpoly]:
-        """Each row times a common denominator of its entries, and the product of these denominators."""
+        """Return each row times a common denominator of its entries, and the product of these denominators."""
         rows, product = [], self.field.context.constant(1)
         for i in range(self._rows):
             row = [self[i, j] for j in range(self._columns)]
             total = self.field.zero
-            for entry in row:  # the sum finds a common denominator where one divides the other
-                if entry.above.is_zero():
+            for entry in row:  # a sum has a common denominator of its terms
+                if entry.numerator.is_zero():
                     continue
-                total = total + Function(self.field, self.field.context.constant(1), entry.below)
-            below = total.below
+                total = total + Function(self.field, self.field.context.constant(1), entry.denominator)
+            denominator = total.denominator
             cleared = []
             for entry in row:
-                if entry.above.is_zero():
-                    cleared.append(entry.above)
+                if entry.numerator.is_zero():
+                    cleared.append(entry.numerator)
                     continue
-                quotient = self.field.quotient(below, entry.below)
+                quotient = self.field.quotient(denominator, entry.denominator)
                 if quotient is None:
                     raise BudgetExceeded("the denominators of a row have no simple common multiple")
-                cleared.append(self.field.times(entry.above, quotient))
+                cleared.append(self.field.times(entry.numerator, quotient))
             rows.append(cleared)
-            product = self.field.times(product, below)
+            product = self.field.times(product, denominator)
         return rows, product
 
 
 def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpoly]:
-    """The signed maximal minors of an n x (n + 1) matrix of polynomials: the k-th is without column k.
+    """Return the signed maximal minors of an n x (n + 1) matrix of polynomials: the k-th omits column k.
 
-    Many identities contain the same image of the same map: the last minors are kept. They are paid and counted as if
-    they were computed again, so that no verdict depends on what was expanded before. Those that a budget was too small
-    for are known for this budget only: with another one, other work is done until it is exceeded.
+    Many identities contain the same image of the same map, so recent minors are cached. A cached result is charged and
+    counted as if it were computed again, so that no verdict depends on earlier computations. For the same reason a
+    failure is cached together with its budget: with another budget the work until it is exceeded would differ.
     """
-    count(sum(map(len, chain(*rows))))  # of the text that they are known by
+    count(sum(map(len, chain(*rows))))  # for the text of the hash key
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
     budget, before = field.budget, counted()
     for known in (key, (key, budget)):
-        minors, products, units = _kept.get(known, (None, 0, 0))
-        if known in _kept and products <= budget:
+        minors, products, units = _cache.get(known, (None, 0, 0))
+        if known in _cache and products <= budget:
             count(units)
             if minors is None:
                 field.budget = -1
@@ -341,32 +343,33 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
             field.budget -= products
             return minors
     try:
-        if len(rows) > _BY_MINORS:
+        if len(rows) > _MAX_ROWS_BY_MINORS:
             columns = range(len(rows) + 1)
             minors = [_bareiss(field, [[*row[:k], *row[k + 1 :]] for row in rows]) * (-1) ** k for k in columns]
         else:
             entries = [[None if entry.is_zero() else entry for entry in row] for row in rows]
-            found = kernel_minors(entries, field.times, field.require)
-            minors = [field.context.constant(0) if minor is None else minor for minor in found]
+            kernel = kernel_minors(entries, field.times, field.require)
+            minors = [field.context.constant(0) if minor is None else minor for minor in kernel]
     except BudgetExceeded:
-        _keep((key, budget), None, 0, counted() - before)
+        _store((key, budget), None, 0, counted() - before)
         raise
-    _keep(key, minors, budget - field.budget, counted() - before)
+    _store(key, minors, budget - field.budget, counted() - before)
     return minors
 
 
-def _keep(key: _Key, minors: list[fmpq_mpoly] | None, products: int, units: int) -> None:
-    """Keep minors in place of the oldest; None where they were given up."""
-    with _keeping:
-        _kept[key] = minors, products, units
+def _store(key: _Key, minors: list[fmpq_mpoly] | None, products: int, units: int) -> None:
+    """Store minors, or None for a failure, and drop the oldest entries of a full cache."""
+    with _cache_lock:
+        _cache[key] = minors, products, units
         while (
-            len(_kept) > _MOST_KEPT or sum(len(P) for kept, *_ in _kept.values() for P in kept or ()) > _MOST_KEPT_TERMS
+            len(_cache) > _MAX_CACHED
+            or sum(len(P) for cached, *_ in _cache.values() for P in cached or ()) > _MAX_CACHED_TERMS
         ):
-            del _kept[next(iter(_kept))]
+            del _cache[next(iter(_cache))]
 
 
 def _bareiss(field: FunctionField, matrix: list[list[fmpq_mpoly]]) -> fmpq_mpoly:
-    """The determinant of a square matrix of polynomials by fraction-free elimination."""
+    """Compute the determinant of a square matrix of polynomials by fraction-free (Bareiss) elimination."""
     rows = [list(row) for row in matrix]
     n = len(rows)
     previous = field.context.constant(1)

@@ -1,7 +1,8 @@
-"""Integers and the primes of another one: contents, what numbers have of these primes, and what they are without.
+"""Integers: contents, common denominators, and the parts of integers that consist of given primes.
 
-Numbers are long, and what they have of given primes is short: it is found from residues. Primes are given by an integer
-`power` that they divide, best as often as they are expected in the numbers; what is there more often is found as well.
+The integers are long, and their parts from given primes short, so these parts are computed from residues. The primes
+are given as the divisors of an integer `power`. It is fastest if `power` contains each prime as often as the numbers
+do; higher multiplicities are found as well.
 """
 
 from __future__ import annotations
@@ -15,19 +16,19 @@ _LOW = (fmpz(1) << 64) - 1
 
 
 def over_one(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
-    """The numerators of rational numbers over their least common denominator, and that.
+    """Return the numerators of rational numbers over their least common denominator, and this denominator.
 
     >>> over_one([fmpq(1, 2), fmpq(-2, 3), fmpq(5)])
     ([3, -4, 30], 6)
     """
-    pairs, below = [(number.p, number.q) for number in numbers], fmpz(1)
+    pairs, denominator = [(number.p, number.q) for number in numbers], fmpz(1)
     for _, q in pairs:
-        below = below.lcm(q)
-    return [p * (below // q) for p, q in pairs], below
+        denominator = denominator.lcm(q)
+    return [p * (denominator // q) for p, q in pairs], denominator
 
 
 def content(integers: Iterable[fmpz]) -> fmpz:
-    """The greatest common divisor of integers."""
+    """Return the greatest common divisor of integers."""
     common = fmpz(0)
     for entry in integers:
         common = common.gcd(entry)
@@ -37,12 +38,12 @@ def content(integers: Iterable[fmpz]) -> fmpz:
 
 
 def without(number: fmpz, power: fmpz) -> fmpz:
-    """A number, not zero, without the primes of `power`."""
+    """Return the part of a nonzero integer that is coprime to `power`."""
     return split_by_primes(number, power)[0]
 
 
 def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
-    """The number without the primes of `power`, and what has been taken away, positive; zero as (0, 1)."""
+    """Split an integer into the part coprime to `power` and the positive part of the primes of `power`; 0 is (0, 1)."""
     part = fmpz(1)
     if number == 0:
         return number, part
@@ -51,12 +52,12 @@ def split_by_primes(number: fmpz, power: fmpz) -> tuple[fmpz, fmpz]:
         part = part * common
         if is_all(common, power):
             break
-        power = common * common  # it has all primes that may still be there
+        power = common * common  # contains all primes that may still divide the number
     return number, part
 
 
 def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
-    """The common factor of numbers, not all of them zero, that is made of the primes of `power`, which is positive."""
+    """Return the largest common factor of integers, not all 0, that consists of the primes of `power` > 0."""
     while True:
         common = power
         for number in numbers:
@@ -69,10 +70,10 @@ def common_part(numbers: Sequence[fmpz], power: fmpz) -> fmpz:
 
 
 def is_all(common: fmpz, power: fmpz) -> bool:
-    """Whether a common divisor with `power` is all there is: no prime is in it as often as in `power`."""
-    rest = power // common
+    """Whether a common divisor with `power` is complete: each of its primes divides `power` more often."""
+    cofactor = power // common
     while common != 1:
-        shared = common.gcd(rest)
+        shared = common.gcd(cofactor)
         if shared == 1:
             return False
         common = common // shared
@@ -80,7 +81,7 @@ def is_all(common: fmpz, power: fmpz) -> bool:
 
 
 def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
-    """values / divisor. Raises ArithmeticError where a remainder shows in the lowest 64 bits."""
+    """Return values / divisor. Raises ArithmeticError if the lowest 64 bits show a remainder."""
     if divisor == 1:
         return list(values)
     quotients = [value // divisor for value in values]
@@ -92,25 +93,25 @@ def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
 
 
 def radical(*numbers: fmpz) -> fmpz:
-    """An integer with the primes of these numbers (not zero), small ones once, others to low powers."""
+    """Return an integer with the primes of these nonzero numbers: small ones once, others to low powers."""
     product = fmpz(1)
     for number in numbers:
         if number == 0:
             raise ArithmeticError("zero has no radical: please report this")
-        rest = abs(number)
+        cofactor = abs(number)
         for prime in SMALL_PRIMES:
-            if rest % prime == 0:
+            if cofactor % prime == 0:
                 if product % prime != 0:
                     product = product * prime
-                while rest % prime == 0:
-                    rest = rest // prime
-        if rest > 1:
-            rest = without(rest, product) if product > 1 else rest
-            # A perfect power counts once.
+                while cofactor % prime == 0:
+                    cofactor = cofactor // prime
+        if cofactor > 1:
+            cofactor = without(cofactor, product) if product > 1 else cofactor
+            # Replace perfect powers by their roots.
             for exponent in (2, 3, 5):
-                root = rest.root(exponent)
-                while rest > 1 and root**exponent == rest:
-                    rest = root
-                    root = rest.root(exponent)
-            product = product * rest
+                root = cofactor.root(exponent)
+                while cofactor > 1 and root**exponent == cofactor:
+                    cofactor = root
+                    root = cofactor.root(exponent)
+            product = product * cofactor
     return product

@@ -1,8 +1,8 @@
-"""Linear algebra under one name over each field: solve, determinant, rank, null space.
+"""Linear algebra with the same functions over each field: solve, determinant, rank, null space.
 
-Matrices are FLINT's own (`Field.matrix` makes them); products, sums and transposes are their operators. This file
-gives the operations that FLINT spells differently, or lacks, from one kind of matrix to the next; and `EntryMatrix`
-for the rings over which FLINT has no matrices.
+Matrices are FLINT's own (`Field.matrix` creates them), with their operators for products, sums and transposes. This
+module has the operations whose names in FLINT depend on the type of matrix, or that FLINT lacks, and `EntryMatrix` for
+the rings without FLINT matrices.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from kahanmaps.errors import PrecisionLost, SingularMatrix
 
 
 def solve(matrix: Any, right: Any) -> Any:
-    """The solution X of `matrix` X = `right`.
+    """Solve `matrix` X = `right`.
 
-    Raises `SingularMatrix`, or `PrecisionLost` over balls, where a determinant that may be zero decides nothing.
+    Raises `SingularMatrix`, or `PrecisionLost` over balls if the ball of the determinant contains zero.
 
     >>> solve(fmpq_mat([[1, 2], [3, 4]]), fmpq_mat([[1], [1]]))
     [-1]
@@ -32,17 +32,17 @@ def solve(matrix: Any, right: Any) -> Any:
         return matrix.solve(right)
     except ZeroDivisionError as error:
         if isinstance(matrix, arb_mat | acb_mat) and not matrix.det().is_zero():
-            raise PrecisionLost("the determinant cannot be told from zero: ask for more bits") from error
+            raise PrecisionLost("the determinant cannot be distinguished from zero: use more bits") from error
         raise SingularMatrix("the matrix is singular") from error
 
 
 def det(matrix: Any) -> Any:
-    """The determinant, an element of the field."""
+    """Return the determinant, an element of the field."""
     return matrix.det()
 
 
 def rank(field: Field, matrix: Any) -> int:
-    """The rank. Over balls: certain, or `PrecisionLost`."""
+    """Return the rank. Over balls it is certain; otherwise raises `PrecisionLost`."""
     if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
         return len(_eliminate(field, matrix)[1])
     if isinstance(matrix, fmpq_mat):
@@ -51,10 +51,10 @@ def rank(field: Field, matrix: Any) -> int:
 
 
 def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
-    """The basis of { v : `matrix` v = 0 } that is in reduced echelon form from the right.
+    """Return the basis of { v : `matrix` v = 0 } in reduced echelon form from the right.
 
-    Each basis vector belongs to a column without pivot: it has a one there and a zero at every other such column, so
-    the basis is determined by the space alone. Empty for a matrix of full column rank.
+    Each basis vector belongs to a column without pivot: it is 1 there and 0 at every other such column, so the basis
+    depends on the space only. It is empty for a matrix of full column rank.
 
     >>> from kahanmaps.algebra.fields import QQ
     >>> nullspace(QQ, fmpq_mat([[2, 4]]))
@@ -65,7 +65,7 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
     if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
         rows, pivots = _eliminate(field, matrix)
     elif isinstance(matrix, fmpq_mat):
-        integers, below, rank_found = _integer_rows(matrix).rref()
+        integers, denominator, rank_found = _integer_rows(matrix).rref()
         pivots = split_columns(integers, rank_found)[0]
     else:
         reduced, rank_found = matrix.rref()
@@ -76,13 +76,13 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
             vector = [field.zero] * columns
             vector[free] = field.one
             for i, pivot in enumerate(pivots):
-                vector[pivot] = -rows[i][free] if rows is not None else fmpq(-integers[i, free], below)
+                vector[pivot] = -rows[i][free] if rows is not None else fmpq(-integers[i, free], denominator)
             basis.append(tuple(vector))
     return basis
 
 
 def trace(matrix: Any) -> Any:
-    """The sum of the diagonal entries."""
+    """Return the sum of the diagonal entries."""
     total = matrix[0, 0]
     for i in range(1, matrix.nrows()):
         total = total + matrix[i, i]
@@ -90,7 +90,7 @@ def trace(matrix: Any) -> Any:
 
 
 def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
-    """The sum of `weights[k]` `matrices[k]`, of which there is at least one."""
+    """Return the sum of `weights[k] * matrices[k]`, for at least one matrix."""
     total = matrices[0] * weights[0]
     for weight, matrix in zip(weights[1:], matrices[1:], strict=True):
         if weight != 0:
@@ -99,7 +99,7 @@ def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
 
 
 def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
-    """The coprime integers proportional to a rational vector, the first that is not zero positive."""
+    """Return the coprime integers proportional to a rational vector, the first nonzero one positive."""
     integers, _ = over_one(vector)
     common = content(integers)
     if common == 0:
@@ -110,7 +110,7 @@ def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
 
 
 class EntryMatrix(ABC):
-    """A matrix kept as the list of its entries, row by row; determinant and solution are left to each kind."""
+    """A matrix stored as the list of its entries, row by row; subclasses define determinant and solution."""
 
     def __init__(self, field: Any, rows: int, columns: int, entries: Sequence[Any]) -> None:
         self.field = field
@@ -122,11 +122,11 @@ class EntryMatrix(ABC):
 
     @abstractmethod
     def det(self) -> Any:
-        """The determinant."""
+        """Return the determinant."""
 
     @abstractmethod
     def solve(self, right: Self) -> Self:
-        """The solution X of self X = right, which may have several columns. Raises ZeroDivisionError if singular."""
+        """Solve self X = right, where `right` may have several columns. Raises ZeroDivisionError if singular."""
 
     def nrows(self) -> int:
         return self._rows
@@ -147,8 +147,8 @@ class EntryMatrix(ABC):
         return self._entries[i * self._columns + j]
 
     def transpose(self) -> Self:
-        flipped = [self[i, j] for j in range(self._columns) for i in range(self._rows)]
-        return type(self)(self.field, self._columns, self._rows, flipped)
+        entries = [self[i, j] for j in range(self._columns) for i in range(self._rows)]
+        return type(self)(self.field, self._columns, self._rows, entries)
 
     def __add__(self, other: Self) -> Self:
         if not isinstance(other, type(self)):
@@ -176,7 +176,7 @@ class EntryMatrix(ABC):
 
     @abstractmethod
     def _dot(self, row: Sequence[Any], column: Sequence[Any]) -> Any:
-        """The entry of a product where a row and a column meet."""
+        """Return the entry of a matrix product: a row times a column."""
 
     def __rmul__(self, other: Any) -> Self:
         factor = operand(self.field, other)
@@ -197,13 +197,15 @@ class EntryMatrix(ABC):
 
 
 def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
-    """The matrix with each row multiplied by its own denominator: same rank, same null space, smaller than by one."""
+    """Multiply each row by its own denominator: rank and null space stay, and entries are smaller than with a common
+    one.
+    """
     rows = [over_one(row)[0] for row in matrix.tolist()]
     return fmpz_mat(rows) if rows else fmpz_mat(0, matrix.ncols())
 
 
 def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
-    """Gauss-Jordan, where FLINT has no echelon form: balls, and entries of our own."""
+    """Gauss-Jordan elimination for matrices without an echelon form in FLINT: balls, and `EntryMatrix`."""
     with field.working():
         rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []
@@ -213,14 +215,14 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
             if not others:
                 continue
             best = others[0]
-            if hasattr(rows[best][column], "abs_lower"):  # of balls the one farthest from zero
+            if hasattr(rows[best][column], "abs_lower"):  # for balls choose the one farthest from zero
                 best = max(others, key=lambda k: rows[k][column].abs_lower())
                 if rows[best][column].contains(0):
-                    raise PrecisionLost("the rank cannot be decided with balls this wide: ask for more bits")
+                    raise PrecisionLost("the rank cannot be decided with balls this wide: use more bits")
             rows[top], rows[best] = rows[best], rows[top]
             lead = rows[top][column]
             rows[top] = [entry / lead for entry in rows[top]]
-            rows[top][column] = field.one  # exactly: lead / lead is only a ball around it
+            rows[top][column] = field.one  # exactly; over balls lead / lead is only a ball around 1
             for i in range(len(rows)):
                 if i != top and not _is_zero(rows[i][column]):
                     factor = rows[i][column]
@@ -231,5 +233,5 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
 
 
 def _is_zero(entry: Any) -> bool:
-    """Whether an entry is certainly zero; a ball that holds 0 and more is neither equal to 0 nor different from it."""
+    """Whether an entry is certainly zero. Trap: for a ball that contains 0 both == 0 and != 0 are False."""
     return bool(entry == 0)

@@ -1,4 +1,4 @@
-"""The kernel of an n x (n + 1) matrix by its maximal minors, over any commutative ring and without division."""
+"""The kernel of an n x (n + 1) matrix by its maximal minors, over any commutative ring, without division."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Foresight = Callable[[list[tuple[Any, Any]]], None]
 def kernel_minors(
     rows: Sequence[Sequence[Any]], times: Product = operator.mul, foresee: Foresight | None = None
 ) -> list[Any]:
-    """The vector of signed maximal minors of an n x (n + 1) matrix, which the matrix sends to zero.
+    """Return the vector of signed maximal minors of an n x (n + 1) matrix, which is in its kernel.
 
-    `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays): exact if the ring
-    is. `times` multiplies two of them. All minors of the first k rows are kept, so that 2^(n+1) n/2 products are taken.
-    An entry None is a zero that costs nothing. `foresee` is given all pairs that a further row multiplies, beforehand:
-    it may raise. Returns the n + 1 minors, the k-th without column k and with the sign (-1)^k; None where all of its
-    products have such a zero.
+    `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays); the result is exact
+    if the ring is. `times` multiplies two elements. The minors of the first k rows are computed for k = 1, 2, ..., with
+    2^(n+1) n/2 products in all. An entry None is a zero whose products are skipped. `foresee` is called with all pairs
+    to be multiplied for a further row, and may raise. The k-th minor omits column k and has the sign (-1)^k; it is None
+    if all its products contain a None.
 
     >>> kernel_minors([[1, 2, 3], [4, 5, 6]])
     [-3, 6, -3]
@@ -48,15 +48,15 @@ def kernel_minors(
             larger[mask] = total
         minors = larger
     full = (1 << width) - 1
-    found = (minors[full ^ 1 << j] for j in range(width))
-    return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(found)]
+    maximal = (minors[full ^ 1 << j] for j in range(width))
+    return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(maximal)]
 
 
 @cache
 def _layers(width: int) -> list[list[tuple[int, list[tuple[int, int, bool]]]]]:
-    """For 2, 3, ... rows the sets of so many columns, as bits, with the products that make the minor on them.
+    """Return, for k = 2, 3, ... rows, the sets of k columns as bit masks, each with the expansion of its minor.
 
-    A product is of the entry in a column of the last row and the minor on the set without it, with its sign.
+    The expansion is by the last row: each product is (column, mask without this column, whether the sign is negative).
     """
     layers = []
     for k in range(2, width):

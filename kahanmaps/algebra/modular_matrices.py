@@ -11,15 +11,15 @@ from kahanmaps.algebra.work import count
 
 
 def matrix(rows: Sequence[Sequence[Any]], prime: int) -> nmod_mat:
-    """The matrix modulo a prime with these rows, at least one, of integers or of residues."""
+    """Return the matrix modulo a prime with these rows (at least one) of integers or residues."""
     count(2 + 0.3 * len(rows) * len(rows[0]))
     if rows[0] and isinstance(rows[0][0], nmod):
         return nmod_mat(rows, prime)
-    return nmod_mat(fmpz_mat(rows), prime)  # in half the time that nmod_mat takes for integers of Python
+    return nmod_mat(fmpz_mat(rows), prime)  # twice as fast as nmod_mat from Python integers
 
 
 def reduced(A: nmod_mat) -> tuple[nmod_mat, int]:
-    """The reduced echelon form of a matrix modulo a prime, and its rank."""
+    """Return the reduced echelon form of a matrix modulo a prime, and its rank."""
     _count_elimination(A)
     form, rank = A.rref()
     return form, int(rank)
@@ -30,25 +30,25 @@ def _count_elimination(A: nmod_mat) -> None:
 
 
 def multiply(A: nmod_mat, B: nmod_mat) -> nmod_mat:
-    """The product of two matrices modulo a prime."""
+    """Return the product of two matrices modulo a prime."""
     count(1 + A.nrows() * A.ncols() * B.ncols() / 1000)
     return A * B
 
 
 def determinant(A: nmod_mat) -> int:
-    """The determinant of a square matrix modulo a prime."""
+    """Return the determinant of a square matrix modulo a prime."""
     _count_elimination(A)
     return int(A.det())
 
 
 def integers(A: nmod_mat) -> list[list[int]]:
-    """The rows of a matrix modulo a prime as residues."""
+    """Return the rows of a matrix modulo a prime as integers."""
     count(A.nrows() * A.ncols() / 2)
     return [list(map(int, row)) for row in A.tolist()]
 
 
 def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[list[int]]:
-    """The canonical basis (reduced echelon form) of the vectors that all rows annihilate, modulo a prime."""
+    """Return the reduced echelon basis of the null space of the rows, modulo a prime."""
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
     form, rank = reduced(matrix([row[::-1] for row in rows], prime))
@@ -56,7 +56,7 @@ def null_space(rows: Sequence[Sequence[Any]], columns: int, prime: int) -> list[
 
 
 def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
-    """The columns in which the rows of a reduced echelon form begin; the others, which those before them span.
+    """Return the pivot columns of a reduced echelon form, and the other columns.
 
     >>> split_columns(*nmod_mat([[0, 2, 4, 0], [0, 1, 2, 3]], 7).rref())
     ([1, 3], [0, 2])
@@ -71,14 +71,14 @@ def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
 
 
 def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
-    """The null space of a reduced echelon form: for each free column the vector that is 1 there and 0 at the others.
+    """Return a basis of the null space of a reduced echelon form: for each free column, 1 there and 0 at the others.
 
     >>> kernel(nmod_mat([[1, 2, 0], [0, 0, 1]], 7), 2)
     [[5, 1, 0]]
     """
     prime, (first, free) = form.modulus(), split_columns(form, rank)
     count(len(free) * (len(first) / 3 + form.ncols() / 50))
-    found = []
+    basis = []
     for k in free:
         vector = [0] * form.ncols()
         vector[k] = 1
@@ -86,12 +86,12 @@ def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
             if j > k:
                 break
             vector[j] = -int(form[i, k]) % prime
-        found.append(vector)
-    return found
+        basis.append(vector)
+    return basis
 
 
 def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
-    """The reduced echelon basis of the span of vectors modulo a prime."""
+    """Return the reduced echelon basis of the span of vectors modulo a prime."""
     if not vectors:
         return []
     form, rank = reduced(matrix(vectors, prime))
@@ -99,12 +99,12 @@ def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
 
 
 def combine(weights: Sequence[Sequence[int]], vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
-    """The combinations sum_k w_k v_k of vectors modulo a prime, one for each row w of weights."""
+    """Return the combinations sum_k w_k v_k of vectors modulo a prime, one for each row w of weights."""
     return integers(multiply(matrix(weights, prime), matrix(vectors, prime))) if weights and vectors else []
 
 
 def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
-    """Where the rows of an echelon form have their first entries: columns that those before them do not span.
+    """Return the pivot columns of an echelon form: where its rows have their first nonzero entries.
 
     >>> pivots(echelon([[1, 2, 0], [2, 4, 1]], 7))
     [0, 2]
@@ -113,7 +113,7 @@ def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
 
 
 def rank(vectors: Sequence[Sequence[Any]], prime: int) -> int:
-    """The rank of vectors modulo a prime."""
+    """Return the rank of vectors modulo a prime."""
     if not vectors:
         return 0
     A = matrix(vectors, prime)

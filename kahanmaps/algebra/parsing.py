@@ -4,10 +4,10 @@
     point       1/2,-1/3,0
     expression  + - * / ^ ** ( ) with names and numbers, for instance (x^2 + y^2)/(1 - eps^2*z^2)
 
-Text is exact: a decimal means the rational number that it spells. Values are built from the bottom up while the text is
-read; no tree is kept and nothing is run as code. (Python's own `ast` gives up at sums of some thousand terms, and at
-integers of 4300 digits.) FLINT ends the process when memory runs out and does not see Ctrl-C, so the size of every
-result is bounded by `Limits`, and if need be refused, before FLINT is called.
+Text is exact: a decimal means the rational number that it spells. The reader computes values from the bottom up while
+it reads the text; it keeps no tree and runs nothing as code. (Python's `ast` fails for sums of some thousand terms, and
+for integers of 4300 digits.) FLINT ends the process when memory runs out and does not react to Ctrl-C, so the size of
+every result is compared with `ExpressionLimits` before FLINT is called.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError, Unknown
 
 @dataclass(frozen=True)
 class ExpressionLimits:
-    """How large a text, and what it stands for, may be. Meant to be out of the way of honest use.
+    """Bounds on the size of a text and of its value, large enough for ordinary use.
 
-    The limits hold for results and for every value on the way to them. Digits are bounded before anything is computed,
-    on the high side.
+    The limits apply to results and to all intermediate values. The number of digits is estimated from above before
+    anything is computed.
     """
 
     number_digits: int = 1_000_000  # of one number read by parse_number or parse_point
@@ -41,7 +41,7 @@ class ExpressionLimits:
     exponent: int = 1_000  # in size
     digits: int = 100_000  # of a coefficient written over the common denominator of its polynomial
     terms: int = 20_000  # of a polynomial
-    words: int = 5_000_000  # of 64 bits, of all values on the way; pairs of terms that are multiplied count too
+    words: int = 5_000_000  # of 64 bits, of all intermediate values; products of two terms count too
 
 
 LIMITS = ExpressionLimits()
@@ -57,7 +57,7 @@ _EXPECTED = "expected an integer, p/q or a decimal such as 0.1"
 
 
 def is_name(text: str) -> bool:
-    """Whether `text` can name a variable: ASCII letters, digits and _, no digit first (FLINT accepts ASCII only).
+    """Whether `text` is a valid variable name: ASCII letters, digits and _, no digit first (FLINT accepts only ASCII).
 
     >>> is_name("x1"), is_name("1x"), is_name("ε")
     (True, False, False)
@@ -66,7 +66,7 @@ def is_name(text: str) -> bool:
 
 
 def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
-    """Raise `InputError` unless `names` are distinct and all of them can name a variable, with `iterates` also x~.
+    """Raise `InputError` unless `names` are distinct valid variable names; `iterates` allows x~ as well.
 
     >>> check_names(["x", "y", "x"])
     Traceback (most recent call last):
@@ -85,7 +85,7 @@ def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
 
 
 def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLimits) -> fmpq:
-    """The number in `text[start:end]`; mistakes are reported with their column in the whole text."""
+    """Parse the number in `text[start:end]`; errors give the column in the complete text."""
     while start < end and text[start] in BLANKS:
         start += 1
     while start < end and text[end - 1] in BLANKS:
@@ -100,19 +100,19 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
         prefix = _START_OF_NUMBER.match(text, start, end)
         column = start if prefix is None else prefix.end()
         raise ExpressionError(f"found {quoted(text[start:end])}, {_EXPECTED}", text, column)
-    sign, above, below, whole, fraction, power = match.groups()
-    if max(len(above or ""), len(below or ""), len(whole or "") + len(fraction or "")) > digits:
+    sign, numerator, denominator, integer_part, fraction, power = match.groups()
+    if max(len(numerator or ""), len(denominator or ""), len(integer_part or "") + len(fraction or "")) > digits:
         raise ExpressionError(f"found a number of more than {digits} digits, expected at most so many", text, start)
-    if below is not None:
-        divisor = fmpz(below)
+    if denominator is not None:
+        divisor = fmpz(denominator)
         if divisor == 0:
             raise ExpressionError("found the denominator 0, expected a nonzero integer", text, match.start(3))
-        value = fmpq(fmpz(above), divisor)
+        value = fmpq(fmpz(numerator), divisor)
     else:
-        value = fmpq(fmpz((whole or "") + (fraction or "")))
+        value = fmpq(fmpz((integer_part or "") + (fraction or "")))
         shift = -len(fraction or "")
         if power is not None:
-            # The length first: Python's int() stops at 4300 digits.
+            # Check the length first: Python's int() raises for more than 4300 digits.
             size = power.lstrip("+-").lstrip("0")
             if len(size) > 9 or int(size or "0") > limits.power_of_ten:
                 found = f"found the power of ten {quoted(power)}"
@@ -131,14 +131,14 @@ def require_text(text: object, what: str, hint: str) -> None:
 
 
 def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
-    """The error to raise for a value of another type: what it is, what was `expected`, and what to do."""
+    """Return the error for a value of a wrong type: it names the type, what was `expected`, and a `hint`."""
     if isinstance(value, float):
-        return InexactNumber(f"found the machine number {value!s}, expected {expected}: {hint}")
+        return InexactNumber(f"found the floating-point number {value!s}, expected {expected}: {hint}")
     return InputError(f"found a value of type {type(value).__name__}, expected {expected}: {hint}")
 
 
 def parse_number(text: str, *, limits: ExpressionLimits = LIMITS) -> fmpq:
-    """The rational number that `text` spells: an integer, p/q or a finite decimal, with blanks around it.
+    """Parse a rational number: an integer, p/q or a finite decimal, perhaps with blanks around it.
 
     Raises `ExpressionError` for anything else, and for numbers beyond the limits.
 
@@ -155,9 +155,9 @@ def parse_number(text: str, *, limits: ExpressionLimits = LIMITS) -> fmpq:
 
 
 def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLimits = LIMITS) -> tuple[fmpq, ...]:
-    """The numbers in a list, with commas between them or blanks, perhaps in brackets; `dimension` of them, if given.
+    """Parse a point: numbers separated by commas or blanks, perhaps in brackets; `dimension` is their number, if given.
 
-    Raises `ExpressionError`, which names the entry (counted from 1) and its column in the whole text.
+    Raises `ExpressionError` with the number of the entry (counted from 1) and its column in the complete text.
 
     >>> parse_point("1/2, -1/3, 0"), parse_point("[1 2]")
     ((1/2, -1/3, 0), (1, 2))
@@ -184,7 +184,7 @@ def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLi
 
 
 def point_entries(text: str) -> list[tuple[int, int]]:
-    """Where the entries of a point begin and end in its text: between commas, or blanks where there are no commas.
+    """Return begin and end of the entries of a point in its text; they are separated by commas, or else by blanks.
 
     >>> point_entries("(1,2)"), point_entries("1 2"), point_entries("")
     ([(1, 2), (3, 4)], [(0, 1), (2, 3)], [])
@@ -216,10 +216,10 @@ def parse_polynomial(
     *,
     limits: ExpressionLimits = LIMITS,
 ) -> fmpq_mpoly:
-    """The polynomial in `ring(variables)` that `text` spells; `constants` are names that stand for numbers.
+    """Parse a polynomial in `ring(variables)`; `constants` are the values of further names.
 
-    A division by something that is not constant is refused, even where it would leave no remainder (`x^2/x`).
-    Raises `ExpressionError` with the column of the mistake; `InputError` for bad names or inexact constants.
+    Division by a nonconstant polynomial is an error, even if it would leave no remainder (`x^2/x`).
+    Raises `ExpressionError` with the column of the mistake; `InputError` for invalid names or inexact constants.
 
     >>> parse_polynomial("x^3/3 + a*x*y^2", ["x", "y"], {"a": fmpq(2, 3)})
     1/3*x^3 + 2/3*x*y^2
@@ -231,7 +231,7 @@ def parse_polynomial(
     """
     _check_expression(text, variables, constants)
     work = _Arithmetic(text, ring(variables), constants, limits, quotients=False)
-    return work.polynomial(_parse(work).above)
+    return work.polynomial(_parse(work).numerator)
 
 
 def parse_rational_function(
@@ -241,7 +241,7 @@ def parse_rational_function(
     *,
     limits: ExpressionLimits = LIMITS,
 ) -> RationalFunction:
-    """The quotient of polynomials in `ring(variables)` that `text` spells; common factors stay as they are written.
+    """Parse a quotient of polynomials in `ring(variables)`; common factors are not canceled.
 
     Raises as `parse_polynomial` does.
 
@@ -251,17 +251,17 @@ def parse_rational_function(
     """
     _check_expression(text, variables, constants)
     work = _Arithmetic(text, ring(variables), constants, limits, quotients=True)
-    above, below = _parse(work)
-    if below is None or not above.value:
-        return RationalFunction(work.polynomial(above), work.ring.constant(1))
-    # Integer coefficients below, or bringing it to normal form would cost one lcm for each of them.
-    return RationalFunction(work.polynomial(above) * below.scale, below.value * below.scale)
+    numerator, denominator = _parse(work)
+    if denominator is None or not numerator.value:
+        return RationalFunction(work.polynomial(numerator), work.ring.constant(1))
+    # Make the denominator integral first: otherwise its normal form would take one lcm for each coefficient.
+    return RationalFunction(work.polynomial(numerator) * denominator.scale, denominator.value * denominator.scale)
 
 
 def parse_constant(
     text: str, constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: ExpressionLimits = LIMITS
 ) -> fmpq:
-    """The number that an expression in numbers and `constants` comes to. Raises as `parse_polynomial` does.
+    """Evaluate an expression in numbers and `constants`. Raises as `parse_polynomial` does.
 
     >>> parse_constant("(1 + a)^2/3", {"a": fmpq(1, 2)})
     3/4
@@ -306,10 +306,10 @@ _OPERAND = "expected a number, a name or '('"
 
 
 class _Polynomial(NamedTuple):
-    """A polynomial, or a number, of known size: `scale` times it has integer coefficients, of size at most 2**bits.
+    """A polynomial, or a number, of known size: `scale` times it has integer coefficients of size at most 2**bits.
 
-    FLINT keeps one common denominator for all coefficients, so this is also the size that FLINT works with. Numbers are
-    fmpq, which is much faster than constant polynomials.
+    FLINT keeps one common denominator for all coefficients, so this is the size of FLINT's representation as well.
+    Numbers are fmpq, which is much faster than constant polynomials.
     """
 
     value: Any
@@ -320,14 +320,14 @@ class _Polynomial(NamedTuple):
 
 
 class _Quotient(NamedTuple):
-    """above/below; below has degree at least 1 and leading coefficient 1, or is None for 1."""
+    """A quotient; the denominator has degree at least 1 and leading coefficient 1, or is None for 1."""
 
-    above: _Polynomial
-    below: _Polynomial | None
+    numerator: _Polynomial
+    denominator: _Polynomial | None
 
 
 class Token(str):
-    """A piece of the text, and where it starts; `kind` is number, name, itself for a mark, or end."""
+    """A token of the text and its start; `kind` is number, name, end, or (for a sign or bracket) the token."""
 
     kind: str
     start_pos: int
@@ -339,7 +339,7 @@ class Token(str):
 
 
 def _tokens(text: str) -> Iterator[Token]:
-    """The pieces of the text as they are asked for, so that the first mistake is the one that is told."""
+    """Yield the tokens lazily, so that the first mistake in the text is the one that is reported."""
     column = 0
     while column < len(text):
         if text[column] in BLANKS:
@@ -358,8 +358,8 @@ def _tokens(text: str) -> Iterator[Token]:
 
 
 def _parse(work: _Arithmetic) -> _Quotient:
-    """The value of the text, or `ExpressionError`."""
-    # Length and brackets, before anything else looks at the text.
+    """Compute the value of the text. Raises `ExpressionError`."""
+    # Check length and brackets first, since the recursion below is as deep as the brackets.
     text, limits = work.text, work.limits
     if len(text) > limits.characters:
         raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
@@ -386,10 +386,10 @@ def _parse(work: _Arithmetic) -> _Quotient:
 
 
 class _Reader:
-    """A sum of products of powers, read from the left.
+    """A reader for sums of products of powers, from left to right.
 
-    Signs are below powers, so that -x^2 is -(x^2), and powers go from the right, so that 2^3^2 is 2^9. Brackets alone
-    are read by recursion, and their depth is limited.
+    Signs bind less than powers, so that -x^2 is -(x^2), and powers associate to the right, so that 2^3^2 is 2^9. Only
+    brackets lead to recursion, and their depth is limited.
     """
 
     def __init__(self, work: _Arithmetic) -> None:
@@ -425,10 +425,10 @@ class _Reader:
         return value
 
     def signs(self) -> list[Token]:
-        found = []
+        signs = []
         while self.next.kind in ("+", "-"):
-            found.append(self.take())
-        return found
+            signs.append(self.take())
+        return signs
 
     def atom(self) -> _Quotient:
         token = self.take()
@@ -446,7 +446,7 @@ class _Reader:
 
 
 def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
-    """What could not be read, in words: a token that cannot stand where it does."""
+    """Return the error for a token that is not allowed at its position."""
     text = work.text
     if token.kind == _END:
         return ExpressionError(f"found the end of the text, {_OPERAND}", text, len(text))
@@ -457,19 +457,19 @@ def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
     start = len(before) - 1
     while start > 0 and (before[start - 1].isalnum() or before[start - 1] in "_.") and before[-1] != ")":
         start -= 1
-    left = before[start:]
-    if token.kind == "(" and is_name(left) and left not in work.names:
-        call = f"found {quoted(left + '(')}, which looks like a function call"
+    operand = before[start:]
+    if token.kind == "(" and is_name(operand) and operand not in work.names:
+        call = f"found {quoted(operand + '(')}, which looks like a function call"
         return ExpressionError(f"{call}: only + - * / ^ are available, and products are written with *", text, start)
-    example = f"{left}*{token}" if len(left) + len(token) < 40 else "x*y"
-    found = f"found {quoted(token)} right after {quoted(left)}"
+    example = f"{operand}*{token}" if len(operand) + len(token) < 40 else "x*y"
+    found = f"found {quoted(token)} right after {quoted(operand)}"
     return ExpressionError(f"{found}, expected an operator between them: write {example}", text, column)
 
 
 class _Arithmetic:
-    """The operations of one expression, each refused where it would pass a limit.
+    """The operations of one expression; each raises an error where it would exceed a limit.
 
-    `pieces` are operands with the tokens of the operators between them.
+    `pieces` are operands, separated by the tokens of the operators.
     """
 
     def __init__(
@@ -487,7 +487,7 @@ class _Arithmetic:
         self.words_left = limits.words
         self.max_bits = limits.digits * 3322 // 1000 + 1
         self.names = {name: self.constant(number) for name, number in constants.items()}
-        self.one = self.constant(fmpq(1)).above
+        self.one = self.constant(fmpq(1)).numerator
         for name, variable in zip(ring.names(), ring.gens(), strict=True):
             self.names[name] = _Quotient(_Polynomial(variable, fmpz(1), 0, 1, 1), None)
 
@@ -504,32 +504,32 @@ class _Arithmetic:
         value = self.names.get(token)
         if value is None:
             raise self.unknown(str(token), token.start_pos)
-        self.check_bits(max(value.above.bits, _bits(value.above.scale)), token.start_pos)
+        self.check_bits(max(value.numerator.bits, _bits(value.numerator.scale)), token.start_pos)
         return value
 
     def sum(self, pieces: list[Any]) -> _Quotient:
         column = pieces[1].start_pos
         polynomials: list[_Polynomial] = []
-        # Terms over one denominator come together before anything is multiplied out: a/d + b/d = (a + b)/d.
+        # Add terms with the same denominator first, before expanding: a/d + b/d = (a + b)/d.
         fractions: list[tuple[_Polynomial, list[_Polynomial]]] = []
         for i in range(0, len(pieces), 2):
             value: _Quotient = pieces[i]
             if i and pieces[i - 1] == "-":
                 value = self.negative(value, pieces[i - 1].start_pos)
-            if value.below is None:
-                polynomials.append(value.above)
+            if value.denominator is None:
+                polynomials.append(value.numerator)
                 continue
-            for below, terms in fractions:
-                if below.value == value.below.value:
-                    terms.append(value.above)
+            for denominator, terms in fractions:
+                if denominator.value == value.denominator.value:
+                    terms.append(value.numerator)
                     break
             else:
-                fractions.append((value.below, [value.above]))
-                degree = sum(below.degree for below, _ in fractions)
+                fractions.append((value.denominator, [value.numerator]))
+                degree = sum(denominator.degree for denominator, _ in fractions)
                 self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
 
         def total(values: list[_Polynomial]) -> _Polynomial:
-            """The sum, by halves: adding one by one would copy the growing sum once for each term."""
+            """Add in pairs: adding one by one would copy the growing sum once for each term."""
             while len(values) > 1:
                 odd = values[-1:] if len(values) % 2 else []
                 pairs = zip(values[::2], values[1::2], strict=False)
@@ -538,26 +538,28 @@ class _Arithmetic:
 
         if not fractions:
             return _Quotient(total(polynomials), None)
-        common, above = fractions[0][0], total(fractions[0][1])
-        for below, terms in fractions[1:]:
+        common, numerator = fractions[0][0], total(fractions[0][1])
+        for denominator, terms in fractions[1:]:
             crossed = self.times(total(terms), common, column)
-            above = self.add(self.times(above, below, column), crossed, column)
-            common = self.times(common, below, column)
+            numerator = self.add(self.times(numerator, denominator, column), crossed, column)
+            common = self.times(common, denominator, column)
         if polynomials:
-            above = self.add(above, self.times(total(polynomials), common, column), column)
-        return _Quotient(above, common)
+            numerator = self.add(numerator, self.times(total(polynomials), common, column), column)
+        return _Quotient(numerator, common)
 
     def product(self, pieces: list[Any]) -> _Quotient:
-        above, below = self.one, None
+        numerator, denominator = self.one, None
         for i in range(0, len(pieces), 2):
             value: _Quotient = pieces[i]
             column = pieces[max(i - 1, 1)].start_pos
             if i and pieces[i - 1] == "/":
                 value = self.reciprocal(value, column)
-            above = self.times(value.above, above, column)
-            if value.below is not None:
-                below = value.below if below is None else self.times(below, value.below, column)
-        return _Quotient(above, below)
+            numerator = self.times(value.numerator, numerator, column)
+            if value.denominator is not None:
+                denominator = (
+                    value.denominator if denominator is None else self.times(denominator, value.denominator, column)
+                )
+        return _Quotient(numerator, denominator)
 
     def negated(self, signs: list[Token], value: _Quotient) -> _Quotient:
         minus = sum(sign == "-" for sign in signs) % 2
@@ -567,40 +569,42 @@ class _Arithmetic:
         column = operator.start_pos
         exponent = _constant(power)
         if exponent is None:
-            raise self.refusal("found an exponent with variables in it, expected an integer", column)
+            raise self.error_at("found an exponent with variables in it, expected an integer", column)
         if exponent.q != 1 or abs(exponent.p) > self.limits.exponent:
             bits = exponent.height_bits()
             found = f"found the exponent {exponent if bits < 100 else f'of about {bits * 1000 // 3322} digits'}"
-            raise self.refusal(f"{found}, expected an integer of size at most {self.limits.exponent}", column)
+            raise self.error_at(f"{found}, expected an integer of size at most {self.limits.exponent}", column)
         n = int(exponent.p)
         if n < 0:
             base, n = self.reciprocal(base, column), -n
         if n == 0:
             return self.constant(fmpq(1))
-        above, below = base
-        return _Quotient(self.repeated(above, n, column), None if below is None else self.repeated(below, n, column))
+        numerator, denominator = base
+        return _Quotient(
+            self.repeated(numerator, n, column), None if denominator is None else self.repeated(denominator, n, column)
+        )
 
     def reciprocal(self, value: _Quotient, column: int) -> _Quotient:
-        above, below = value.above, value.below or self.one
-        if not above.value:
-            raise self.refusal("found a division by 0", column)
-        number = _constant(_Quotient(above, None))
+        numerator, denominator = value.numerator, value.denominator or self.one
+        if not numerator.value:
+            raise self.error_at("found a division by 0", column)
+        number = _constant(_Quotient(numerator, None))
         if number is not None:
-            return _Quotient(self.scaled(below, 1 / number, column), None)
+            return _Quotient(self.scaled(denominator, 1 / number, column), None)
         if not self.quotients:
-            raise self.refusal("found a division by something with variables in it, expected a polynomial", column)
-        leading = above.value.leading_coefficient()
+            raise self.error_at("found a division by something with variables in it, expected a polynomial", column)
+        leading = numerator.value.leading_coefficient()
         if leading == 1:
-            return _Quotient(below, above)
-        # Leading coefficient 1, so that denominators which differ by a constant are seen to be the same.
-        self.spend(above.terms, above.bits, column)
-        monic = above._replace(value=above.value / leading, scale=abs((leading * above.scale).p))
-        return _Quotient(self.scaled(below, 1 / leading, column), monic)
+            return _Quotient(denominator, numerator)
+        # Make the leading coefficient 1, so that denominators which differ by a constant become equal.
+        self.spend(numerator.terms, numerator.bits, column)
+        monic = numerator._replace(value=numerator.value / leading, scale=abs((leading * numerator.scale).p))
+        return _Quotient(self.scaled(denominator, 1 / leading, column), monic)
 
     def negative(self, value: _Quotient, column: int) -> _Quotient:
-        return _Quotient(self.scaled(value.above, fmpq(-1), column), value.below)
+        return _Quotient(self.scaled(value.numerator, fmpq(-1), column), value.denominator)
 
-    # Arithmetic of numbers and polynomials: estimate, refuse or compute.
+    # Arithmetic of numbers and polynomials: estimate the size, then raise an error or compute.
 
     def add(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
         scale = left.scale
@@ -624,7 +628,7 @@ class _Arithmetic:
         bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
             found = f"found a product of polynomials with {left.terms} and {right.terms} terms"
-            raise self.refusal(f"{found}, which is too large to expand", column)
+            raise self.error_at(f"{found}, which is too large to expand", column)
         self.spend(pairs, bits_of_pair, column)
         return self.counted(left.value * right.value, left.scale * right.scale, bits, column)
 
@@ -637,7 +641,7 @@ class _Arithmetic:
         return value._replace(value=value.value * number, scale=value.scale * number.q, bits=bits)
 
     def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
-        """The n-th power by squaring, each product checked; n is positive."""
+        """Compute the n-th power by squaring, n > 0; each product is checked."""
         self.check_degree(value.degree * n, "a power", column)
         if value.terms == 1:
             bits = value.bits * n
@@ -655,10 +659,10 @@ class _Arithmetic:
 
     def counted(self, value: Any, scale: fmpz, bits: int, column: int) -> _Polynomial:
         if isinstance(value, fmpq):
-            return self.constant(value).above
+            return self.constant(value).numerator
         if len(value) > self.limits.terms:
             found = f"found a polynomial of {len(value)} terms"
-            raise self.refusal(f"{found}, expected at most {self.limits.terms}", column)
+            raise self.error_at(f"{found}, expected at most {self.limits.terms}", column)
         return _Polynomial(value, scale, bits, len(value), int(value.total_degree()))
 
     def polynomial(self, value: _Polynomial) -> fmpq_mpoly:
@@ -668,19 +672,19 @@ class _Arithmetic:
     def check_bits(self, bits: int, column: int) -> None:
         if bits > self.max_bits:
             found = f"found a number of about {bits * 1000 // 3322} digits"
-            raise self.refusal(f"{found}, expected at most {self.limits.digits}", column)
+            raise self.error_at(f"{found}, expected at most {self.limits.digits}", column)
 
     def check_degree(self, degree: int, what: str, column: int) -> None:
         if degree > self.limits.degree:
-            raise self.refusal(f"found {what} of degree {degree}, expected at most {self.limits.degree}", column)
+            raise self.error_at(f"found {what} of degree {degree}, expected at most {self.limits.degree}", column)
 
     def spend(self, terms: int, bits: int, column: int) -> None:
         """Count the machine words of so many terms with coefficients of so many bits."""
         self.words_left -= terms * (bits // 64 + 1)
         if self.words_left < 0:
-            raise self.refusal("found an expression that takes too much work to expand: simplify or split it", column)
+            raise self.error_at("found an expression that takes too much work to expand: simplify or split it", column)
 
-    def refusal(self, message: str, column: int) -> ExpressionError:
+    def error_at(self, message: str, column: int) -> ExpressionError:
         return ExpressionError(message, self.text, column)
 
     def unknown(self, name: str, column: int | None) -> UnknownName:
@@ -702,12 +706,12 @@ class _Arithmetic:
 
 def _constant(value: _Quotient) -> fmpq | None:
     """The number that a value is, or None where variables are left in it."""
-    above = value.above.value
-    if not above:
+    numerator = value.numerator.value
+    if not numerator:
         return fmpq(0)
-    if value.below is not None or value.above.degree > 0:
+    if value.denominator is not None or value.numerator.degree > 0:
         return None
-    return above if isinstance(above, fmpq) else above.leading_coefficient()
+    return numerator if isinstance(numerator, fmpq) else numerator.leading_coefficient()
 
 
 def _bits(integer: fmpz) -> int:

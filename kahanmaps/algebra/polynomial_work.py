@@ -1,7 +1,7 @@
-"""Units of counted work (work.py) for polynomials: of one variable modulo primes below 2^64, and of several over Q.
+"""Units of counted work (work.py) for polynomials: in one variable modulo primes below 2^64, and in several over Q.
 
-Lengths are numbers of coefficients, sizes numbers of terms. What stands here was fitted to FLINT 3, from 2 to 100,000
-coefficients, within a factor of two: classical products and remainders at small lengths, fast ones beyond.
+A length is a number of coefficients, a size a number of terms. The formulas were fitted to FLINT 3, from 2 to 100,000
+coefficients, within a factor of two: classical products and remainders for small lengths, fast ones for larger.
 """
 
 from __future__ import annotations
@@ -15,33 +15,35 @@ from kahanmaps.algebra.work import count
 
 
 def product_units(length: int, other: int) -> float:
-    """A product of two polynomials, or of as many terms of two series."""
+    """Return the units of a product of two polynomials, or of two series with so many terms."""
     short, long = (length, other) if length < other else (other, length)
     return 0.4 + long * (0.05 + min(short / 3000, 0.05 * short.bit_length()))
 
 
 def series_units(length: int) -> float:
-    """The inverse of a series of so many terms, or a quotient of two."""
+    """Return the units of the inverse of a series with so many terms, or of a quotient of two."""
     return 0.5 + 2 * product_units(length, length)
 
 
 def gcd_units(length: int, common: int = 0) -> float:
-    """The gcd of two polynomials, which has the length `common`."""
+    """Return the units of a gcd of two polynomials, where the gcd has the length `common`."""
     return 0.5 + length * (0.2 + min((length - common) / 500, 0.1 * sqrt(length)))
 
 
 def minpoly_units(length: int) -> float:
-    """The shortest linear recurrence of so many terms."""
+    """Return the units of the shortest linear recurrence of so many terms."""
     return 3 + length * (1.2 + min(length / 100, 0.2 * sqrt(length)))
 
 
 def roots_units(length: int, roots: int = 0) -> float:
-    """The roots modulo a prime of 61 bits, so many of them: powers of t modulo the polynomial, then modulo factors."""
+    """Return the units of computing the roots modulo a prime of 61 bits: powers of t modulo the polynomial, then
+    modulo its factors.
+    """
     return 150 * (product_units(length, length) + product_units(roots, roots) * roots.bit_length())
 
 
 def counted_product(left: Any, right: Any) -> Any:
-    """The product of two polynomials, counted as work."""
+    """Return the product of two polynomials, and count its work."""
     if isinstance(left, nmod_poly):
         count(product_units(len(left), len(right)))
     elif isinstance(left, fmpq_mpoly | nmod_mpoly):
@@ -50,9 +52,9 @@ def counted_product(left: Any, right: Any) -> Any:
 
 
 def factored(polynomial: Any) -> list[tuple[Any, int]]:
-    """The irreducible factors over Q of a polynomial in several variables, with multiplicities.
+    """Return the irreducible factors over Q of a polynomial in several variables, with multiplicities.
 
-    Counted by terms: who calls bounds their number.
+    The work is counted by terms, whose number the caller has to bound.
     """
     count(50 + 10 * len(polynomial))
     return [(factor, int(k)) for factor, k in polynomial.factor()[1]]

@@ -1,8 +1,8 @@
 """Polynomials and rational functions in named variables with exact rational coefficients.
 
-A polynomial is FLINT's `fmpq_mpoly` in a ring made by `ring`; this file adds what FLINT leaves out: values over
-any field (`evaluate`), primitive integer forms, monomials up to a degree, and quotients of two polynomials. Loading it
-teaches pickle what python-flint can pickle only as integers and rationals, so that results come back from processes.
+A polynomial is an `fmpq_mpoly` of FLINT in a ring made by `ring`. This module adds: values over any field (`evaluate`),
+primitive integer forms, monomials up to a degree, and quotients of two polynomials. Importing it also registers
+pickling of FLINT's polynomials, matrices, balls and residues, so that results can be sent between processes.
 
 >>> import pickle
 >>> x, y = ring(["x", "y"]).gens()
@@ -42,7 +42,7 @@ _MAX_FACTORED_TERMS = 100_000
 
 
 def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
-    """The ring Q[names], monomials ordered by degree and then reverse lexicographically.
+    """Return the ring Q[names], with monomials ordered by degree, then reverse lexicographically.
 
     >>> ring(["x", "y"]).gens()
     (x, y)
@@ -54,17 +54,17 @@ def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
 
 
 def names_of(polynomial: fmpq_mpoly) -> tuple[str, ...]:
-    """The names of the variables of the ring that `polynomial` lives in."""
+    """Return the names of the variables of the ring of `polynomial`."""
     return tuple(polynomial.context().names())
 
 
 def degree(polynomial: fmpq_mpoly) -> int:
-    """The total degree; -1 for the zero polynomial."""
+    """Return the total degree; -1 for the zero polynomial."""
     return -1 if polynomial.is_zero() else int(polynomial.total_degree())
 
 
 def degree_in(polynomial: fmpq_mpoly, count: int) -> int:
-    """The total degree in the first `count` variables; 0 for the zero polynomial.
+    """Return the total degree in the first `count` variables; 0 for the zero polynomial.
 
     >>> x, a = ring(["x", "a"]).gens()
     >>> degree_in(a**3*x**2 + a**7, 1)
@@ -79,7 +79,7 @@ def is_homogeneous(polynomial: fmpq_mpoly, of_degree: int) -> bool:
 
 
 def gradient(polynomial: fmpq_mpoly) -> tuple[fmpq_mpoly, ...]:
-    """The partial derivatives, in the order of the ring's variables.
+    """Return the partial derivatives, in the order of the variables of the ring.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> gradient(x**2*y)
@@ -89,7 +89,7 @@ def gradient(polynomial: fmpq_mpoly) -> tuple[fmpq_mpoly, ...]:
 
 
 def monomials(count: int, of_degree: int) -> Iterator[tuple[int, ...]]:
-    """Exponent vectors of all monomials of one degree in `count` variables, x1 first.
+    """Yield the exponent vectors of all monomials of one degree in `count` variables, x1 first.
 
     >>> list(monomials(2, 2))
     [(2, 0), (1, 1), (0, 2)]
@@ -102,52 +102,54 @@ def monomials(count: int, of_degree: int) -> Iterator[tuple[int, ...]]:
         yield (of_degree,)
         return
     for first in range(of_degree, -1, -1):
-        for rest in monomials(count - 1, of_degree - first):
-            yield (first, *rest)
+        for others in monomials(count - 1, of_degree - first):
+            yield (first, *others)
 
 
 def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
-    """The least positive integer whose product with `polynomial` has integer coefficients."""
+    """Return the least positive integer whose product with `polynomial` has integer coefficients."""
     return over_one(polynomial.coeffs())[1]
 
 
 def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
-    """About how many decimal digits the longest coefficient has, all of them over one denominator.
+    """Return the approximate number of decimal digits of the longest coefficient over a common denominator.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> digits_of([x/3, 1000*y])
     4
     """
-    integers, below = over_one(coefficient for polynomial in polynomials for coefficient in polynomial.coeffs())
-    longest = max([below, *integers], key=abs)
+    integers, denominator = over_one(coefficient for polynomial in polynomials for coefficient in polynomial.coeffs())
+    longest = max([denominator, *integers], key=abs)
     return int(longest.bit_length() * 0.30103) + 1
 
 
 def over_one_denominator(
     functions: Sequence[RationalFunction], context: fmpq_mpoly_ctx, images: Sequence[fmpq_mpoly]
 ) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
-    """Numerators over the least common denominator, and this, with `images` in the ring `context` for the variables.
+    """Return numerators over the least common denominator, and this denominator.
+
+    The variables are replaced by the `images`, in the ring `context`.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> over_one_denominator([RationalFunction(y, x), RationalFunction(x, x * y)], x.context(), [x, y])
     ([y^2, x], x*y)
     """
 
-    def moved(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+    def substituted(polynomial: fmpq_mpoly) -> fmpq_mpoly:
         count = polynomial.context().nvars()
         if count:
             return polynomial.compose(*images[:count], ctx=context)
         return context.constant(0 if polynomial.is_zero() else polynomial.leading_coefficient())
 
-    pairs = [(moved(function.numerator), moved(function.denominator)) for function in functions]
-    below = context.constant(1)
-    for _, denominator in pairs:
-        below = below * denominator / below.gcd(denominator)
-    return [above * (below / denominator) for above, denominator in pairs], below
+    pairs = [(substituted(function.numerator), substituted(function.denominator)) for function in functions]
+    denominator = context.constant(1)
+    for _, entry_denominator in pairs:
+        denominator = denominator * entry_denominator / denominator.gcd(entry_denominator)
+    return [numerator * (denominator / entry_denominator) for numerator, entry_denominator in pairs], denominator
 
 
 def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
-    """The pair (c, P) with polynomial = c P, P of coprime integer coefficients, its leading one positive.
+    """Return (c, P) with polynomial = c P, where P has coprime integer coefficients, the leading one positive.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> primitive_part(x/2 - 3*y/4)
@@ -155,17 +157,18 @@ def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
     """
     if polynomial.is_zero():
         return fmpq(1), polynomial
-    integers, below = over_one(polynomial.coeffs())
-    factor = fmpq(content(integers), below)
+    integers, denominator = over_one(polynomial.coeffs())
+    factor = fmpq(content(integers), denominator)
     if polynomial.leading_coefficient() < 0:
         factor = -factor
     return factor, polynomial / factor
 
 
 def irreducible_factors(polynomial: fmpq_mpoly) -> list[tuple[fmpq_mpoly, int]]:
-    """The factors over Q that are no numbers, with their powers; of more than 100,000 terms the polynomial itself.
+    """Return the nonconstant irreducible factors over Q with their powers.
 
-    FLINT takes some ten microseconds a term, and cannot be interrupted.
+    A polynomial of more than 100,000 terms is returned unfactored: FLINT takes some ten microseconds for each term, and
+    cannot be interrupted.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> irreducible_factors(2 * x**2 * (x + y))
@@ -178,26 +181,26 @@ def irreducible_factors(polynomial: fmpq_mpoly) -> list[tuple[fmpq_mpoly, int]]:
 
 
 def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
-    """The value at `point`, whose entries are elements of `field`; coefficients are carried into the field.
+    """Return the value at `point`, whose entries are elements of `field`; coefficients are converted to the field.
 
-    Raises `BadPrime` where the field is GF(p) and p divides the denominator of a coefficient.
+    Raises `BadPrime` if the field is GF(p) and p divides the denominator of a coefficient.
     """
     if all(isinstance(entry, fmpq) for entry in point):
-        # In integers over one denominator: a gcd for the result, none for each term.
+        # Compute in integers over a common denominator: one gcd for the result instead of one for each term.
         top = degree(polynomial)
         if top <= 0:
             return polynomial.leading_coefficient() if top == 0 else fmpq(0)
         X, W = over_one(point)
-        below = common_denominator(polynomial)
+        denominator = common_denominator(polynomial)
         powers: list[list[Any]] = [*([fmpz(1), entry] for entry in X), [fmpz(1), W]]
         total: Any = fmpz(0)
         for monomial, coefficient in polynomial.terms():
-            term: Any = coefficient.p * (below // coefficient.q)
+            term: Any = coefficient.p * (denominator // coefficient.q)
             for table, exponent in zip(powers, (*monomial, top - int(sum(monomial))), strict=True):
                 if exponent:
                     term = term * _power(table, exponent)
             total += term
-        return fmpq(total, below * _power(powers[-1], top))
+        return fmpq(total, denominator * _power(powers[-1], top))
     own = field.value(polynomial, point)
     if own is not None:
         return own
@@ -215,14 +218,14 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
 
 
 def _power(table: list[Any], exponent: int) -> Any:
-    """table[1]^exponent from a table of powers that grows as needed."""
+    """Return table[1]^exponent from a table of powers, which is extended as needed."""
     while len(table) <= exponent:
         table.append(table[-1] * table[1])
     return table[exponent]
 
 
 def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> tuple[fmpq_mpoly, ...]:
-    """The entries of `matrix` times the column of `polynomials`."""
+    """Return the entries of `matrix` times the column of `polynomials`."""
     zero: Any = polynomials[0].context().constant(0)
     combined = []
     for i in range(matrix.nrows()):
@@ -235,32 +238,34 @@ def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> 
 
 
 def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:
-    """The polynomial with some variables replaced by numbers, in the ring of the remaining variables."""
+    """Replace some variables by numbers; the result is in the ring of the remaining variables."""
     names = names_of(polynomial)
     known: dict[Any, Any] = {name: value for name, value in values.items() if name in names}
     return polynomial.subs(known).project_to_context(ring([name for name in names if name not in known]))
 
 
 def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
-    """The coefficients of the monomials in the first `count` variables, polynomials in the others, in the same ring.
+    """Return the coefficients of the monomials in the first `count` variables.
+
+    They are polynomials in the other variables, as elements of the same ring.
 
     >>> x, a, b = ring(["x", "a", "b"]).gens()
     >>> coefficients_in(a*x**2 + b*x - a*b*x + 3, 1)
     [a, -a*b + b, 3]
     """
-    found: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
+    coefficients: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
     for monomial, value in polynomial.terms():
         exponents = tuple(int(e) for e in monomial)
-        found.setdefault(exponents[:count], {})[((0,) * count + exponents[count:])] = value
-    return [polynomial.context().from_dict(terms) for terms in found.values()]
+        coefficients.setdefault(exponents[:count], {})[((0,) * count + exponents[count:])] = value
+    return [polynomial.context().from_dict(terms) for terms in coefficients.values()]
 
 
 @dataclass(frozen=True, eq=False)
 class RationalFunction:
     """A quotient of two polynomials over Q; the denominator has coprime integer coefficients, the first positive.
 
-    Common factors are not removed (a gcd of large polynomials costs more than it is worth here); two rational
-    functions are equal when the cross products are.
+    Common factors are not removed, since a gcd of large polynomials is expensive; two rational functions are equal if
+    the cross products are.
 
     >>> x, y = ring(["x", "y"]).gens()
     >>> RationalFunction(x, 2*y) == RationalFunction(x*y, 2*y**2)
@@ -279,7 +284,7 @@ class RationalFunction:
 
     @classmethod
     def reduced(cls, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> RationalFunction:
-        """The quotient in lowest terms.
+        """Return the quotient in lowest terms.
 
         >>> x, y = ring(["x", "y"]).gens()
         >>> RationalFunction.reduced(x * y, 2 * y**2).denominator
@@ -296,7 +301,7 @@ class RationalFunction:
             return False
         return bool(self.numerator * other.denominator == other.numerator * self.denominator)
 
-    # Equal functions may be written with different common factors, so no cheap hash is consistent with ==.
+    # Equal functions may have different common factors, so there is no fast hash that is consistent with ==.
     __hash__ = None  # type: ignore[assignment]
 
     @property
@@ -308,16 +313,16 @@ class RationalFunction:
         return names_of(self.numerator)
 
     def value(self, field: Any, point: Sequence[Any]) -> Any:
-        """The value at `point` over `field`, or None where the denominator vanishes."""
-        below = evaluate(self.denominator, field, point)
-        if field.is_zero(below):
+        """Return the value at `point` over `field`, or None where the denominator vanishes."""
+        denominator = evaluate(self.denominator, field, point)
+        if field.is_zero(denominator):
             return None
-        above = evaluate(self.numerator, field, point)
+        numerator = evaluate(self.numerator, field, point)
         with field.working():
-            return above / below
+            return numerator / denominator
 
 
-# Pickles.
+# Pickling.
 
 
 def _polynomial(names: tuple[str, ...], ordering: str, terms: dict[tuple[int, ...], fmpq]) -> fmpq_mpoly:
@@ -325,7 +330,7 @@ def _polynomial(names: tuple[str, ...], ordering: str, terms: dict[tuple[int, ..
 
 
 def _of_ball(x: arb) -> tuple[Any, ...]:
-    """Midpoint and radius are integers times powers of 2, exactly, whatever the precision in force."""
+    """Return midpoint and radius as exact integers times powers of 2, independent of the current precision."""
     return arb, tuple(end.man_exp() if end.is_finite() else float(end) for end in (x.mid(), x.rad()))
 
 
@@ -349,5 +354,5 @@ copyreg.pickle(fmpq_mpoly, lambda P: (_polynomial, (P.context().names(), P.conte
 copyreg.pickle(arb, _of_ball)
 copyreg.pickle(acb, lambda x: (acb, (x.real, x.imag)))
 copyreg.pickle(nmod, lambda x: (nmod, (int(x), x.modulus())))
-# The modulus of a residue: it does not say it itself.
+# fmpz_mod has no method for its modulus p: the residue 0 x - 1 is p - 1.
 copyreg.pickle(fmpz_mod, lambda x: (_residue, (int(x), int(0 * x - 1) + 1)))

@@ -1,7 +1,7 @@
 """Rational numbers from their residues: Wang's reconstruction, many numbers over one denominator, Chinese remainders.
 
-Nothing here proves that a number found is the one meant: a residue fits infinitely many fractions, and these functions
-return the simplest. Whoever calls them has to check the answer, for instance modulo another prime.
+A residue fits infinitely many fractions, and these functions return the simplest one. The caller has to check the
+answer, for instance modulo another prime.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from collections.abc import Callable, Sequence
 
 from flint import fmpq, fmpz, fmpz_mat
 
-_TOGETHER = 7  # residues in one lattice: heights up to m^(7/8), where Wang's bound is m^(1/2)
-_SPARE_BITS = 4  # by which a common denominator must beat what chance would give
+_MAX_TOGETHER = 7  # residues in one lattice: heights up to m^(7/8), where Wang's bound is m^(1/2)
+_SPARE_BITS = 4  # a common denominator must be so many bits shorter than for random residues
 
 
 def random_prime(rng: random.Random, bits: int = 61) -> int:
-    """A random prime with this number of bits, at least 2; a given `rng` in a given state always gives the same one.
+    """Draw a random prime with this number of bits, at least 2; it depends on the state of `rng` only.
 
-    Modulo 61 bits FLINT has gcds of polynomials and echelon forms in two thirds of the time that 63 bits take.
+    With 61 bits FLINT computes gcds of polynomials and echelon forms in two thirds of the time for 63 bits.
 
     >>> random_prime(random.Random(1)).bit_length()
     61
@@ -30,7 +30,7 @@ def random_prime(rng: random.Random, bits: int = 61) -> int:
 
 
 def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
-    """The fraction n/d = residue modulo `modulus` with |n| and d at most sqrt((modulus - 1)/2), if there is one.
+    """Return the fraction n/d = residue modulo `modulus` with |n| and d at most sqrt((modulus - 1)/2), or None.
 
     There is at most one. Exact; `modulus` is at least 2 and need not be prime.
 
@@ -40,42 +40,48 @@ def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
     True
     """
     bound = int(fmpz((modulus - 1) // 2).isqrt())
-    above, below = (modulus, 0), (residue % modulus, 1)
-    while below[0] > bound:
-        quotient = above[0] // below[0]
-        above, below = below, (above[0] - quotient * below[0], above[1] - quotient * below[1])
-    n, d = below
+    numerator, denominator = (modulus, 0), (residue % modulus, 1)
+    while denominator[0] > bound:
+        quotient = numerator[0] // denominator[0]
+        numerator, denominator = (
+            denominator,
+            (numerator[0] - quotient * denominator[0], numerator[1] - quotient * denominator[1]),
+        )
+    n, d = denominator
     if d == 0 or abs(d) > bound or fmpz(n).gcd(fmpz(d)) != 1:
         return None
     return fmpq(n, d)
 
 
 def simple_fraction(residue: int, modulus: int, spare_bits: int) -> fmpq | None:
-    """The fraction n/d with this residue for which |n| d is least, if that is below modulus / 2^spare_bits.
+    """Return the fraction n/d with this residue and the least |n| d, if this is less than modulus / 2^spare_bits.
 
-    A random residue has such a fraction with a probability of about 2^-spare_bits times the bits of the modulus, and so
-    has the residue of a simple fraction another one, if the modulus is random: one near a power of 10 is close to small
-    multiples of such powers. The numerator may be much longer than the denominator or the reverse. Exact.
+    A random residue has such a fraction with a probability of about 2^-spare_bits times the bits of the modulus. Trap:
+    the modulus must be random too; with one near a power of 10 a simple fraction may have the residue of a simpler one.
+    The numerator may be much longer than the denominator or the reverse. Exact.
 
     >>> m = (2**61 - 1) * (2**63 - 25)
     >>> simple_fraction(10**20 * pow(7, -1, m), m, 40), simple_fraction(3**84, m, 40)
     (100000000000000000000/7, None)
     """
-    above, below = (modulus, 0), (residue % modulus, 1)
-    best = below
-    while below[0] * abs(below[1]):
-        best = min(best, below, key=lambda pair: pair[0] * abs(pair[1]))
-        quotient = above[0] // below[0]
-        above, below = below, (above[0] - quotient * below[0], above[1] - quotient * below[1])
+    numerator, denominator = (modulus, 0), (residue % modulus, 1)
+    best = denominator
+    while denominator[0] * abs(denominator[1]):
+        best = min(best, denominator, key=lambda pair: pair[0] * abs(pair[1]))
+        quotient = numerator[0] // denominator[0]
+        numerator, denominator = (
+            denominator,
+            (numerator[0] - quotient * denominator[0], numerator[1] - quotient * denominator[1]),
+        )
     n, d = best
     return fmpq(n, d) if n * abs(d) < modulus >> spare_bits else None
 
 
 def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] | None:
-    """The simplest fractions with these residues, taken together; None where no simple ones stand out.
+    """Return the simplest fractions with these residues, taken together; None if no fractions are simple enough.
 
-    Numbers over one common denominator may be higher than alone: for k of them up to about modulus^(k/(k+1)), found as
-    a short vector of a lattice. Exact, but a guess: see the top of the file.
+    Numbers with a common denominator may be longer than single ones: k of them may have heights up to about
+    modulus^(k/(k+1)); they are found as a short vector of a lattice (LLL). The answer is a guess to be checked.
 
     >>> m = 2**61 - 1
     >>> numbers = [fmpq(n, 10**10 + 19) for n in (10**10, -3141592653)]
@@ -83,34 +89,34 @@ def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] |
     >>> rational_vector(residues, m) == tuple(numbers), rational_reconstruction(residues[0], m) == numbers[0]
     (True, False)
     """
-    telling = [i for i, residue in enumerate(residues) if residue not in (0, 1, modulus - 1)]
-    step = -(-len(telling) // _TOGETHER) or 1
-    chosen = [residues[i] for i in telling[::step]]
-    below, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(chosen)
+    nontrivial = [i for i, residue in enumerate(residues) if residue not in (0, 1, modulus - 1)]
+    step = -(-len(nontrivial) // _MAX_TOGETHER) or 1
+    chosen = [residues[i] for i in nontrivial[::step]]
+    denominator, bound, k = 1, int(fmpz((modulus - 1) // 2).isqrt()), len(chosen)
     if k > 1:
-        # The q > 0 for which q and all q r modulo `modulus` are smallest, if that is smaller than chance allows.
+        # The q > 0 with the smallest q and q r modulo `modulus`, if they are smaller than for random residues.
         rows = [[1, *chosen], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
         size, q = max(abs(int(entry)) for entry in shortest), abs(int(shortest[0]))
         if q and size ** (k + 1) << (_SPARE_BITS * (k + 1)) <= modulus**k:
-            below, bound = q, int(fmpz(modulus**k).root(k + 1)) >> _SPARE_BITS
-    found = []
+            denominator, bound = q, int(fmpz(modulus**k).root(k + 1)) >> _SPARE_BITS
+    fractions = []
     for residue in residues:
-        n = residue * below % modulus
+        n = residue * denominator % modulus
         n = n - modulus if n > modulus // 2 else n
         if abs(n) > bound:
             fraction = rational_reconstruction(n, modulus)
             if fraction is None:
                 return None
-            below *= int(fraction.q)  # the others most likely need it too
-            found.append(fraction / (below // int(fraction.q)))
+            denominator *= int(fraction.q)  # probably a factor of the other denominators too
+            fractions.append(fraction / (denominator // int(fraction.q)))
         else:
-            found.append(fmpq(n, below))
-    return tuple(found)
+            fractions.append(fmpq(n, denominator))
+    return tuple(fractions)
 
 
 def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) -> list[int]:
-    """The residues modulo `modulus * prime` that are `old` modulo the first and `new` modulo the second.
+    """Return the residues modulo `modulus * prime` that are `old` modulo `modulus` and `new` modulo `prime`.
 
     >>> chinese([1, 2], 3, [4, 0], 5)
     [4, 5]
@@ -120,12 +126,13 @@ def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) ->
 
 
 def from_residues(
-    modulo: Callable[[int], Sequence[Sequence[int]] | None], most_primes: int
+    modulo: Callable[[int], Sequence[Sequence[int]] | None], max_primes: int
 ) -> list[tuple[fmpq, ...]] | None:
-    """The simplest fractions that have the residues `modulo(prime)` for several primes, and for one more.
+    """Find the simplest fractions with the residues `modulo(prime)` for several primes, checked with a further prime.
 
-    They come in groups of numbers that are likely to have a denominator in common. None where `modulo` is None, or the
-    primes are not enough. The same primes are taken each time: of unlucky ones only the work is wasted.
+    The residues come in groups of numbers that probably have a common denominator. Returns None if `modulo` returns
+    None, or `max_primes` are not enough. Every call uses the same primes: since the answer is checked, a bad prime
+    costs only time.
 
     >>> numbers = (fmpq(355, 113), fmpq(-7, 3**40))
     >>> from_residues(lambda p: [[int(x.p % p) * pow(int(x.q), -1, p) % p] for x in numbers], 5)
@@ -133,7 +140,7 @@ def from_residues(
     """
     rng = random.Random(0)
     residues, modulus, guesses, next_guess = list[list[int]](), 1, list[tuple[fmpq, ...]](), 2
-    for count in range(1, most_primes + 1):
+    for count in range(1, max_primes + 1):
         prime = random_prime(rng)
         new = modulo(prime)
         if new is None:
@@ -147,7 +154,7 @@ def from_residues(
         residues = [chinese(old, modulus, group, prime) for old, group in zip(residues or new, new, strict=True)]
         modulus *= prime
         guesses = []
-        if count >= next_guess:  # a guess takes longer than a prime
+        if count >= next_guess:  # not after each prime, since a guess takes longer than the values modulo a prime
             for group in residues:
                 guess = rational_vector(group, modulus)
                 if guess is None:

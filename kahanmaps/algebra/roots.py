@@ -1,7 +1,7 @@
-"""A root of an irreducible polynomial over Q, the value of a parameter: `root of t^2 - 2`, `root of t^2 - 2 near 1.4`.
+"""Algebraic numbers as values of parameters: `root of t^2 - 2`, `root of t^2 - 2 near 1.4`.
 
-Conjugate roots can not be told apart by identities over Q: what is exact holds in Q[t]/g for the class of t, and so for
-every root of g. Modulo a prime any root there stands for it; real numbers need the embedding that `near` chooses.
+Identities over Q cannot distinguish conjugate roots: exact results hold in Q[t]/g for the class of t, and so for every
+root of g. Modulo a prime any root represents it; real numbers need the embedding that `near` selects.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _GUARD_BITS = 64
 
 
 class Root:
-    """A root of the irreducible `polynomial`, monic; of several real ones that next to `near`, where it is given.
+    """A root of the monic irreducible `polynomial`; if `near` is given, the real root closest to it.
 
     >>> root = parse_root("root of 2*t^2 - 4 near 1.4")
     >>> root, root.number_field, root == parse_root("root of t^2 - 2 near 3/2")
@@ -53,8 +53,8 @@ class Root:
         self.near = near
         self._near_text = "" if near is None else QQ.format(near)
         if near is not None:
-            with suppress(InputError):  # which is said where the real number is needed
-                # One text for all numbers that mean the same root: the first decimal of 4, 8, ... digits that does.
+            with suppress(InputError):  # the error is raised where the real number is needed
+                # Use the same text for all `near` with the same root: the shortest decimal of 4, 8, ... digits.
                 root = self._real(256)
                 for digits in (4, 8, 16, 32, 64):
                     text = root.str(digits, radius=False)
@@ -65,7 +65,7 @@ class Root:
 
     @property
     def degree(self) -> int:
-        """That of the number field."""
+        """The degree of the number field."""
         return int(self.polynomial.degree())
 
     @cached_property
@@ -74,7 +74,10 @@ class Root:
         return EtaleAlgebra(self.polynomial)
 
     def over(self, field: Field) -> Any:
-        """The root as an element of the field. Raises BadPrime where GF(p) has none, InputError for other fields."""
+        """Return the root as an element of the field.
+
+        Raises BadPrime if GF(p) contains no root, InputError for other fields.
+        """
         if isinstance(field, EtaleAlgebra) and field == self.number_field:
             return field.generator
         if isinstance(field, PrimeField):
@@ -82,7 +85,7 @@ class Root:
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
-            # For all conjugates: the root is b/q for a b that is integral, and of Cauchy's size at most.
+            # A bound for all conjugates: the root is b/q with an algebraic integer b within Cauchy's bound.
             q = fmpz(self.polynomial.denom())
             size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
             return Bound(field, CoefficientSize(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
@@ -91,18 +94,18 @@ class Root:
         raise InputError(f"a {self} is no element of {field}")
 
     def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
-        """A polynomial with the root for its k-th variable, in lowest terms: 0 where it vanishes at the root."""
+        """Reduce a polynomial modulo the minimal polynomial of its k-th variable: 0 if it vanishes at the root."""
         x = polynomial.context().gens()[k]
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
     def real_approximation(self, bits: int = 256) -> fmpq:
-        """A rational number as close to the real root as so many bits allow."""
+        """Return a rational approximation of the real root to so many bits."""
         middle = self._real(bits).mid()
         mantissa, exponent = middle.man_exp()
         return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
     def residues(self, field: PrimeField) -> list[int]:
-        """All roots modulo the prime, each once. Raises BadPrime where there is none."""
+        """Return all distinct roots modulo the prime. Raises BadPrime if there are none."""
         p = field.prime
         if p >= 2**63:
             raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
@@ -114,7 +117,7 @@ class Root:
 
     @property
     def decimal(self) -> str:
-        """The real root that is meant, `, about 1.41421356237310`; empty where there is none, or no choice."""
+        """The real root as text, `, about 1.41421356237310`; empty if there is none or it is ambiguous."""
         try:
             return f", about {self._real(64).str(15, radius=False)}"
         except InputError:
@@ -123,15 +126,16 @@ class Root:
     def _real(self, bits: int, near: fmpq | None = None) -> arb:
         near = self.near if near is None else near
         with flint.ctx.workprec(bits + _GUARD_BITS):
-            roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs say less
-            found: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
-            if not found:
+            roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs have a weaker type
+            real_roots: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
+            if not real_roots:
                 raise InputError(f"a {self} is not real: take exact or mod:P arithmetic")
             middle = arb(0 if near is None else near)
-            first, *others = sorted(found, key=lambda root: float(abs(root - middle)))
+            first, *others = sorted(real_roots, key=lambda root: float(abs(root - middle)))
             if others and (near is None or not abs(first - middle) < abs(others[0] - middle)):  # a comparison of balls
-                texts = ", ".join(root.str(6, radius=False) for root in found)
-                raise InputError(f"a {self} may be {texts}: say which, e.g. near {found[-1].str(4, radius=False)}")
+                texts = ", ".join(root.str(6, radius=False) for root in real_roots)
+                example = real_roots[-1].str(4, radius=False)
+                raise InputError(f"a {self} may be {texts}: say which, e.g. near {example}")
             return first
 
     def __eq__(self, other: object) -> bool:
@@ -146,7 +150,7 @@ class Root:
 
 
 class AlgebraicPoint(NamedTuple):
-    """A point over Q[t]/g, its coordinates polynomials in t, a `root` of g.
+    """A point over Q[t]/g: its coordinates are polynomials in t, a `root` of g.
 
     >>> point = parse_algebraic_point("1, 2*t/3", {"t": parse_root("root of t^2 + 1")}, {})
     >>> point.over(point.root.number_field), point.over(PrimeField(5))
@@ -157,12 +161,12 @@ class AlgebraicPoint(NamedTuple):
     entries: tuple[fmpq_mpoly, ...]
 
     def over(self, field: Field) -> tuple[Any, ...]:
-        """The point over a field with such a root. Raises BadPrime, InputError as `Root.over` does."""
+        """Return the point over a field that contains the root. Raises BadPrime, InputError as `Root.over` does."""
         root = self.root.over(field)
         return tuple(evaluate(entry, field, (root,)) for entry in self.entries)
 
     def real_approximation(self) -> tuple[fmpq, ...]:
-        """A rational point next to it. Raises InputError where the root is not real."""
+        """Return a rational approximation of the point. Raises InputError if the root is not real."""
         root = self.root.real_approximation()
         return tuple(evaluate(entry, QQ, (root,)) for entry in self.entries)
 
@@ -170,18 +174,18 @@ class AlgebraicPoint(NamedTuple):
 def parse_algebraic_point(
     text: str, roots: Mapping[str, Root], constants: Mapping[str, fmpq]
 ) -> AlgebraicPoint | tuple[fmpq, ...]:
-    """The point whose coordinates are polynomials in one algebraic number and constants; rational where it lacks.
+    """Parse a point whose coordinates are polynomials in one algebraic number and constants.
 
     Args:
-        text: as `parse_point` has it, with names in the coordinates.
+        text: the coordinates in the form of `parse_point`, with names allowed.
         roots: algebraic numbers by name.
         constants: rational numbers by name.
 
     Returns:
-        The point, exact.
+        The exact point; a rational point if no algebraic number occurs.
 
     Raises:
-        InputError: for a text that cannot be read, with the number of the entry, and for two algebraic numbers.
+        InputError: for invalid text, with the number of the entry, and for two different algebraic numbers.
     """
     entries = []
     for number, (start, end) in enumerate(point_entries(text), 1):
@@ -205,7 +209,7 @@ def parse_algebraic_point(
 
 
 def parse_root(text: str) -> Root | None:
-    """The root that a text `root of g`, `root of g near r` or `sqrt(2)` names; None for other text. Raises InputError.
+    """Parse `root of g`, `root of g near r` or `sqrt(2)`; return None for other text. Raises InputError.
 
     >>> print(parse_root("-sqrt(2)"), parse_root("1/2"))
     root of t^2 - 2 near -1.414 None
@@ -213,14 +217,14 @@ def parse_root(text: str) -> Root | None:
     square = _SQUARE_ROOT.fullmatch(text)
     if square is not None:
         number = parse_number(square["number"])
-        side = -1 if square["sign"] else 1  # next to any number of its sign
+        side = -1 if square["sign"] else 1  # any number of the same sign selects the root
         return Root(fmpq_poly([-number, 0, 1]), fmpq(side) if number > 0 else None)
-    found = _FORM.fullmatch(text)
-    if found is None:
+    match = _FORM.fullmatch(text)
+    if match is None:
         return None
-    names = sorted(set(re.findall(r"[A-Za-z_]\w*", found["g"])))
+    names = sorted(set(re.findall(r"[A-Za-z_]\w*", match["g"])))
     if len(names) != 1:
         raise InputError(f"found {quoted(text)}, expected a polynomial in one variable, e.g. root of t^2 - 2")
-    terms = {int(e): c for (e,), c in parse_polynomial(found["g"], names).terms()}
+    terms = {int(e): c for (e,), c in parse_polynomial(match["g"], names).terms()}
     coefficients = [terms.get(k, fmpq(0)) for k in range(max(terms, default=0) + 1)]
-    return Root(fmpq_poly(coefficients), None if found["near"] is None else parse_number(found["near"]))
+    return Root(fmpq_poly(coefficients), None if match["near"] is None else parse_number(match["near"]))

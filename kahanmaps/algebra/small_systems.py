@@ -1,13 +1,14 @@
-"""All rational solutions of a small system of polynomial equations over Q, exactly: factor and branch.
+"""All rational solutions of a small system of polynomial equations over Q, exactly, by factoring and branching.
 
-Equations that factor are branched on, linear ones are substituted, and where nothing factors a Groebner basis of
-bounded size is computed. A finite set of solutions is then read off from a matrix of multiplication in the quotient
-ring, whose rational eigenvalues are the values of a linear form at the rational solutions. What is left is told, never
-dropped: linear families with free variables, equations that this does not solve, and how many solutions are not
-rational. Every step loses no rational solution.
+The solver branches on the factors of an equation and substitutes linear equations; if nothing factors, it computes a
+Groebner basis of bounded size. For a finite set of solutions it then uses the matrix of multiplication by a linear form
+in the quotient ring: its rational eigenvalues are the values of the form at the rational solutions. The result also
+contains linear families with free variables, equations that could not be solved, and the numbers of solutions that are
+not rational. No step discards a rational solution.
 
-What FLINT cannot interrupt is bounded by size: Groebner bases go one S-polynomial after the other here, and polynomials
-in several variables are factored up to a number of terms. All counts as work, in units fitted to measurements.
+FLINT cannot be interrupted, so single operations are bounded in size: Groebner bases are computed one S-polynomial
+after the other, and polynomials in several variables are factored only up to a number of terms. Everything counts as
+work, in units fitted to measurements.
 """
 
 from __future__ import annotations
@@ -30,16 +31,17 @@ from kahanmaps.algebra.work import SPENT, Budget, count
 MAX_BASIS = 120  # polynomials of a Groebner basis
 MAX_TERMS = 400  # of one of them
 MAX_BITS = 4_000  # of a coefficient
-MAX_FACTORED = 5_000  # terms of a polynomial in several variables that is factored, which takes some 20 ms then
+MAX_FACTORED = 5_000  # terms of a polynomial in several variables that is factored (about 20 ms)
 MAX_PARTS = 400  # points, families and unsolved parts together
-MAX_QUOTIENT = 130  # dimension of the quotient ring, so the number of solutions over the complex numbers
+MAX_QUOTIENT = 130  # dimension of the quotient ring: the number of complex solutions with multiplicity
 
 
 @dataclass(frozen=True)
 class SolutionComponent:
-    """Solutions: `values` are the variables as polynomials of degree at most 1 in those that stay free.
+    """A set of solutions: `values` are the variables as polynomials of degree at most 1 in the free variables.
 
-    `equations` hold for the free variables (none: a linear family, or one point where nothing is free).
+    `equations` are conditions on the free variables; without any it is a linear family, or a single point if no
+    variable is free.
     """
 
     values: tuple[fmpq_mpoly, ...]
@@ -47,7 +49,7 @@ class SolutionComponent:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """The indices of the variables that stay free."""
+        """The indices of the free variables."""
         used = [False] * self.values[0].context().nvars()
         for value in (*self.values, *self.equations):
             for i, exponent in enumerate(value.degrees()):
@@ -56,12 +58,12 @@ class SolutionComponent:
 
     @property
     def point(self) -> tuple[fmpq, ...]:
-        """The values where the free variables are 0."""
+        """The solution with all free variables equal to 0."""
         zero = (0,) * self.values[0].context().nvars()
         return tuple(value[zero] if not value.is_zero() else fmpq(0) for value in self.values)
 
     def slopes(self, i: int) -> list[fmpq]:
-        """The direction of the family that belongs to its free variable i."""
+        """Return the derivative of the values in the free variable i."""
         return [v.derivative(i).leading_coefficient() if v.degrees()[i] else fmpq(0) for v in self.values]
 
     def contains(self, other: SolutionComponent) -> bool:
@@ -77,16 +79,16 @@ class SolutionComponent:
 
 @dataclass
 class Solutions:
-    """What was found: linear families and points, what was not solved, and what is not rational.
+    """The result of `solve_system`: linear families and points, unsolved parts, and parts without rational points.
 
-    `conjugate` are the parts that have no rational point, in the order of `irrational`, which tells of them in words.
+    `conjugate` are the parts without a rational point, in the order of their descriptions `irrational`.
     """
 
     components: list[SolutionComponent] = field(default_factory=list)
     unsolved: list[SolutionComponent] = field(default_factory=list)
     conjugate: list[SolutionComponent] = field(default_factory=list)
     irrational: list[str] = field(default_factory=list)
-    without_basis: list[SolutionComponent] = field(default_factory=list)  # of the unsolved, those with too large a one
+    without_basis: list[SolutionComponent] = field(default_factory=list)  # unsolved: the Groebner basis was too large
     reason: str = ""  # why something is unsolved
 
     @property
@@ -96,28 +98,28 @@ class Solutions:
 
 
 def solve_system(equations: Sequence[fmpq_mpoly], variables: Sequence[fmpq_mpoly], budget: Budget) -> Solutions:
-    """The rational solutions of `equations` = 0, polynomials in the ring whose generators are `variables`.
+    """Solve `equations` = 0 over Q, for polynomials in the ring whose generators are `variables`.
 
-    Exact. What is not solved when the `budget` is spent is returned as unsolved.
+    Exact. Parts that are not solved when the `budget` is spent are returned as unsolved.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
-    >>> found = solve_system([x**2 - 1, x*y - y], (x, y), Budget())
-    >>> [component.values for component in found.components]
+    >>> solutions = solve_system([x**2 - 1, x*y - y], (x, y), Budget())
+    >>> [component.values for component in solutions.components]
     [(-1, 0), (1, y)]
     >>> solve_system([x**2 - 2, y], (x, y), Budget()).irrational
     ['x^2 - 2']
     """
     solver = _Solver(budget)
     solver.solve(list(equations), tuple(variables))
-    found = solver.found
-    found.components = without_contained(found.components)
-    found.irrational = list(dict.fromkeys(found.irrational))
-    return found
+    solutions = solver.solutions
+    solutions.components = without_contained(solutions.components)
+    solutions.irrational = list(dict.fromkeys(solutions.irrational))
+    return solutions
 
 
 def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
-    """The reduced basis of the linear span, leading monomials first, with coprime integer coefficients.
+    """Return the reduced echelon basis of the linear span, with coprime integer coefficients.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -145,7 +147,7 @@ def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
 
 
 def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-    """The remainder on division by all of `basis`: the normal form, where that is a Groebner basis.
+    """Return the remainder on division by all of `basis`: the normal form, if it is a Groebner basis.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -153,35 +155,36 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
     2*x
     """
     context = p.context()
-    done = context.constant(0)
+    remainder = context.constant(0)
     leads = [(tuple(g.monoms()[0]), g) for g in basis]
     while not p.is_zero():
         top, value = tuple(p.monoms()[0]), p.leading_coefficient()
         count(10 + len(p) + len(leads) / 2)
         for lead, g in leads:
             if all(a <= b for a, b in zip(lead, top, strict=True)):
-                rest = context.from_dict({tuple(b - a for a, b in zip(lead, top, strict=True)): fmpq(1)})
-                p = p - g * rest * (value / g.leading_coefficient())
+                cofactor = context.from_dict({tuple(b - a for a, b in zip(lead, top, strict=True)): fmpq(1)})
+                p = p - g * cofactor * (value / g.leading_coefficient())
                 break
         else:
             head = context.from_dict({top: value})
-            done, p = done + head, p - head
-    return done
+            remainder, p = remainder + head, p - head
+    return remainder
 
 
 def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
-    """Coordinates in which cubic forms may fall apart: a matrix whose columns are the new basis, or None.
+    """Find coordinates in which cubic forms may decouple: a matrix whose columns are the new basis, or None.
 
-    If the span of the forms has a basis each of which depends on its own coordinates, the Hessians of its members are
-    simultaneously block diagonal in these. They are the kernels of the factors of the characteristic polynomial
-    of the quotient of two of them. Any invertible matrix is a valid answer, and this one passes a third Hessian.
+    If the span of the forms has a basis whose elements depend on disjoint sets of coordinates, the Hessians of all
+    elements are block diagonal in these coordinates. The blocks are the kernels of the factors of the characteristic
+    polynomial of the quotient of two Hessians. Correctness does not depend on the answer, since the caller may use any
+    invertible matrix; the one returned is checked with a third Hessian.
     """
     if not forms or count < 2:
         return None
     rng = random.Random("decoupling")
 
     def hessian() -> fmpq_mat:
-        """Of a random combination, at a random point."""
+        """Return the Hessian of a random combination at a random point."""
         total = forms[0].context().constant(0)
         for p in forms:
             total = total + p * fmpq(rng.randint(1, 99))
@@ -203,36 +206,36 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
             power = power * ratio
         blocks.append(nullspace(QQ, part))
     T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
-    # Coordinates that do not decouple would only make the numbers longer.
-    inside = [k for k, block in enumerate(blocks) for _ in block]
+    # Return nothing unless the coordinates decouple: they would only make the numbers longer.
+    block_of = [k for k, block in enumerate(blocks) for _ in block]
     check = T.transpose() * hessian() * T
-    apart = all(check[i, j] == 0 for i in range(count) for j in range(count) if inside[i] != inside[j])
-    return T if apart and len(blocks) > 1 else None
+    is_decoupled = all(check[i, j] == 0 for i in range(count) for j in range(count) if block_of[i] != block_of[j])
+    return T if is_decoupled and len(blocks) > 1 else None
 
 
 class _Solver:
     def __init__(self, budget: Budget) -> None:
         self.budget = budget
-        self.found = Solutions()
+        self.solutions = Solutions()
         self.stopped = ""
 
-    def solve(self, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], based: bool = False) -> None:
-        """Add the solutions of `equations` to what was found; `based` says that they are a Groebner basis already."""
-        if self.stopped:  # told once
+    def solve(self, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], is_basis: bool = False) -> None:
+        """Add the solutions of `equations` to the result; `is_basis` says that they are already a Groebner basis."""
+        if self.stopped:  # the reason is already in the result
             return
         count(50)
-        given = [p for p in equations if not p.is_zero()]
-        equations = equations if based else independent(equations)
-        if len(given) > len(equations):
-            given = equations
+        original = [p for p in equations if not p.is_zero()]
+        equations = equations if is_basis else independent(equations)
+        if len(original) > len(equations):
+            original = equations
         if any(p.is_constant() for p in equations):
             return
         if not equations:
-            self.found.components.append(SolutionComponent(values))
+            self.solutions.components.append(SolutionComponent(values))
             return
         if self.budget.is_spent:
             self.stopped = SPENT
-        elif len(self.found.components) + len(self.found.unsolved) > MAX_PARTS:
+        elif len(self.solutions.components) + len(self.solutions.unsolved) > MAX_PARTS:
             self.stopped = f"there are more than {MAX_PARTS} parts"
         if self.stopped:
             self._give_up(equations, values, self.stopped)
@@ -242,34 +245,36 @@ class _Solver:
                 context = p.context()
                 gens, k = list(context.gens()), max(i for i, e in enumerate(p.degrees()) if e)
                 gens[k] = gens[k] - p / p.derivative(k).leading_coefficient()
-                count(sum(20 + len(q) * len(p) for q in (*given, *values)))
-                put = [tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (given, values)]
-                self.solve(list(put[0]), put[1])
+                count(sum(20 + len(q) * len(p) for q in (*original, *values)))
+                substituted = [
+                    tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (original, values)
+                ]
+                self.solve(list(substituted[0]), substituted[1])
                 return
-        # Factors that the equations have as they were given may be lost in combinations of them, as in x f, y g, z h.
-        best = _easiest_product(equations) or _easiest_product(given)
+        # The reduced basis may hide factors of the original equations, as for x f, y g, z h: try both.
+        best = _easiest_product(equations) or _easiest_product(original)
         if best is not None:
             for factor in sorted(best, key=lambda q: (degree(q), str(q))):
-                # The remainders: or the same product, mixed with other equations, would be branched on again.
-                self.solve([factor, *(divmod(p, factor)[1] for p in given)], values)
+                # Use remainders, since the solver would otherwise branch on the same product again.
+                self.solve([factor, *(divmod(p, factor)[1] for p in original)], values)
             return
         for p in equations:
-            if sum(e > 0 for e in p.degrees()) == 1:  # irreducible in one variable: no rational root
+            if sum(e > 0 for e in p.degrees()) == 1:  # irreducible in one variable and not linear: no rational root
                 self._no_rational_point(str(primitive_part(p)[1]), equations, values)
                 return
-        if based:
+        if is_basis:
             self._finite(equations, values)
             return
         basis = groebner(equations, self.budget)
         if basis is None:
             spent = self.budget.is_spent
             self._give_up(equations, values, SPENT if spent else "a Groebner basis would be too large")
-            self.found.without_basis.append(SolutionComponent(values, tuple(equations)))
+            self.solutions.without_basis.append(SolutionComponent(values, tuple(equations)))
             return
-        self.solve(basis, values, based=True)
+        self.solve(basis, values, is_basis=True)
 
     def _finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
-        """Branch on the rational values of a linear form, where the Groebner basis says that solutions are finite."""
+        """Branch on the rational values of a linear form if the Groebner basis shows finitely many solutions."""
         free = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
         quotient = quotient_monomials(basis, free)
         if quotient is None:
@@ -294,7 +299,7 @@ class _Solver:
         for factor, _ in factors:
             if factor.degree() > 1:
                 text = f"groups of {factor.degree()} conjugate solutions"
-                # The factor at the form, in the quotient ring: multiplied out it may have millions of terms.
+                # Evaluate the factor at the form in the quotient ring: expanded it may have millions of terms.
                 vector = fmpq_mat(len(quotient), 1)
                 for coefficient in reversed(factor.coeffs()):
                     vector = matrix * vector
@@ -305,18 +310,18 @@ class _Solver:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
 
     def _no_rational_point(self, text: str, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
-        self.found.irrational.append(text)
-        self.found.conjugate.append(SolutionComponent(values, tuple(equations)))
+        self.solutions.irrational.append(text)
+        self.solutions.conjugate.append(SolutionComponent(values, tuple(equations)))
 
     def _give_up(self, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], reason: str) -> None:
         part = SolutionComponent(values, tuple(equations))
-        if part not in self.found.unsolved:
-            self.found.unsolved.append(part)
-        self.found.reason = reason
+        if part not in self.solutions.unsolved:
+            self.solutions.unsolved.append(part)
+        self.solutions.reason = reason
 
 
 def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
-    """The factors of that one of the equations that falls apart best, None where none does."""
+    """Return the factors of the equation whose factorization is best to branch on; None if no equation factors."""
     products = []
     for p in equations:
         used = sum(e > 0 for e in p.degrees())
@@ -329,11 +334,11 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
             continue
         products.append(p.factor()[1])
     reducible = [[factor for factor, _ in powers] for powers in products if len(powers) > 1 or powers[0][1] > 1]
-    return min(reducible, key=lambda one: (max(map(degree, one)), sum(map(len, one))), default=None)
+    return min(reducible, key=lambda factors: (max(map(degree, factors)), sum(map(len, factors))), default=None)
 
 
 def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly] | None:
-    """The reduced Groebner basis, graded and reverse lexicographic, or None if it exceeds the limits or the budget.
+    """Compute the reduced Groebner basis (degree reverse lexicographic); None if it exceeds the limits or the budget.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -344,18 +349,18 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
     integers = fmpz_mpoly_ctx.get(names_of(equations[0]), Ordering.degrevlex)
     basis: list[Any] = []  # fmpz_mpoly, of which type checkers do not know spoly
     leads: list[tuple[int, ...]] = []
-    packed: list[int] = []  # the exponents of one, 16 bits each: it divides b if no bit of the guard is borrowed in b
+    packed: list[int] = []  # leading exponents, 16 bits each: a divides b if b + guard - a keeps all guard bits
     guard = sum(1 << 16 * i + 15 for i in range(integers.nvars()))
-    # Pairs of polynomials, those first whose leading monomials have the smallest common multiple in this order.
+    # A heap of pairs of polynomials, by the least common multiple of their leading monomials.
     pairs: list[tuple[int, list[int], int, int]] = []
-    waiting: set[tuple[int, int]] = set()  # the same pairs
+    waiting: set[tuple[int, int]] = set()  # the same pairs, for lookups
     bits = 1  # of the longest coefficient
 
     def pack(monomial: Iterable[int]) -> int:
         return sum(e << 16 * i for i, e in enumerate(monomial))
 
     def add(p: fmpz_mpoly) -> bool:
-        """Whether it is within the limits; then it is added."""
+        """Add p and return True, unless a limit is exceeded."""
         nonlocal bits
         bits = max(bits, *(abs(c).bit_length() for c in p.coeffs()))
         if len(basis) >= MAX_BASIS or len(p) > MAX_TERMS or bits > MAX_BITS:
@@ -372,8 +377,8 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         return True
 
     for p in filter(None, equations):
-        below = common_denominator(p)
-        cleared = integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()})
+        denominator = common_denominator(p)
+        cleared = integers.from_dict({tuple(m): c.p * (denominator // c.q) for m, c in p.terms()})
         if not add(cleared.primitive()[1]):
             return None
     used = sum(any(lead[i] for lead in leads) for i in range(integers.nvars()))
@@ -385,7 +390,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         waiting.remove((i, j))
         count(4 + len(basis) / 10)
         common = pack(map(max, leads[i], leads[j])) + guard
-        # A third leading monomial divides it, and both pairs with that are done: it reduces to 0 as well.
+        # Buchberger's chain criterion: a third leading monomial divides it, and both pairs with that one are done.
         if any(
             (common - lead) & guard == guard
             and k not in (i, j)
@@ -406,28 +411,28 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
 
 
 def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:
-    """The monomials that no leading monomial divides; None if they are infinitely many."""
+    """Return the monomials that no leading monomial divides; None if there are infinitely many."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     for i in free:
         if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leading):
             return None
     count = len(leading[0])
-    layer, found = [(0,) * count], []
+    layer, monomials = [(0,) * count], []
     while layer:
         layer = [m for m in layer if not any(all(a <= b for a, b in zip(lead, m, strict=True)) for lead in leading)]
-        found += layer
-        if len(found) > 4 * MAX_QUOTIENT:
-            return found
+        monomials += layer
+        if len(monomials) > 4 * MAX_QUOTIENT:
+            return monomials
         raised = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free))
         layer = list(dict.fromkeys(raised))
-    return found
+    return monomials
 
 
 def without_contained(components: Sequence[SolutionComponent]) -> list[SolutionComponent]:
-    """Each solution once: no component twice, and none inside a larger one."""
+    """Remove components that are equal to, or contained in, another one."""
     ordered = sorted(components, key=lambda c: -len(c.free))
-    kept: list[SolutionComponent] = []
+    maximal: list[SolutionComponent] = []
     for component in ordered:
-        if not any(larger.contains(component) for larger in kept):
-            kept.append(component)
-    return sorted(kept, key=lambda c: (len(c.free), [str(v) for v in c.values]))
+        if not any(larger.contains(component) for larger in maximal):
+            maximal.append(component)
+    return sorted(maximal, key=lambda c: (len(c.free), [str(v) for v in c.values]))

@@ -1,12 +1,11 @@
-"""Counted work: what bounds a search in place of a clock, so that the same question has the same answer on any machine.
+"""Counted work: it bounds a search instead of a clock, so that a search has the same result on every machine.
 
-Work is counted in units; one is about a microsecond of field operations on a laptop of 2020. Expensive operations
-count themselves, from the sizes of what they are given, before they are done: see `count` and the functions below it.
-A `Budget` is so many units; it is spent by all that is counted after it was made. `benchmarks/units.py` compares units
-with seconds.
+Work is counted in units of about a microsecond of field operations on a laptop of 2020. Expensive operations call
+`count` in advance, with an estimate from the sizes of their arguments. A `Budget` is a number of units; all work that
+is counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
 
-Trap: what a cache of a module keeps is not counted when it is asked for again, and budgets would then depend on what
-was asked before. For functions that count, `counted_cache` counts it again; caches of one search are harmless.
+Trap: a result from a module-level cache costs no work the second time, so budgets would depend on earlier calls. For
+functions that count work use `counted_cache`, which counts it again. Caches within a single search are harmless.
 """
 
 from __future__ import annotations
@@ -31,24 +30,24 @@ _counter = _Counter()
 
 
 def count(units: float) -> None:
-    """Count so many units of work as done, in this thread."""
+    """Add units to the work counted in this thread."""
     _counter.units += ceil(units)
 
 
 def counted() -> int:
-    """The units of work that were counted in this thread so far."""
+    """Return the units of work counted in this thread so far."""
     return _counter.units
 
 
 class Budget:
-    """Units of counted work that may be spent from now on, in the thread that made it.
+    """A limit on the work counted from now on, in the thread that created it.
 
     >>> budget = Budget(100)
     >>> stages = budget.share([1, 3])
     >>> next(stages).units
     25.0
     >>> count(5)
-    >>> budget.spent, budget.left, next(stages).units  # what the first stage left goes to the second
+    >>> budget.spent, budget.left, next(stages).units  # the unused units of the first stage go to the second
     (5, 95.0, 95.0)
     """
 
@@ -61,36 +60,36 @@ class Budget:
 
     @property
     def spent(self) -> int:
-        """The units that were counted since the budget was made."""
+        """The units counted since the budget was created."""
         return counted() - self._before
 
     @property
     def left(self) -> float:
-        """The units that may still be spent, at least 0."""
+        """The remaining units, at least 0."""
         return max(0.0, self.units - self.spent)
 
     @property
     def is_spent(self) -> bool:
-        """Whether nothing is left."""
+        """Whether no units remain."""
         return self.spent >= self.units
 
     def part(self, fraction: float) -> Budget:
-        """A budget of this fraction of what is left."""
+        """Return a budget of this fraction of the remaining units."""
         return Budget(self.left * fraction)
 
     def share(self, weights: Sequence[float]) -> Iterator[Budget]:
-        """Budgets for stages, in proportion to their weights; each is made when it is asked for.
+        """Yield budgets for stages, in proportion to their weights; each is created when the stage begins.
 
-        What one stage leaves goes to those after it.
+        Units that a stage does not use go to the later stages.
         """
         for k, weight in enumerate(weights):
             yield self.part(weight / sum(weights[k:]))
 
 
 def units_at(effort: int, units: float) -> float:
-    """The units at an effort, of which 1 is the default; each more doubles them, each less halves them.
+    """Return the units for an effort: `units` for the default 1, doubled for each step above, halved for each below.
 
-    Raises InputError for an effort that is no integer from -20 to 40.
+    Raises InputError for an effort that is not an integer from -20 to 40.
 
     >>> units_at(1, 100), units_at(3, 100), units_at(0, 100)
     (100.0, 400.0, 50.0)
@@ -101,18 +100,18 @@ def units_at(effort: int, units: float) -> float:
 
 
 def counted_cache(size: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """A decorator: keep the last results of a function, and count its work whenever a result is asked for."""
+    """Decorate a function with a cache of its last results that counts the work of a result on every call."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         @lru_cache(size)
-        def remembered(*arguments: Any) -> tuple[Any, int]:
+        def cached(*arguments: Any) -> tuple[Any, int]:
             before = counted()
             return function(*arguments), counted() - before
 
         @wraps(function)
         def call(*arguments: Any) -> Any:
             before = counted()
-            result, units = remembered(*arguments)
+            result, units = cached(*arguments)
             count(units - (counted() - before))
             return result
 

@@ -239,4 +239,4 @@ def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
         value = integral.value(functions, symbol if settings.eps is None else settings.eps, tuple(point))
     except BudgetExceeded:
         return False
-    return is_constant(value.above, value.below, H.dim)
+    return is_constant(value.numerator, value.denominator, H.dim)

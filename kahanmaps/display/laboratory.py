@@ -357,7 +357,7 @@ def _about(what: str, found: Any, *beside: str) -> tuple[str, str]:
 
 # What has a title here is shown by its lines: the title, and what stands beside it.
 _TITLES: dict[type, Callable[[Any], tuple[str, str]]] = {
-    IntegralSearch: lambda found: _about("integrals", found, f"{found.found} found; {found.count_text}"),
+    IntegralSearch: lambda found: _about("integrals", found, f"{found.formula_count} found; {found.count_text}"),
     DensitySearch: lambda found: _about("densities", found, "dx/phi is invariant"),
     PoissonSearch: lambda found: _about("Poisson tensors", found),
     DarbouxSearch: lambda found: _about("Darboux polynomials", found, f"by cofactor, up to degree {found.degree}"),

@@ -19,7 +19,7 @@ from dataclasses import replace
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.printing import PLAIN, Notation, above_and_below, first_terms
+from kahanmaps.algebra.printing import PLAIN, Notation, first_terms, integer_fraction
 from kahanmaps.display.markup import escape
 from kahanmaps.display_protocols import latex_form
 from kahanmaps.errors import InputError, counted
@@ -171,7 +171,7 @@ def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters:
     <span class="formula">\(H = x^2\)</span>
     """
     is_quotient = isinstance(function, RationalFunction) and not function.is_polynomial
-    is_negative, *sides = above_and_below(function) if isinstance(function, RationalFunction) else (False, function)
+    is_negative, *sides = integer_fraction(function) if isinstance(function, RationalFunction) else (False, function)
     sides = sides if is_quotient else sides[:1]
     if characters is not None and any(len(first_terms(side, characters)) < len(side) for side in sides):
         cut = [latex_cut(side, characters) for side in sides]

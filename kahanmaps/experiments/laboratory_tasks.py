@@ -86,7 +86,7 @@ def integrals(found: IntegralSearch) -> Result:
     return {
         "verdict": _weakest(verdict for _, verdict in found.formulas),
         "status": _state_of_integrals(found),
-        "integrals": found.found,
+        "integrals": found.formula_count,
         "codimension": found.codimension if found.profile.nullities else found.by_theorems or None,
         "formulas": [text for text, _ in found.formulas],
         "nullities": list(found.profile.nullities),

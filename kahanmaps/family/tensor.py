@@ -238,5 +238,5 @@ def _quotient(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField
 
 def _rational(element: Function) -> RationalFunction:
     """A quotient in lowest terms."""
-    common = element.above.gcd(element.below)
-    return RationalFunction(element.above / common, element.below / common)
+    common = element.numerator.gcd(element.denominator)
+    return RationalFunction(element.numerator / common, element.denominator / common)

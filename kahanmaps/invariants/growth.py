@@ -1,4 +1,4 @@
-"""How something grows with n: the degrees of iterates, or the heights of the points of an orbit."""
+"""The kinds of growth of the degrees of iterates, or of the heights of the points of an orbit."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from enum import StrEnum
 
 
 class Growth(StrEnum):
-    """The kinds of growth, the slower ones first; heights show them as far as a finite orbit does."""
+    """A kind of growth, slower ones first; a finite number of heights supports it, but does not prove it."""
 
     ZERO = "zero"  # from some term on
-    PERIODIC = "periodic"  # the start came back: exact
+    PERIODIC = "periodic"  # the orbit returned to its initial point: exact
     BOUNDED = "bounded"
     LOGARITHMIC = "logarithmic"
     LINEAR = "linear"
     QUADRATIC = "quadratic"
     POLYNOMIAL = "polynomial"
     EXPONENTIAL = "exponential"
-    UNKNOWN = "unknown"  # of degrees without a recurrence
-    UNDECIDED = "undecided"  # of heights that follow no rule
+    UNKNOWN = "unknown"  # degrees without a recurrence
+    UNDECIDED = "undecided"  # heights that match no rule
 
 
 OF_DEGREES = tuple(kind for kind in Growth if kind not in (Growth.PERIODIC, Growth.LOGARITHMIC, Growth.UNDECIDED))

@@ -1,36 +1,37 @@
-"""How fast the numbers of an exact orbit grow: heights h_0, h_1, ..., their kind of growth, and its constant.
+"""Heights h_0, h_1, ... of the points of an exact orbit, their kind of growth, and its constant.
 
-The height of a rational point x = (p_1 : ... : p_d : q), integers without a common factor, is here the bit length of
-the largest of them, that is floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: the logarithmic projective height up to
-less than one bit.
+The height of a rational point x = (p_1 : ... : p_d : q), with integers without a common factor, is here the bit length
+of the largest of them, floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: the logarithmic projective height up to less than
+one bit.
 
-Over a number field Q[t]/g of degree m it is the height of the rational point of all coefficients of 1, t, t^2, ...:
-between that of the point and m times as much, up to a constant (denominators are ideals, and the least integer in one
-is at most its norm), so that the kind of growth is the same.
+Over a number field Q[t]/g of degree m it is the height of the rational point of all coefficients of 1, t, t^2, ... Up
+to a constant this lies between the height of the point and m times it (denominators are ideals, and the least positive
+integer in an ideal is at most its norm), so that the kind of growth is the same.
 
-What is known. One step is a rational map of some degree d, so h(Phi(x)) <= d h(x) + O(1): no growth is faster than
-exponential. Where an orbit stays on a curve, some power of the map is an automorphism of (the smooth model of) a part
-of it. On a rational curve this is a Moebius map: heights grow linearly, or logarithmically where there is one fixed
-point, or the orbit comes back. On an elliptic curve of degree d in projective space that the map translates by T,
+Theory. One step is a rational map of some degree d, so h(Phi(x)) <= d h(x) + O(1): growth is at most exponential. If an
+orbit stays on a curve, some power of the map is an automorphism of (the smooth model of) a component. On a rational
+curve this is a Moebius map: heights grow linearly, or logarithmically if there is one fixed point, or the orbit is
+periodic. On an elliptic curve of degree d in projective space that the map translates by T,
 
     h_n = c n^2 + b n + O(1),        c = d hhat(T)/log 2,
 
-by the theory of Neron and Tate, with hhat the canonical height that belongs to the divisor (O). In a plane of the
-normal form d = 3, and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of an orbit of infinitely
-many points are unbounded (Northcott).
+by the theory of Neron and Tate, where hhat is the canonical height of the divisor (O). In a plane of the normal form
+d = 3, and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of an infinite orbit are unbounded
+(Northcott).
 
 There is a formula for c up to a bounded error. Over Q(gamma) the height pairing <T, T> of that point is 1/12
 (docs/mathematics.md, by shioda-1990), so hhat(T) = (log 2) h(gamma)/24 + O(1) at rational gamma (tate-1983), and
 
     c = h(gamma)/8 + O(1),       gamma = 1 - disc(h) level^2,
 
-where h(gamma) is the height of a rational number in bits. O(1) is bounded, by which numbers is not known to us:
-measured were -0.55 to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So heights grow the
-faster the longer the coefficients, eps and the start are.
+where h(gamma) is the height of a rational number in bits. The O(1) is bounded, but we know no explicit bound; measured
+values are -0.55 to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So longer coefficients,
+eps or initial points mean faster growth.
 
 Measured, not proved: for a member of the family c is the sum of the constants of its m planes (six members with m = 1,
-2, 3: at n = 120 to 3 parts in 10^5). That is to be expected as long as the denominators of different planes have little
-in common. Two planes with the same cubic and the same start have all in common, and c is the constant of one.
+2, 3: at n = 120 to 3 parts in 10^5). This is plausible as long as the denominators of different planes have few common
+factors. Two planes with the same cubic and the same initial point have equal denominators, and c is the constant of one
+plane.
 """
 
 from __future__ import annotations
@@ -55,35 +56,35 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.iteration import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, require_steps
 from kahanmaps.maps.orbits.methods import choose_method
 
-FEWEST_HEIGHTS = 9  # for a decision; exponential growth is plain from fewer, and a budget leaves no more of it
-_FEWEST_FOR_EXPONENTIAL = 6
-_FEWEST_FOR_LOGARITHMIC = 32
-_NOISE = 4  # bits by which the rise of a quarter may differ from the rule without meaning anything
-_SHOWN = 20
+MIN_HEIGHTS = 9  # for a decision; exponential growth needs fewer, and a budget of digits allows no more
+_MIN_FOR_EXPONENTIAL = 6
+_MIN_FOR_LOGARITHMIC = 32
+_NOISE = 4  # bits: smaller deviations of the rise of a quarter from a rule are ignored
+_MAX_SHOWN = 20
 _NOT_GIVEN = NoNormalForm("none was given")
 
 
 @dataclass(frozen=True)
 class HeightGrowth:
-    """The heights of an orbit at the steps 0, every, 2 every, ..., and how it ended.
+    """The heights of an orbit at the steps 0, every, 2 every, ..., and how the orbit ended.
 
-    The kind of growth is decided on exact numbers. Let w be a quarter of the number of heights, and r_1, ..., r_4 the
-    rises over the last four stretches of w: each is w times the slope of the line of least squares, because single
-    heights fluctuate by a few bits, some by the logarithm of n. Let e_j = r_{j+1} - r_j. In this order:
+    The kind of growth is decided with exact numbers. Let w be a quarter of the number of heights, and r_1, ..., r_4 the
+    rises over the last four intervals of w steps: each is w times the slope of the line of least squares, since single
+    heights fluctuate by a few bits, some by the logarithm of n. Let e_j = r_{j+1} - r_j. The first matching rule holds:
 
-    * periodic: the start came back;
+    * periodic: the orbit returned to its initial point;
     * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2, and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 =
       e_2^2; powers of n stay below 0.9 e_2^2 as long as e_2 >= 2 e_1: tried up to n^8.)
     * quadratic: all e_j > 0, none more than 5/3 of another, and e_1 + e_2 + e_3 >= 8 bits. (c n^2 + b n has equal e_j,
-      wherever its minimum is; n^3 has 1 : 2 : 3, and at least 1 : 1.8 where the last four stretches leave steps out.)
-    * logarithmic: at least 32 heights, the largest of the last stretch above that of the first, and from the second
-      stretch on a rise or fall of less than 1/8 bit from one height to the next. (Linear growth so slow is not to be
-      expected: a Moebius map of infinite order with two fixed points raises heights by at least 1/2 bit a step, for
-      its multiplier has a Mahler measure of 2 or more.)
+      wherever its minimum is; n^3 has 1 : 2 : 3, and at least 1 : 1.8 if the last four intervals leave steps out.)
+    * logarithmic: at least 32 heights, the largest of the last interval above that of the first, and from the second
+      interval on a rise or fall of less than 1/8 bit from one height to the next. (Linear growth is not so slow: a
+      Moebius map of infinite order with two fixed points raises heights by at least 1/2 bit for each step, since its
+      multiplier has a Mahler measure of 2 or more.)
     * bounded: the second half has neither a larger nor a smaller height than the first;
     * linear: all r_j > 0, and they differ by at most a quarter of the least, and by at most 4 bits or 1/32 of the
       least, whichever is more;
-    * otherwise, or with fewer than 9 heights (6 for exponential growth), undecided; n log n is undecided, too.
+    * undecided otherwise, or with fewer than 9 heights (6 for exponential growth); n log n is undecided, too.
     """
 
     heights: tuple[int, ...]
@@ -103,18 +104,18 @@ class HeightGrowth:
 
     @property
     def reason(self) -> str:
-        """Why that kind, in a sentence."""
+        """The measurement that decided the kind, as a phrase."""
         return self._decision[1]
 
     @cached_property
     def constant(self) -> Fraction | None:
-        """For quadratic growth c in h_n ~ c n^2, for linear growth in h_n ~ c n, in bits; otherwise None.
+        """The constant c in bits: h_n ~ c n^2 for quadratic growth, h_n ~ c n for linear growth; otherwise None.
 
-        It is the leading coefficient of the polynomial of least squares through all heights. Where c n^2 + b n is
-        right up to fluctuations between -s and s, its error is at most 12 s/n^2, and about 13 s/n^2.5 for independent
-        ones of standard deviation s; for linear growth 3 s/n and 3.5 s/n^1.5. The second difference of the heights at
-        n/3, 2n/3 and n has 18 s/n^2 and 11 s/n^2: on six members with known c it was off, at n = 120, by 2 to 18 parts
-        in 10^5, the polynomial by less than 3. Leaving out the first tenth or third of the heights gained nothing.
+        It is the leading coefficient of the least-squares polynomial through all heights. If h_n is c n^2 + b n up to
+        fluctuations between -s and s, the error is at most 12 s/n^2, and about 13 s/n^2.5 for independent ones of
+        standard deviation s; for linear growth 3 s/n and 3.5 s/n^1.5. The second difference of the heights at n/3, 2n/3
+        and n would have 18 s/n^2 and 11 s/n^2: on six members with known c its error at n = 120 was 2 to 18 parts in
+        10^5, that of the polynomial less than 3. Leaving out the first tenth or third of the heights gained nothing.
         """
         match self.kind:
             case Growth.QUADRATIC:
@@ -125,7 +126,7 @@ class HeightGrowth:
 
     @property
     def ratio(self) -> Fraction | None:
-        """The last height over the one before; for exponential growth the factor (of `every` steps)."""
+        """The quotient of the last two heights: for exponential growth the factor of `every` steps."""
         return Fraction(self.heights[-1], self.heights[-2]) if len(self.heights) > 1 else None
 
     def __str__(self) -> str:
@@ -133,7 +134,7 @@ class HeightGrowth:
 
     @property
     def text(self) -> str:
-        """One line for people."""
+        """A sentence on the kind of growth and its reason."""
         parts = [f"heights grow as: {self.kind}"]
         if self.constant is not None:
             parts.append(f"about {decimal_text(self.constant)} {'n^2' if self.kind is Growth.QUADRATIC else 'n'} bits")
@@ -144,7 +145,7 @@ class HeightGrowth:
     def to_json(self) -> dict[str, Any]:
         """Plain data: heights at the steps 0, 1, 2, 4, 8, ... (times `every`) and the last; numbers rounded as text."""
         last = len(self.heights) - 1
-        shown = sorted({0, last, *(1 << k for k in range(last.bit_length()))})[-_SHOWN:]
+        shown = sorted({0, last, *(1 << k for k in range(last.bit_length()))})[-_MAX_SHOWN:]
         return {
             "steps": self.every * last,
             "every": self.every,
@@ -171,24 +172,24 @@ class HeightGrowth:
 
 
 def height(point: Sequence[Any]) -> int:
-    """The height of a point with exact coordinates, in bits; over Q[t]/g that of all coefficients of 1, t, t^2, ...
+    """Return the height in bits of a point with exact coordinates; over Q[t]/g that of all coefficients.
 
     >>> height(["3/4", "-1/6", 0])  # (9 : -2 : 0 : 12)
     4
     """
     if isinstance(point, str) or not hasattr(point, "__len__"):
         raise wrong_kind(point, "the coordinates of a point", 'write a list, e.g. [3, "1/2"]')
-    # In lowest terms as a whole: a prime that divides the least common denominator to its full power does so in one of
-    # the fractions, whose numerator it does not divide.
+    # These integers have no common factor: a prime that divides the least common denominator to its full power divides
+    # the denominator of one fraction to this power, and not its numerator.
     numbers = [entry.coefficients if isinstance(entry, EtaleElement) else [rational(entry)] for entry in point]
     return IntegerPoint.from_rationals([number for row in numbers for number in row]).bits
 
 
 def height_of(point: OrbitPoint) -> int:
-    """The height of a point of an orbit over Q; no fraction is formed that is not there already."""
+    """Return the height of a point of an orbit over Q, without forming fractions."""
     value = point.value
     if isinstance(value, IntegerPoint):
-        return value.bits  # kept in lowest terms
+        return value.bits  # an IntegerPoint is in lowest terms
     if isinstance(value, tuple):
         return height(value)
     return value.height
@@ -204,19 +205,19 @@ def height_growth(
     max_digits: int | None = DEFAULT_MAX_DIGITS,
     budget: Budget | None = None,
 ) -> HeightGrowth:
-    """The heights of an orbit of a map over Q at the steps 0, every, 2 every, ... up to `steps`, as far as it goes.
+    """Measure the heights of an orbit of a map over Q at the steps 0, every, 2 every, ... up to `steps`.
 
-    It is interrupted after the step in flight when the `budget` is spent.
+    The orbit ends earlier where it cannot be continued, or after the current step once the `budget` is spent.
 
-    With a `normal_form` (family.system_normal_form) the orbit is walked in normal form, and for large `every` its
-    points are reached directly; the numbers are the same. Then every height costs a gcd of large numbers, which for
-    long orbits is most of the work: three planes take about 0.2 s for 100 steps, 2 s for 200 and 8 s for 300, but
-    0.8 s with `every` = 15, which tells nearly as much.
+    With a `normal_form` (family.system_normal_form) the orbit is computed in normal form, and for large `every` its
+    points are computed directly; the heights are the same. Each height then costs a gcd of large numbers, which is most
+    of the work for long orbits: three planes take about 0.2 s for 100 steps, 2 s for 200 and 8 s for 300, but 0.8 s
+    with `every` = 15, which is nearly as informative.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.maps.kahan import KahanMap
-    >>> found = height_growth(KahanMap(load("weierstrass").system, "1/10"), [1, "1/2"], 40)
-    >>> found.heights[:6], found.kind, decimal_text(found.constant)
+    >>> growth = height_growth(KahanMap(load("weierstrass").system, "1/10"), [1, "1/2"], 40)
+    >>> growth.heights[:6], growth.kind, decimal_text(growth.constant)
     ((2, 7, 17, 32, 52, 82), <Growth.QUADRATIC: 'quadratic'>, '3.04132')
     """
     if kahan_map.field is not QQ and not isinstance(kahan_map.field, EtaleAlgebra):
@@ -230,28 +231,28 @@ def height_growth(
     first = height(kahan_map.point(start))
     bits = first if kahan_map.eps is None else max(first, height([kahan_map.eps]))
     if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
-        # One step may take minutes then, and its numbers are that long as a rule.
+        # A single step could take minutes, and its numbers would usually be over the budget as well.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
         return HeightGrowth((first,), end, every)
     normal_form = _NOT_GIVEN if normal_form is None else normal_form
     method = choose_method(None, "exact", normal_form, None if every == 1 else at).name
     if method == "doubling" and isinstance(normal_form, SystemNormalForm):
         iterates = Orbit(kahan_map, start, at=at, normal_form=normal_form, max_digits=max_digits)
-        # A return to the start is noticed here: at a multiple of the period, where steps are left out.
+        # A return to the initial point shows at a multiple of the period, since steps are left out.
         heights: list[int] = []
-        origin, back = None, None
+        origin, return_step = None, None
         for point, bits in _within(iterates, 1, budget):
             if origin is None:
                 origin = point.value
-            elif back is None and point.value == origin:
-                back = point.step
+            elif return_step is None and point.value == origin:
+                return_step = point.step
             heights.append(bits)
-        if not heights:  # the start alone is over the budget; an orbit that is walked delivers it all the same
+        if not heights:  # the initial point alone is over the budget; step by step it would still be listed
             heights.append(height(iterates.start))
         assert iterates.end is not None
         end = iterates.end
-        if back is not None:
-            end = OrbitEnd("periodic", end.steps, f"at step {back} the orbit is at its start")
+        if return_step is not None:
+            end = OrbitEnd("periodic", end.steps, f"at step {return_step} the orbit is at its start")
     else:
         form = normal_form if method == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
         orbit = Orbit(kahan_map, start, at[-1], normal_form=form, max_digits=max_digits)
@@ -264,70 +265,70 @@ def height_growth(
 
 
 def decimal_text(value: Fraction, digits: int = 6) -> str:
-    """The number rounded to so many significant digits, ties to even; the same text on every machine.
+    """Round a number to so many significant digits, ties to even; the text is the same on every machine.
 
     >>> decimal_text(Fraction(1, 3)), decimal_text(Fraction(-20, 3), 2), decimal_text(Fraction(5))
     ('0.333333', '-6.7', '5')
     """
     context = decimal.Context(prec=digits, rounding=decimal.ROUND_HALF_EVEN)
-    # The integers are taken as they are, and their quotient is rounded once.
+    # Decimal(int) is exact, so the quotient is rounded once.
     return format(context.divide(decimal.Decimal(value.numerator), decimal.Decimal(value.denominator)), "f")
 
 
 def _within(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[OrbitPoint, int]]:
-    """The points at multiples of `every` with their heights, until the budget is spent, which is charged by these."""
+    """Yield the points at multiples of `every` with their heights until the budget is spent; count their work."""
     bits = rise = 0
     for point in orbit:
         if point.step % every == 0:
             before, bits = bits, height_of(point)
             rise = max(0, bits - before)
             yield point, bits
-        # Steps that multiply heights need gcds of longer numbers than those along which relations hold.
+        # Steps that multiply heights need gcds of longer numbers than steps of slow growth.
         count(20 + len(orbit.start) ** 2 * (bits / 100 + rise / 15))
         if budget is not None and budget.is_spent:
             orbit.interrupt()
 
 
 def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
-    """The rules of HeightGrowth; see there."""
-    if len(heights) < _FEWEST_FOR_EXPONENTIAL:
+    """Apply the rules in the docstring of HeightGrowth."""
+    if len(heights) < _MIN_FOR_EXPONENTIAL:
         return Growth.UNDECIDED, _too_few(heights)
     width = (len(heights) - 1) // 4
     begin = len(heights) - 1 - 4 * width
     rises: list[Fraction] = [
         width * _leading_coefficient(heights[begin + j * width : begin + (j + 1) * width + 1], 1) for j in range(4)
     ]
-    more = [after - before for before, after in pairwise(rises)]
-    told = f"four quarters raise them by {', '.join(decimal_text(rise, 4) for rise in rises)} bits"
-    if min(more) > 0 and sum(more) >= 2 * _NOISE:
-        first, second, third = more
+    increases = [after - before for before, after in pairwise(rises)]
+    measured = f"four quarters raise them by {', '.join(decimal_text(rise, 4) for rise in rises)} bits"
+    if min(increases) > 0 and sum(increases) >= 2 * _NOISE:
+        first, second, third = increases
         if second >= 2 * first and 10 * first * third >= 9 * second * second:
-            return Growth.EXPONENTIAL, f"{told}, and the increases multiply"
-        if 3 * max(more) <= 5 * min(more) and len(heights) >= FEWEST_HEIGHTS:
-            return Growth.QUADRATIC, f"{told}, and the increases are about the same"
-    if len(heights) < FEWEST_HEIGHTS:
+            return Growth.EXPONENTIAL, f"{measured}, and the increases multiply"
+        if 3 * max(increases) <= 5 * min(increases) and len(heights) >= MIN_HEIGHTS:
+            return Growth.QUADRATIC, f"{measured}, and the increases are about the same"
+    if len(heights) < MIN_HEIGHTS:
         return Growth.UNDECIDED, _too_few(heights)
     rises_at_all = max(heights[: width + 1]) < max(heights[-width - 1 :])
-    if rises_at_all and -3 * width < 8 * sum(rises[1:]) < 3 * width and len(heights) >= _FEWEST_FOR_LOGARITHMIC:
-        return Growth.LOGARITHMIC, f"{told}: less than linear growth would"
+    if rises_at_all and -3 * width < 8 * sum(rises[1:]) < 3 * width and len(heights) >= _MIN_FOR_LOGARITHMIC:
+        return Growth.LOGARITHMIC, f"{measured}: less than linear growth would"
     half = len(heights) // 2
     low, high = min(heights[:half]), max(heights[:half])
     if low <= min(heights[half:]) and max(heights[half:]) <= high:
         return Growth.BOUNDED, f"the second half of them stays within {low} to {high} bits, as the first"
     least, spread = min(rises), max(rises) - min(rises)
     if least > 0 and spread <= least / 4 and (spread <= _NOISE or spread <= least / 32):
-        return Growth.LINEAR, f"{told}, about the same each time"
-    return Growth.UNDECIDED, f"{told}, which fits no rule; more steps may tell"
+        return Growth.LINEAR, f"{measured}, about the same each time"
+    return Growth.UNDECIDED, f"{measured}, which fits no rule; more steps may tell"
 
 
 def _too_few(heights: Sequence[int]) -> str:
-    return f"found {counted(len(heights), 'height')}, expected {FEWEST_HEIGHTS} or more"
+    return f"found {counted(len(heights), 'height')}, expected {MIN_HEIGHTS} or more"
 
 
 def _leading_coefficient(values: Sequence[int], degree: int) -> Fraction:
-    """The coefficient of n^degree, degree 1 or 2, in the polynomial of least squares through values at 0, 1, 2, ...
+    """Return the leading coefficient of the least-squares polynomial of degree 1 or 2 through values at 0, 1, 2, ...
 
-    It is the projection to the last one of the orthogonal polynomials on these points.
+    It is computed by projection to the orthogonal polynomial of this degree on these points.
     """
     n = len(values) - 1
     if degree == 1:

@@ -1,11 +1,12 @@
-"""Functions of a point and of eps that a map may conserve or have for a density; claimed ones, and those of theorems.
+"""Integrals and densities of a map as functions of a point and of eps: claimed ones, and those given by theorems.
 
 For f = J grad H with a cubic H and any constant skew J the Kahan map Phi_f conserves
 
     H + (2 eps/3) grad H^T (I - eps f')^{-1} f  =  H + grad H . (x~ - x)/3  =  H + O(eps^2)    ("modified H"),
 
-and for homogeneous H and J = [[0, I], [-I, 0]] this is -1/6 of the paper's H~ = eps^{-1} x^T J x~. It has the invariant
-measure dx/phi, phi(x~) = phi(x) det dPhi(x), with the density phi = det(I - eps f'(x)).
+and for homogeneous H and J = [[0, I], [-I, 0]] this is -1/6 of the paper's H~ = eps^{-1} x^T J x~. The map has the
+invariant volume form dx/phi, phi(x~) = phi(x) det dPhi(x), with the denominator phi = det(I - eps f'(x)), which is
+called the density here.
 Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ integral), (tH), (eq: CMOQ measure).
 """
 
@@ -43,31 +44,34 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_LONGEST_CONDITION = 200  # characters
+_MAX_CONDITION = 200  # characters
 
 
 class PhaseFunction(ABC):
-    """A function of x and eps, with a name and a formula for people."""
+    """A function of x and eps, with a name and a formula to print."""
 
     name: str
     formula: str
-    condition: str = ""  # for which eps it means something, as `where`
+    condition: str = ""  # for which eps it is defined and not 0, in the form of `where`
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        """The value at a point over `field`; None at a pole. Raises SingularStep where a map in it has no value."""
+        """Return the value at a point over `field`, None at a pole.
+
+        Raises SingularStep at an indeterminacy point of a map that the function contains.
+        """
 
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """All that determines the function, as `derive_seed` takes it."""
+        """Data that determine the function, for `derive_seed`."""
 
 
 class ClaimedFunction(PhaseFunction):
-    """A rational function of the variables and eps (its last variable) that somebody makes a claim about.
+    """A rational function of the variables and eps (its last variable) in a claim of a file or of the user.
 
-    Where there is a `root`, the variable before eps stands for it. Where it contains x~, the image of x, it is a
-    function of x under the map, which is needed then.
+    With a `root`, the variable before eps represents it. If the function contains x~, the image of x, the map is
+    required.
     """
 
     def __init__(
@@ -95,7 +99,7 @@ class ClaimedFunction(PhaseFunction):
         return self.on(field, eps, points)
 
     def on(self, field: Field, eps: Any, points: Sequence[Sequence[Any]]) -> Any:
-        """The value on successive points of an orbit, one more than it has iterates; None at a pole."""
+        """Return the value on successive points of an orbit (one more than it has iterates), None at a pole."""
         with field.working():
             values = () if self.root is None else (self.root.over(field),)
             coordinates = [entry for point in points[: self.iterates + 1] for entry in point]
@@ -103,9 +107,9 @@ class ClaimedFunction(PhaseFunction):
 
 
 def orbit_about(over: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
-    """The points of an orbit: length steps, x in the middle or, where the inverse is not known, first.
+    """Return an orbit of `length` steps with x in the middle or, if the inverse is not known, at the beginning.
 
-    Formulas of points on both sides of x have lower degrees than those of as many points ahead of it.
+    With x in the middle the formulas of the points have lower degrees.
     """
     points, before = [x], 0
     try:
@@ -123,51 +127,50 @@ def orbit_about(over: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, .
 def at_eps(
     function: RationalFunction, eps: fmpq | None, root: Root | None = None, k: int = 0
 ) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Numerator and denominator, with the number for eps if one is given; the denominator may then be 0.
+    """Return numerator and denominator, at eps if it is given; the denominator may then be 0.
 
-    With a `root` they are remainders, and their k-th variable stands for it.
+    With a `root`, which the k-th variable represents, they are reduced modulo its minimal polynomial.
     """
-    above, below = function.numerator, function.denominator
+    numerator, denominator = function.numerator, function.denominator
     if eps is not None:
-        above, below = substitute(above, {"eps": eps}), substitute(below, {"eps": eps})
-    return (above, below) if root is None else (root.remainder(above, k), root.remainder(below, k))
+        numerator, denominator = substitute(numerator, {"eps": eps}), substitute(denominator, {"eps": eps})
+    return (numerator, denominator) if root is None else (root.remainder(numerator, k), root.remainder(denominator, k))
 
 
 def where(dim: int, *polynomials: fmpq_mpoly | Sequence[fmpq_mpoly]) -> str:
-    """For which symbols and eps none of the polynomials is identically 0, in words; empty where it is so for all.
+    """Return a condition on symbols and eps for the polynomials not to be identically 0; empty if there is none.
 
     Args:
-        dim: the dimension; variables of the polynomials beyond so many are symbols, or eps, which is not 0.
-        polynomials: none of them 0. The entries of a sequence count as one: they are not to be 0 all together.
+        dim: the dimension; the further variables of the polynomials are symbols, and eps, which is not 0.
+        polynomials: nonzero polynomials. For a sequence of polynomials, at least one of them is not to be 0.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y, a, b, eps = ring(["x", "y", "a", "b", "eps"]).gens()
     >>> where(2, a*x + b*y), where(2, (10*eps - 1)*eps*x, a*y), where(2, a*x + eps), where(1, [a*x, b*x])
     ('where a, b are not all 0', 'where 10*eps - 1 is not 0 and a is not 0', '', 'where a, b are not all 0')
     """
-    groups = [[one] if isinstance(one, fmpq_mpoly) else one for one in polynomials]
-    found = list(dict.fromkeys(filter(None, (_not_all_zero(group, dim) for group in groups))))
-    text = f"where {' and '.join(found)}" if found else ""
-    return text if len(text) <= _LONGEST_CONDITION else "where it has a value and is not identically 0"
+    groups = [[group] if isinstance(group, fmpq_mpoly) else group for group in polynomials]
+    conditions = list(dict.fromkeys(filter(None, (_not_all_zero(group, dim) for group in groups))))
+    text = f"where {' and '.join(conditions)}" if conditions else ""
+    return text if len(text) <= _MAX_CONDITION else "where it is defined and not identically 0"
 
 
 def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
     names = names_of(polynomials[0])
     coefficients = [c for polynomial in polynomials for c in coefficients_in(polynomial, dim)]
-    found = coefficients
-    if "eps" in names[dim:]:  # the last variable: the highest power of it that divides each is taken out
+    if "eps" in names[dim:]:  # the last variable: divide each coefficient by its power of eps, which is not 0
         least = [min(int(monomial[-1]) for monomial in c.monoms()) for c in coefficients]
-        found = [
+        coefficients = [
             c.context().from_dict({(*m[:-1], int(m[-1]) - low): value for m, value in c.terms()})
             for c, low in zip(coefficients, least, strict=True)
         ]
-    symbols = {name for c in found for name in names if name not in c.unused_gens()}
+    symbols = {name for c in coefficients for name in names if name not in c.unused_gens()}
     if len(symbols) == 1:
         # In one symbol the common zeros are those of the greatest common divisor.
-        found = [reduce(lambda common, c: common.gcd(c), found)]
-    if any(c.is_constant() for c in found):
+        coefficients = [reduce(lambda common, c: common.gcd(c), coefficients)]
+    if any(c.is_constant() for c in coefficients):
         return ""
-    texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in found))
+    texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in coefficients))
     return f"{', '.join(texts)} {'is not' if len(texts) == 1 else 'are not all'} 0"
 
 
@@ -180,7 +183,7 @@ class ImageFunction(PhaseFunction):
 
 
 def modified(H: fmpq_mpoly, gradient: Sequence[fmpq_mpoly], phi: Map, point: Sequence[Any]) -> Any:
-    """H + grad H . (x~ - x)/3 at a point, for any map."""
+    """Evaluate H + grad H . (x~ - x)/3 at a point, for any map."""
     field, image = phi.field, phi.step(point)
     with field.working():
         total = field.zero
@@ -213,7 +216,7 @@ class PaperIntegral(ImageFunction):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         super().__init__(hamiltonian)
         self.name = f"{letter}~{index}"
-        # x^, as in the paper: the map need not be the one whose integral this is, but another of its class.
+        # x^, as in the paper: the map of J grad H may be another map of the class than the one that conserves H~.
         self.formula = (
             f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"
@@ -235,10 +238,10 @@ class PaperIntegral(ImageFunction):
 
 
 class CommutantIntegral(ImageFunction):
-    """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x): rational whatever the roots of chi are.
+    """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x); it is defined over Q for all roots of chi.
 
-    With C = I this is H~; for k < m these span the same space as the K~_s of all associated systems, over the
-    splitting field of chi. Proof in docs/mathematics.md.
+    With C = I this is H~. Over the splitting field of chi, the functions for k < m span the same space as the K~_s of
+    all associated systems. Proof in docs/mathematics.md.
     """
 
     def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
@@ -260,9 +263,9 @@ class CommutantIntegral(ImageFunction):
 
 
 class ClaimedIntegral(ClaimedFunction):
-    """A rational function of the variables and eps that somebody claims is conserved at `eps`, or (None) at every eps.
+    """A rational function of the variables and eps that is claimed to be conserved, at `eps` or (None) at every eps.
 
-    `condition` says for which eps it has values, `is_constant` whether it is a constant there.
+    `condition` says for which eps it is defined, `is_constant` whether it is a constant there.
     """
 
     def __init__(
@@ -276,21 +279,21 @@ class ClaimedIntegral(ClaimedFunction):
         super().__init__(name, function, root, map_)
         dim = len(function.names) - 1 - (root is not None)
         self.condition = integral_condition(function, dim, eps, root)
-        above, below = at_eps(function, eps, root, dim)
-        self.is_constant = not below.is_zero() and is_constant(above, below, dim, root)
+        numerator, denominator = at_eps(function, eps, root, dim)
+        self.is_constant = not denominator.is_zero() and is_constant(numerator, denominator, dim, root)
 
 
 def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
-    """For which symbols and eps I = P/Q has values.
+    """Return the condition on symbols and eps under which I = P/Q is defined.
 
     Args:
         integral: a function of `dim` variables, then of symbols and eps.
         dim: the dimension.
-        eps: an exact number, or None for every eps.
-        root: what the only symbol stands for, where it is algebraic.
+        eps: half the time step, an exact number, or None for every eps.
+        root: the algebraic number that the only symbol represents, if any.
 
     Returns:
-        This in words; empty where I has values at all of them, or at none.
+        The condition as text; empty if I is defined for all of them, or for none.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> for text in ("x/((10*eps - 1)*y)", "x/y"):
@@ -298,17 +301,20 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
     ['where 10*eps - 1 is not 0']
     ['']
     """
-    _, below = at_eps(integral, eps, root, dim)
-    return "" if below.is_zero() else where(dim, below)
+    _, denominator = at_eps(integral, eps, root, dim)
+    return "" if denominator.is_zero() else where(dim, denominator)
 
 
-def is_constant(above: fmpq_mpoly, below: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
-    """Whether the quotient of two polynomials does not depend on the first `dim` variables; `below` is not 0."""
-    monomial, coefficients = below.monoms()[0][:dim], list[fmpq_mpoly]()
-    for part in (above, below):  # of that monomial in the first variables: polynomials in the others, in the same ring
+def is_constant(numerator: fmpq_mpoly, denominator: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
+    """Whether the quotient of two polynomials does not depend on the first `dim` variables; `denominator` is not 0."""
+    monomial, coefficients = denominator.monoms()[0][:dim], list[fmpq_mpoly]()
+    for part in (
+        numerator,
+        denominator,
+    ):  # the coefficient of this monomial, a polynomial in the other variables
         terms = {(*(0,) * dim, *m[dim:]): value for m, value in part.terms() if m[:dim] == monomial}
         coefficients.append(part.context().from_dict(terms))
-    difference = above * coefficients[1] - below * coefficients[0]
+    difference = numerator * coefficients[1] - denominator * coefficients[0]
     return bool((difference if root is None else root.remainder(difference, dim)).is_zero())
 
 
@@ -317,7 +323,7 @@ class DeterminantDensity(PhaseFunction):
 
     name = "phi"
     formula = "phi = det(I - eps f'(x))"
-    # No condition: it is 1 at eps = 0, and where it is 0 at an eps, the map has no value and nothing is claimed.
+    # No condition: phi is 1 at eps = 0, and if it is identically 0 at an eps, there is no map and no claim.
 
     def __init__(self, system: QuadraticSystem) -> None:
         self.map = KahanFamily(system)
@@ -331,9 +337,9 @@ class DeterminantDensity(PhaseFunction):
 
 
 class ClaimedDensity(ClaimedFunction):
-    """A rational function of the variables and eps that somebody claims is a density at `eps`, or (None) at every eps.
+    """A rational function of the variables and eps that is claimed to be a density, at `eps` or (None) at every eps.
 
-    `condition` says for which eps that means something, as `density_condition`. Raises InputError as it does.
+    `condition` is that of `density_condition`. Raises InputError as `density_condition` does.
     """
 
     def __init__(self, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None) -> None:
@@ -343,20 +349,20 @@ class ClaimedDensity(ClaimedFunction):
 
 
 def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
-    """The hypothesis that phi is a function other than 0, of which every law for dx/phi holds for no reason.
+    """Return the hypothesis that phi is defined and not 0: for phi = 0 every law for dx/phi would hold trivially.
 
     Args:
         phi: a function of `dim` variables, then of symbols and eps.
         dim: the dimension.
-        eps: an exact number, or None for every eps.
-        root: what the only symbol stands for, where it is algebraic.
+        eps: half the time step, an exact number, or None for every eps.
+        root: the algebraic number that the only symbol represents, if any.
 
     Returns:
-        For which symbols and eps neither phi nor its denominator is identically 0, in words; empty where it is so
-        for all of them.
+        The condition on symbols and eps that neither phi nor its denominator is identically 0, as text; empty if it
+        holds for all of them.
 
     Raises:
-        InputError: where phi is identically 0 or 0/0, for that eps and root if they are given.
+        InputError: if phi is identically 0 or 0/0, at the given eps and root.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> for text in ("a*x + b*y", "(10*eps - 1)*x", "x/(a*y)", "a*x + y"):
@@ -367,40 +373,40 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     ['where a is not 0']
     ['']
     """
-    above, below = at_eps(phi, eps, root, dim)
-    if above.is_zero():
+    numerator, denominator = at_eps(phi, eps, root, dim)
+    if numerator.is_zero():
         text = format_rational_function(phi)
-        what = "0/0" if below.is_zero() else "identically 0"
+        what = "0/0" if denominator.is_zero() else "identically 0"
         at = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
         which = f", which is {what} at {at}" if text != "0" else ""
         raise InputError(
             f"found the density {quoted(text) if which else text}{which}, expected a function that is not zero: "
             "the measure is dx/phi"
         )
-    return where(dim, above) if below.is_zero() else where(dim, above, below)
+    return where(dim, numerator) if denominator.is_zero() else where(dim, numerator, denominator)
 
 
 def jacobian_determinant_sides(kahan: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
-    """Numerator and denominator of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x)).
+    """Return numerator and denominator of det dPhi(x), for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x)).
 
-    Of a map with several factors the products of theirs.
+    For a map with several factors they are the products over the factors.
     """
     factors, points = zip(*kahan.stages(x), strict=True)
-    above = [
-        det(one.numerator_matrix(here, there))
-        for one, here, there in zip(factors, points, (*points[1:], image), strict=True)
+    numerator = [
+        det(factor.numerator_matrix(before, after))
+        for factor, before, after in zip(factors, points, (*points[1:], image), strict=True)
     ]
-    below = [one.determinant(here) for one, here in zip(factors, points, strict=True)]
+    denominator = [factor.determinant(before) for factor, before in zip(factors, points, strict=True)]
     with kahan.field.working():
-        return reduce(mul, above), reduce(mul, below)
+        return reduce(mul, numerator), reduce(mul, denominator)
 
 
 @dataclass(frozen=True)
 class Normalized:
-    """The integral `function` = (alpha I + beta)/gamma for an integral I, and its limit eps -> 0, `leading`.
+    """An integral `function` = (alpha I + beta)/gamma for an integral I, and its limit `leading` for eps -> 0.
 
-    alpha, beta and gamma, the `coefficients`, are polynomials in the symbols and eps without common factor. `leading`
-    is None where I is a constant.
+    The `coefficients` alpha, beta and gamma are polynomials in the symbols and eps without common factor. `leading` is
+    None if I is a constant.
     """
 
     function: RationalFunction
@@ -409,23 +415,24 @@ class Normalized:
 
     @property
     def is_shifted(self) -> bool:
-        """Whether something was subtracted, the limit of I being a constant."""
+        """Whether a constant was subtracted, because the limit of I is constant."""
         return not self.coefficients[1].is_zero()
 
     def combination(self, name: str) -> str:
-        """The integral as a formula in I, which is called `name`, the symbols and eps: "(F1 - 1)/eps^2"."""
+        """Return the integral as a formula in I (called `name`), the symbols and eps, e.g. "(F1 - 1)/eps^2"."""
         target = ring([name, *(other for other in self.function.names if other != name)])
         alpha, beta, gamma = (coefficient.project_to_context(target) for coefficient in self.coefficients)
         return format_rational_function(RationalFunction(alpha * target.gen(0) + beta, gamma))
 
 
 def normalized(function: RationalFunction, dim: int) -> Normalized:
-    """The integral (alpha I + beta)/gamma that tends to a function of x, of primitive polynomials, as eps -> 0.
+    """Normalize an integral I: return (alpha I + beta)/gamma that tends to a nonconstant function of x as eps -> 0.
 
-    With I a map that approximates a flow conserves (alpha I + beta)/gamma, alpha, beta, gamma being functions of eps
-    and the parameters alone; computations give one of these at random. Where its limit is a constant, as that of the
-    published integrals (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top is, its values hide how well it is conserved:
-    errors of H are multiplied by a power of eps. So the constant is subtracted, and the rest is divided by that power.
+    If a map conserves I, it conserves (alpha I + beta)/gamma for all functions alpha, beta, gamma of eps and the
+    parameters, and a computation returns an arbitrary one of these. If its limit is a constant, like that of the
+    published integrals (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top, its values hide how well it is conserved,
+    since errors of H are multiplied by a power of eps. So the constant is subtracted, and the result divided by that
+    power.
 
     Args:
         function: an integral I of a map that approximates a flow, for every eps; a rational function of the variables,
@@ -433,12 +440,12 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         dim: the number of variables.
 
     Returns:
-        The integral, exact; I itself where it is a constant. The limit is in lowest terms, with coprime integers as
-        coefficients above and below, the leading ones positive. Normalized integrals are returned unchanged.
+        The integral, exact; I itself if it is a constant. The limit is in lowest terms, and its numerator and
+        denominator have coprime integer coefficients, the leading ones positive. Normalized integrals stay unchanged.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
-    >>> found = normalized(parse_rational_function("(1 - eps^2*x^2)/(1 + 2*eps^2*y^2)", ["x", "y", "eps"]), 2)
-    >>> [format_rational_function(one) for one in (found.function, found.leading)], found.combination("F")
+    >>> result = normalized(parse_rational_function("(1 - eps^2*x^2)/(1 + 2*eps^2*y^2)", ["x", "y", "eps"]), 2)
+    >>> [format_rational_function(F) for F in (result.function, result.leading)], result.combination("F")
     (['(x^2 + 2*y^2)/(2*y^2*eps^2 + 1)', 'x^2 + 2*y^2'], '(-F + 1)/eps^2')
     """
     P, Q = function.numerator, function.denominator
@@ -449,55 +456,55 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         return unchanged
     while True:
         count(20 + len(P) + len(Q))
-        # A factor that is free of x does not help to conserve anything.
-        above, below = _content(P, dim), _content(Q, dim)
-        P, Q = P / above, Q / below
-        alpha, beta, gamma = alpha * below, beta * below, gamma * above
+        # Divide by factors that are free of x: they are conserved trivially.
+        numerator, denominator = _content(P, dim), _content(Q, dim)
+        P, Q = P / numerator, Q / denominator
+        alpha, beta, gamma = alpha * denominator, beta * denominator, gamma * numerator
         p, q = _lowest(P), _lowest(Q)
         common = p.gcd(q)
         p, q = p / common, q / common
         if degree_in(p, dim) or degree_in(q, dim):
             break
-        # P/Q = p/q + O(eps), constants: with content taken out neither begins with a power of eps. This ends, for I
-        # is no function of eps alone: P(x) Q(y) - P(y) Q(x) has a lowest power of eps, and q P - p Q has it at most.
+        # P/Q = p/q + O(eps) with constants p and q; without content neither is divisible by eps. The loop ends, since I
+        # is not a function of eps alone: the lowest power of eps in P(x) Q(y) - P(y) Q(x) bounds that in q P - p Q.
         P, alpha, beta = q * P - p * Q, q * alpha, q * beta - p * gamma
         if P.is_zero():
             return unchanged
     scale = primitive_part(p)[0] / primitive_part(q)[0]
     P, gamma = P / scale, gamma * scale
-    common = reduce(lambda one, other: one.gcd(other), (alpha, beta, gamma))
+    common = reduce(lambda left, right: left.gcd(right), (alpha, beta, gamma))
     coefficients = (alpha / common, beta / common, gamma / common)
     leading = RationalFunction(primitive_part(p)[1], primitive_part(q)[1])
     return Normalized(RationalFunction(P, Q), leading, coefficients)
 
 
 def measured_integrals(file: SystemFile) -> dict[str, RationalFunction]:
-    """The integrals that a file claims, by name, as they are measured along orbits.
+    """Return the integrals that a file claims, by name, in the form in which they are measured along orbits.
 
-    One whose limit eps -> 0 is a constant is replaced by that combination of it which tends to an integral of the flow.
+    An integral with a constant limit for eps -> 0 is replaced by a combination that tends to an integral of the flow.
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(measured_integrals(load("euler_top"))), list(measured_integrals(load("volterra_periodic_3")))
     (['(-F1 + 1)/eps^2', '(-F2/2 + 1/2)/eps^2'], ['I1', 'I2'])
     """
-    found = {}
+    integrals = {}
     for name, function in file.integrals.items():
         if file.map.has_eps and file.map.time_steps and file.map.root is None:
-            one = normalized(function, file.dim)
-            if one.is_shifted:
-                name, function = one.combination(name), one.function
-        found[name] = function
-    return found
+            result = normalized(function, file.dim)
+            if result.is_shifted:
+                name, function = result.combination(name), result.function
+        integrals[name] = function
+    return integrals
 
 
 def _content(polynomial: fmpq_mpoly, dim: int) -> fmpq_mpoly:
-    """The greatest common divisor of the coefficients of monomials in the first `dim` variables; 1 for numbers."""
-    found = reduce(lambda one, other: one.gcd(other), coefficients_in(polynomial, dim))
-    return found / found if found.is_constant() else found
+    """Return the greatest common divisor of the coefficients in the first `dim` variables; 1 if it is a number."""
+    content = reduce(lambda left, right: left.gcd(right), coefficients_in(polynomial, dim))
+    return content / content if content.is_constant() else content
 
 
 def _lowest(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-    """The terms of lowest order in eps, without their power of it."""
+    """Return the terms of lowest order in eps, divided by this power of eps."""
     order = min(int(monomial[-1]) for monomial in polynomial.monoms())
     terms: dict[tuple[int, ...], fmpq] = {}
     for monomial, value in polynomial.terms():

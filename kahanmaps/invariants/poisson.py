@@ -1,12 +1,12 @@
-"""Poisson tensors P(x), and what it is that a map preserves one.
+"""Poisson tensors P(x), and the law that a map preserves one.
 
-A map Phi is Poisson for P when dPhi(x) P(x) dPhi(x)^T = P(x~). Where M(x) x~ = r(x) defines it, dPhi = M^{-1} N, and
-the law reads, free of denominators but for those of x~ and P,
+A map Phi is Poisson for P if dPhi(x) P(x) dPhi(x)^T = P(x~). If M(x) x~ = r(x) defines the map, then dPhi = M^{-1} N,
+and the law becomes, without denominators except those of x~ and P,
 
     N(x, x~) P(x) N(x, x~)^T = M(x) P(x~) M(x)^T;
 
-for Kahan maps M = I - eps f'(x) and N = I + eps f'(x~). Two kinds of tensors are known here: those that somebody has
-written down, and Pi(x) = J - eps^2 f'(x)^2 J of Hamiltonian systems. Source: petrera-suris-2016, Theorem 12.
+for Kahan maps M = I - eps f'(x) and N = I + eps f'(x~). There are two kinds of tensors: explicit matrices, and
+Pi(x) = J - eps^2 f'(x)^2 J of Hamiltonian systems. Source: petrera-suris-2016, Theorem 12.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _TENSOR_FILE = TomlKind("tensor", 4_000_000, SystemFileError)
 
 
 def poisson_tensor(hamiltonian: CubicHamiltonian, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-    """The matrix Pi(x) = J - eps^2 f'(x)^2 J over `field`."""
+    """Return the matrix Pi(x) = J - eps^2 f'(x)^2 J over `field`."""
     with field.working():
         jacobian = hamiltonian.system.over(field).jacobian(point)
         J = field.convert_matrix(hamiltonian.J)
@@ -48,20 +48,20 @@ class PoissonTensor(ABC):
     name: str
     formula: str
     has_eps: bool = True
-    symbols: tuple[str, ...] = ()  # of which it depends as well: their values stand behind those of the variables
+    symbols: tuple[str, ...] = ()  # further arguments: their values follow those of the variables
 
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """All that determines the tensor, as `derive_seed` takes it."""
+        """Data that determine the tensor, for `derive_seed`."""
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        """The matrix P(x); None at a pole."""
+        """Return the matrix P(x), None at a pole."""
 
     @abstractmethod
     def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
-        """The matrix sum_l v_l dP/dx_l for a direction v, where P has a value."""
+        """Return the matrix sum_l v_l dP/dx_l for a direction v, at a point that is not a pole."""
 
 
 class HamiltonianTensor(PoissonTensor):
@@ -110,7 +110,7 @@ class MatrixPoissonTensor(PoissonTensor):
             for j, entry in enumerate(row[: i + 1]):
                 other = rows[j][i]
                 if other != RationalFunction(-entry.numerator, entry.denominator):
-                    texts = [format_rational_function(one) for one in (other, entry)]
+                    texts = [format_rational_function(f) for f in (other, entry)]
                     raise InputError(
                         f"found {texts[0]} in row {j + 1}, column {i + 1} and {texts[1]} in row {i + 1}, "
                         f"column {j + 1}, expected a skew matrix"
@@ -127,7 +127,7 @@ class MatrixPoissonTensor(PoissonTensor):
     def from_text(
         cls, rows: Sequence[Sequence[str]], variables: Sequence[str], parameters: Mapping[str, fmpq] | None = None
     ) -> MatrixPoissonTensor:
-        """The tensor with entries written as rational functions of the variables, the parameters and eps."""
+        """Parse a tensor whose entries are rational functions of the variables, the parameters and eps."""
         names = (*variables, "eps")
         if len(rows) != len(variables):
             raise InputError(f"found a tensor with {len(rows)} rows, expected {len(variables)}, one for each variable")
@@ -135,9 +135,9 @@ class MatrixPoissonTensor(PoissonTensor):
 
     @classmethod
     def read(cls, path: str | Path, variables: Sequence[str], parameters: Mapping[str, fmpq]) -> MatrixPoissonTensor:
-        """The tensor in a TOML file: the rows `tensor` of the section [poisson], entries numbers or text.
+        """Read a tensor from a TOML file: the rows `tensor` of the section [poisson], with numbers or text as entries.
 
-        Raises InputError for a file that cannot be read or says something else.
+        Raises InputError for a file that cannot be read or has another form.
         """
         document = _TENSOR_FILE.document(_TENSOR_FILE.read(path), str(path))
         section = document.get("poisson")
@@ -150,7 +150,7 @@ class MatrixPoissonTensor(PoissonTensor):
         return cls.from_text([[str(entry) for entry in row] for row in rows], variables, parameters)
 
     def toml_section(self) -> str:
-        """The tensor as a section [poisson], which `read` reads."""
+        """Return the tensor as a section [poisson] of a TOML file, as `read` expects it."""
         rows = [", ".join(f'"{format_rational_function(entry)}"' for entry in row) for row in self.rows]
         return "\n".join(["[poisson]", "tensor = [", *(f"  [{row}]," for row in rows), "]", ""])
 
@@ -158,13 +158,13 @@ class MatrixPoissonTensor(PoissonTensor):
     def brackets(self) -> dict[tuple[str, str], RationalFunction]:
         """The brackets {x_i, x_j} = P_ij for i < j that are not 0."""
         names = self.rows[0][0].names if self.rows else ()
-        return {(names[i], names[j]): entry for (i, j), entry in self._above.items()}
+        return {(names[i], names[j]): entry for (i, j), entry in self._upper.items()}
 
     @property
     def formula(self) -> str:  # type: ignore[override]
         """The brackets that are not 0."""
-        found = [f"{{{a},{b}}} = {format_rational_function(entry)}" for (a, b), entry in self.brackets.items()]
-        return ", ".join(found) or "P = 0"
+        equations = [f"{{{a},{b}}} = {format_rational_function(entry)}" for (a, b), entry in self.brackets.items()]
+        return ", ".join(equations) or "P = 0"
 
     @property
     def subject(self) -> tuple[Any, ...]:
@@ -173,8 +173,8 @@ class MatrixPoissonTensor(PoissonTensor):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():
             place = (*point, field.convert(eps))
-            above = {pair: entry.value(field, place) for pair, entry in self._above.items()}
-            return None if None in above.values() else self._matrix(field, above)
+            upper = {pair: entry.value(field, place) for pair, entry in self._upper.items()}
+            return None if None in upper.values() else self._matrix(field, upper)
 
     def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
         with field.working():
@@ -184,17 +184,17 @@ class MatrixPoissonTensor(PoissonTensor):
                 terms = [v * evaluate(P, field, place) for v, P in zip(direction, parts, strict=False) if len(P)]
                 return sum(terms[1:], terms[0]) if terms else field.zero
 
-            above = {}
-            for pair, entry in self._above.items():
+            upper = {}
+            for pair, entry in self._upper.items():
                 numerator, denominator = self._slopes[pair]
                 N, D = evaluate(entry.numerator, field, place), evaluate(entry.denominator, field, place)
-                above[pair] = slope(numerator) / D
+                upper[pair] = slope(numerator) / D
                 if not entry.is_polynomial:
-                    above[pair] = above[pair] - N * slope(denominator) / (D * D)
-            return self._matrix(field, above)
+                    upper[pair] = upper[pair] - N * slope(denominator) / (D * D)
+            return self._matrix(field, upper)
 
     @cached_property
-    def _above(self) -> dict[tuple[int, int], RationalFunction]:
+    def _upper(self) -> dict[tuple[int, int], RationalFunction]:
         return {
             (i, j): entry
             for i, row in enumerate(self.rows)
@@ -204,12 +204,12 @@ class MatrixPoissonTensor(PoissonTensor):
 
     @cached_property
     def _slopes(self) -> dict[tuple[int, int], tuple[Any, Any]]:
-        return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._above.items()}
+        return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._upper.items()}
 
-    def _matrix(self, field: Field, above: Mapping[tuple[int, int], Any]) -> Any:
+    def _matrix(self, field: Field, upper: Mapping[tuple[int, int], Any]) -> Any:
         n, zero = self.dim, field.zero
         entries = [
-            above[i, j] if (i, j) in above else -above[j, i] if (j, i) in above else zero
+            upper[i, j] if (i, j) in upper else -upper[j, i] if (j, i) in upper else zero
             for i in range(n)
             for j in range(n)
         ]
@@ -217,17 +217,17 @@ class MatrixPoissonTensor(PoissonTensor):
 
 
 def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
-    """The hypothesis that P is a tensor other than 0, of which every law for tensors holds for no reason.
+    """Return the hypothesis that P is defined and not 0: for P = 0 every law for tensors would hold trivially.
 
     Args:
         tensor: P, a matrix of functions of the variables, symbols and eps.
-        eps: an exact number, or None for every eps.
+        eps: half the time step, an exact number, or None for every eps.
 
     Returns:
-        For which symbols and eps P has values and is not identically 0, in words; empty where it is so for all of them.
+        The condition on symbols and eps that P is defined and not identically 0, as text; empty if it holds for all.
 
     Raises:
-        InputError: where P is identically 0, at that eps if it is given.
+        InputError: if P is identically 0, at the given eps.
 
     >>> for entry in ("(10*eps - 1)*x", "x/(10*eps - 1)", "x + 10*eps - 1"):
     ...     tensor = MatrixPoissonTensor.from_text([["0", entry], [f"-({entry})", "0"]], ["x", "y"])
@@ -237,42 +237,42 @@ def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
     ['']
     """
     entries = [at_eps(entry, eps) for entry in tensor.brackets.values()]
-    numerators = [above for above, _ in entries if not above.is_zero()]
-    if any(below.is_zero() for _, below in entries):
-        return ""  # then P has no values, of which the verdict tells
+    numerators = [numerator for numerator, _ in entries if not numerator.is_zero()]
+    if any(denominator.is_zero() for _, denominator in entries):
+        return ""  # P is not defined at this eps, which the verdict reports
     if not numerators:
         which = f"{quoted(tensor.formula)}, which is identically 0 at eps = {eps}" if entries else tensor.formula
         raise InputError(f"found the tensor {which}, expected one that is not zero: every map preserves 0")
-    return where(tensor.dim, numerators, *(below for _, below in entries))
+    return where(tensor.dim, numerators, *(denominator for _, denominator in entries))
 
 
 def transformation_sides(
     map_: Map, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any], values: Sequence[Any] = ()
 ) -> tuple[Any, Any] | None:
-    """Both sides of the transformation law above, at x = `point` and x~ = `image`.
+    """Return both sides of the transformation law of this module, at x = `point` and x~ = `image`.
 
-    None at a pole of the tensor, and where it is 0 at both points: 0 = 0 says nothing of a map. `values` are those of
-    the symbols. Of a map with several factors it is the law of the last one, for what the others
-    make of P(x).
+    `values` are those of the symbols. Returns None at a pole of the tensor, and if it is 0 at both points, where the
+    law is trivial. For a map with several factors it is the law of the last factor, with P(x) transformed by the other
+    ones.
     """
     field, eps = map_.field, map_.eps
-    here, there = (tensor.value(field, eps, (*place, *values)) for place in (point, image))
-    if here is None or there is None or (_is_zero(field, here) and _is_zero(field, there)):
+    P, P_image = (tensor.value(field, eps, (*x, *values)) for x in (point, image))
+    if P is None or P_image is None or (_is_zero(field, P) and _is_zero(field, P_image)):
         return None
-    *before, (last, at) = map_.stages(point)
-    for one, x in before:
-        slopes = one.jacobian(x)
+    *earlier, (last, last_point) = map_.stages(point)
+    for factor, x in earlier:
+        slopes = factor.jacobian(x)
         with field.working():
-            here = slopes * here * slopes.transpose()
-    forward, backward = last.numerator_matrix(at, image), last.denominator_matrix(at)
+            P = slopes * P * slopes.transpose()
+    N, M = last.numerator_matrix(last_point, image), last.denominator_matrix(last_point)
     with field.working():
-        return forward * here * forward.transpose(), backward * there * backward.transpose()
+        return N * P * N.transpose(), M * P_image * M.transpose()
 
 
 def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequence[Any]) -> list[Any] | None:
-    """sum over l of P_il d_l P_jk + cyclic in i, j, k, for all i < j < k: zero when P is a Poisson tensor.
+    """Return sum_l P_il d_l P_jk + cyclic in i, j, k, for all i < j < k: zero if P is a Poisson tensor.
 
-    None at a pole, and where P is 0: there the sum is 0 whatever P is elsewhere.
+    Returns None at a pole, and where P is 0, since the sum is then 0 for every tensor.
     """
     n = tensor.dim
     P = tensor.value(field, eps, point)
@@ -290,5 +290,5 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
 
 
 def _is_zero(field: Field, matrix: Any) -> bool:
-    """Whether the matrix is 0; not over bounds, where the degrees of the laws, which are larger, stand for its own."""
+    """Whether the matrix is 0. Over bounds the answer is no: the bounds of both sides of the law cover this case."""
     return not isinstance(field, BoundField) and all(field.is_zero(entry) for entry in matrix.entries())

@@ -254,7 +254,7 @@ def contradictions(found: Findings) -> list[str]:
         said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
     if found.degrees is not None and found.degrees.enclosure is not None and orbits_lie_on_curves(found):
         said.append("positive algebraic entropy is proved, which excludes an integral")
-    if found.pencil is not None and (impossible := found.pencil.against(growth)):
+    if found.pencil is not None and (impossible := found.pencil.contradiction(growth)):
         said.append(impossible)
     if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL):
         said.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from flint import fmpq_mat
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.printing import above_and_below
+from kahanmaps.algebra.printing import integer_fraction
 from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.convention import eps_share
@@ -133,7 +133,7 @@ def _quotient(left: str, function: RationalFunction) -> Rows:
     whole = latex_rational_function(function)
     if len(whole) <= _LINE or function.is_polynomial:
         return [(left, whole)]
-    is_negative, numerator, denominator = above_and_below(function)
+    is_negative, numerator, denominator = integer_fraction(function)
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
     quotient = rf"{'-' * is_negative}\frac{{{P}}}{{{Q}}}"
     return [(left, quotient), (P, latex_polynomial(numerator)), (Q, latex_polynomial(denominator))]

@@ -276,7 +276,7 @@ def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[Rational
             point = part.at(eps, field, values).step(point)
     except BudgetExceeded:
         return None
-    return [RationalFunction(entry.above, entry.below) for entry in point]
+    return [RationalFunction(entry.numerator, entry.denominator) for entry in point]
 
 
 def _too_large(parts: Sequence[MapFactor]) -> str:

@@ -17,7 +17,7 @@ from kahanmaps.algebra.bounds import BoundField, CoefficientSize
 
 def bounded(K, element):
     """A polynomial's own bound in K, as tight as can be."""
-    return K.polynomial(*true_size(element.above))
+    return K.polynomial(*true_size(element.numerator))
 
 
 # Numbers
@@ -27,24 +27,24 @@ def bounded(K, element):
 def test_sums_differences_and_products_of_polynomials_are_bounded(p, q, r):
     K = BoundField()
     a, b, c = (bounded(K, element) for element in (p, q, r))
-    assert covers_polynomial((a + b).above, numerator(p + q))
-    assert covers_polynomial((a - b).above, numerator(p - q))
-    assert covers_polynomial((a * b).above, numerator(p * q))
-    assert covers_polynomial((-a).above, numerator(-p))
-    assert covers_polynomial(((a + b) * c - a * a * a).above, numerator((p + q) * r - p * p * p))
+    assert covers_polynomial((a + b).numerator, numerator(p + q))
+    assert covers_polynomial((a - b).numerator, numerator(p - q))
+    assert covers_polynomial((a * b).numerator, numerator(p * q))
+    assert covers_polynomial((-a).numerator, numerator(-p))
+    assert covers_polynomial(((a + b) * c - a * a * a).numerator, numerator((p + q) * r - p * p * p))
 
 
 @given(st.lists(polynomials(), min_size=6, max_size=6))
 def test_rational_functions_are_bounded(drawn):
     a, b, c, d, e, f = drawn
-    assume(not any(element.above.is_zero() for element in (b, d, f)))
+    assume(not any(element.numerator.is_zero() for element in (b, d, f)))
     K = BoundField()
     A, B, C, D, E, G = (bounded(K, element) for element in drawn)
     assert covers(A / B + C / D, a / b + c / d)
     assert covers(A / B - C / D * (E / G), a / b - c / d * (e / f))
     assert covers((A / B) * (C / B) + E / B, (a / b) * (c / b) + e / b)
     inner = b + c / d
-    assume(not inner.above.is_zero())
+    assume(not inner.numerator.is_zero())
     assert covers(A / (B + C / D), a / inner)
 
 
@@ -53,7 +53,7 @@ def test_entries_of_a_matrix_with_one_bound_are_different_denominators():
     K = BoundField()
     p, q = K.matrix(1, 2, [K.polynomial(3, 1.0), K.polynomial(2, 1.0)]).entries()
     total = K.one / p + K.one / q
-    assert (total.above, total.pole_degree) == (CoefficientSize(3, 2.0), 6)
+    assert (total.numerator, total.pole_degree) == (CoefficientSize(3, 2.0), 6)
     assert not K.is_zero(p)
     assert not K.is_zero(q)
     assert K.pole_degree == 12
@@ -80,7 +80,7 @@ def in_K(K, rows):
 @given(st.integers(1, 3).flatmap(lambda n: polynomial_matrices(n, n)))
 def test_determinants_are_bounded(rows):
     K = BoundField()
-    assert covers_polynomial(in_K(K, rows).det().above, numerator(in_F(rows).det()))
+    assert covers_polynomial(in_K(K, rows).det().numerator, numerator(in_F(rows).det()))
 
 
 @given(st.integers(1, 3).flatmap(lambda n: st.tuples(polynomial_matrices(n, n), polynomial_matrices(n, 1))))
@@ -88,19 +88,19 @@ def test_solutions_are_bounded_by_cramers_rule(drawn):
     rows, right = drawn
     matrix = in_F(rows)
     determinant = matrix.det()
-    assume(not determinant.above.is_zero())
+    assume(not determinant.numerator.is_zero())
     K = BoundField()
     bound = in_K(K, rows).solve(in_K(K, right)).entry
     assert true_size(numerator(determinant))[0] <= bound.pole_degree
     for entry in matrix.solve(in_F(right)).entries():
-        assert covers_polynomial(bound.above, cleared(entry, determinant))
+        assert covers_polynomial(bound.numerator, cleared(entry, determinant))
 
 
 def cleared(entry, determinant):
     """The polynomial entry * determinant."""
-    product = determinant.above * entry.above
-    quotient = product / entry.below
-    assert quotient * entry.below == product
+    product = determinant.numerator * entry.numerator
+    quotient = product / entry.denominator
+    assert quotient * entry.denominator == product
     return quotient
 
 
@@ -124,7 +124,7 @@ def test_denominators_of_a_determinant_and_of_cramers_rule_are_those_of_all_rows
     x, w = K.variable(), K.polynomial(5, 0.0)
     matrix = K.matrix(2, 2, [x / w * K.convert(fmpq(1, 3))] * 4)
     det = matrix.det()
-    assert (det.above.degree, det.pole_degree, det.scale) == (2, 10, 9)
+    assert (det.numerator.degree, det.pole_degree, det.scale) == (2, 10, 9)
     solution = matrix.solve(K.matrix(2, 1, [K.one] * 2)).entry
-    assert (solution.above.degree, solution.pole_degree) == (5 + 1, 2)
-    assert solution.above.bits == pytest.approx(math.log2(3 * 2), abs=1e-6)
+    assert (solution.numerator.degree, solution.pole_degree) == (5 + 1, 2)
+    assert solution.numerator.bits == pytest.approx(math.log2(3 * 2), abs=1e-6)

@@ -159,6 +159,6 @@ def test_both_ways_to_a_product_lead_to_the_same(field, monkeypatch):
     monkeypatch.setattr(etale, "_product", lambda *both: asked.append(both) or product(*both))
     assert [a * b for a in elements for b in elements] == products
     assert len(asked) == len(products)
-    monkeypatch.setattr(etale, "_FEW", field.degree - 1)  # with more coefficients FLINT is faster
+    monkeypatch.setattr(etale, "_MAX_COEFFICIENTS", field.degree - 1)  # with more coefficients FLINT is faster
     assert elements[0] * elements[1] == products[1]
     assert len(asked) == len(products)

@@ -16,8 +16,8 @@ small = st.integers(-4, 4)
 
 
 def value(function: Function, point: tuple[fmpq, ...]) -> fmpq | None:
-    below = evaluate(function.below, None, point)
-    return None if below == 0 else evaluate(function.above, None, point) / below
+    denominator = evaluate(function.denominator, None, point)
+    return None if denominator == 0 else evaluate(function.numerator, None, point) / denominator
 
 
 def linear(field: FunctionField, a: int, b: int, c: int) -> Function:
@@ -27,9 +27,11 @@ def linear(field: FunctionField, a: int, b: int, c: int) -> Function:
 
 @st.composite
 def functions(draw, field: FunctionField) -> Function:
-    above = linear(field, draw(small), draw(small), draw(small)) * linear(field, draw(small), draw(small), draw(small))
-    below = linear(field, draw(small), draw(small), draw(st.integers(1, 4)))
-    return above / below
+    numerator = linear(field, draw(small), draw(small), draw(small)) * linear(
+        field, draw(small), draw(small), draw(small)
+    )
+    denominator = linear(field, draw(small), draw(small), draw(st.integers(1, 4)))
+    return numerator / denominator
 
 
 FIELD = FunctionField(NAMES, budget=10**12)
@@ -88,7 +90,7 @@ def test_the_denominator_of_a_solution_is_the_determinant(n):
     x, y = FIELD.variables
     matrix = FIELD.matrix(n, n, [x if i == j else y * FIELD.convert(i - j) for i in range(n) for j in range(n)])
     solution = matrix.solve(FIELD.column([y] * n)).entries()
-    assert {str(entry.below) for entry in solution} == {str(matrix.det().above)}
+    assert {str(entry.denominator) for entry in solution} == {str(matrix.det().numerator)}
 
 
 def test_a_singular_matrix_is_refused():
@@ -102,7 +104,7 @@ def test_the_budget_is_spent_before_the_work_is_done():
     field = FunctionField(NAMES, budget=1000)
     x, y = field.variables
     power = x + y + field.one
-    while len(power.above) ** 2 + 100 < field.budget:
+    while len(power.numerator) ** 2 + 100 < field.budget:
         power = power * power
     with pytest.raises(BudgetExceeded):
         _ = power * power * power * power

@@ -12,7 +12,7 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.search import tell_apart
+from kahanmaps.laboratory.preserve.search import find_branches
 
 # f = grad H x grad K with quadratic H(x, y) and K(y, z). By exchanging H and K each of the two pencils becomes the
 # other: (K + const)/(1 - eps^2 (a (dK/dz)^2 ...)) has its zeros where the other one has them.
@@ -63,7 +63,7 @@ def test_shuffled_spaces_are_put_in_order_on_every_map(order):
     laboratory = Laboratory(system("x y", "a*y", "x", a="2"), ["a"])
     first, second = laboratory.maps
     model = spaces(first.prime, (*first.values, first.eps), numbers, order)
-    branches = tell_apart(model, lambda p, values: spaces(p, values, numbers, order), ("a", "eps"), 0, Budget())
+    branches = find_branches(model, lambda p, values: spaces(p, values, numbers, order), ("a", "eps"), 0, Budget())
     assert branches is not None
     assert branches.place == (1, 1)
     ordered = [
@@ -91,4 +91,4 @@ def test_spaces_that_are_conjugate_have_no_order(names):
 
     prime = next(map_.prime for map_ in Laboratory(FAMILY).other_maps(20) if root_of(2, map_.prime) is not None)
     model = alike(prime, (3,) * len(names))
-    assert tell_apart(model, alike, names, 0, Budget()) is None
+    assert find_branches(model, alike, names, 0, Budget()) is None

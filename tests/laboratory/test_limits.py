@@ -27,7 +27,7 @@ def beside(name, *symbols):
 
 
 def order_in_eps(function):
-    above, below = (min(int(m[-1]) for m in part.monoms()) for part in (function.above, function.below))
+    above, below = (min(int(m[-1]) for m in part.monoms()) for part in (function.numerator, function.denominator))
     return above - below
 
 
@@ -159,7 +159,7 @@ def test_a_polarised_map_deforms_the_energy_of_a_cubic_field():
     found = flow_and_map(integrals_of_duffing())
     [one] = found.limits
     assert (format_rational_function(one.leading), one.kept.holds) == ("x^4 + 2*y^2", False)
-    assert one.text.endswith("the map deforms: I1/3 tends to L1 where the points are those of a solution")
+    assert one.text.endswith("the map deforms: I1/3 tends to L1 at successive points of one solution")
     assert (found.others, found.lost, found.density.text) == ((), 0, "1")
 
 

@@ -115,8 +115,8 @@ def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
 )
 def test_the_genus_allows_one_kind_of_growth(genus, possible, impossible):
     found = replace(curves("x*y"), genus=genus)
-    assert [found.against(growth) for growth in possible] == [""] * len(possible)
-    assert all(found.against(growth) for growth in impossible)
+    assert [found.contradiction(growth) for growth in possible] == [""] * len(possible)
+    assert all(found.contradiction(growth) for growth in impossible)
 
 
 def test_a_genus_that_the_degrees_exclude_is_no_finding():
@@ -130,7 +130,7 @@ def test_a_genus_that_the_degrees_exclude_is_no_finding():
 
 def test_what_the_map_does_on_the_curves_is_said_where_it_follows():
     elliptic, rational, other = (curves(text) for text in ("y^2 - x^3 - x", "x*y", "y^2 - x^5 - x"))
-    assert elliptic.motion(Growth.QUADRATIC) == "on it the map is a translation, for the degrees grow"
+    assert elliptic.motion(Growth.QUADRATIC) == "on it the map is a translation, since the degrees grow"
     assert elliptic.motion(Growth.BOUNDED) == rational.motion(Growth.LINEAR) == ""
     assert "finite order" in other.motion(Growth.UNKNOWN)
     assert "an iterate" in replace(elliptic, components=2).motion(Growth.QUADRATIC)

@@ -17,12 +17,12 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import denominators_among
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.products import candidates
-from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat, search
+from kahanmaps.laboratory.preserve.search import may_be_conjugate, repeat_search, search_spaces
 
 
 def searched(file, eps=None):
     laboratory = Laboratory(file, (), eps)
-    return laboratory, search(
+    return laboratory, search_spaces(
         laboratory.maps[0], orbit_profile(laboratory.maps), laboratory.cofactors(), budget=Budget()
     )
 
@@ -41,7 +41,7 @@ def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
     assert gradient_rank(laboratory.maps[0], found.all_spaces) == independent
     assert not may_be_conjugate(found)
     reference, second = laboratory.primes[0], laboratory.maps[1]
-    again = repeat(found, second, reference)
+    again = repeat_search(found, second, reference)
     assert again is not None
     assert [[len(space.basis) for space in group] for group in again.spaces] == [
         [len(space.basis) for space in group] for group in found.spaces
@@ -67,12 +67,12 @@ def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeyp
     profile, dim = orbit_profile(laboratory.maps), laboratory.map.dim
     assert profile.codimension == len(origins)
     over = denominators_among(candidates(laboratory, known, Budget()), dim)
-    found = search(laboratory.maps[0], profile, known, over, budget=Budget())
+    found = search_spaces(laboratory.maps[0], profile, known, over, budget=Budget())
     assert [step.text for step in found.steps] == origins
     assert gradient_rank(laboratory.maps[0], found.all_spaces) == len(origins)
     # Without the variables for denominators only the polynomial is found.
     with pytest.raises(pytest.fail.Exception):
-        search(laboratory.maps[0], profile, known, budget=Budget())
+        search_spaces(laboratory.maps[0], profile, known, budget=Budget())
 
 
 # The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.

@@ -39,7 +39,7 @@ def difference_sizes(claim, o):
     for left, right in claim.function(o):
         difference = left - right
         entries = difference.entries() if hasattr(difference, "entries") else [difference]
-        found += [lowest(entry) for entry in entries if not entry.above.is_zero()]
+        found += [lowest(entry) for entry in entries if not entry.numerator.is_zero()]
     return found
 
 

@@ -14,7 +14,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
 
 @click.command("find-density")
 @opt.system_options
-@click.option("--flow", is_flag=True, help="Search for densities of the differential equation instead.")
+@click.option("--flow", is_flag=True, help="Densities of the differential equation instead of the map.")
 @click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
 @search_options("density")
 def command(system: str | None, **options: Any) -> int:
@@ -26,11 +26,13 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-density nahm_tetrahedral --toml
       kahanmaps find-density zander_120 --flow
 
-    phi is a polynomial of least degree, or a product of powers of known polynomials with exponents of either sign;
-    where nothing else is found, factors of integrals are tried too. phi times an integral is again such a denominator:
-    the shortest is printed, and --json has all that were found. Each is verified as an identity.
+    phi (called density) is a polynomial of the least degree, or a product of powers of known polynomials, of any degree
+    and with exponents of either sign. If there is neither, the command searches for integrals and tries products of
+    powers of their factors too. Every formula is verified as an identity.
 
-    Exit status: 0 found, 2 usage error, 3 none up to the degree tried.
+    phi times any integral is a density again: the shortest one is shown, --json lists all of them.
+
+    Exit status: 0 if a density was found, 2 for a usage error, 3 if there is none up to the degree that was tried.
     """
     require_one_form(options)
     with SearchProgress(options) as search:
@@ -38,7 +40,7 @@ def command(system: str | None, **options: Any) -> int:
         settings = search_arguments(options, "flow", "max_degree")
         if options["flow"] and options["as_toml"]:
             raise click.UsageError("--flow goes without --toml, which is about the map")
-        found = lib.find_densities(file, **settings, progress=search)
-    further = f"note\t{found.further}" if found.further else ""
-    print_search("find-density", found, search, options, [("phi", one, "") for one in found.shown], further)
-    return 0 if found.densities else 3
+        result = lib.find_densities(file, **settings, progress=search)
+    further = f"note\t{result.further}" if result.further else ""
+    print_search("find-density", result, search, options, [("phi", phi, "") for phi in result.shown], further)
+    return 0 if result.densities else 3

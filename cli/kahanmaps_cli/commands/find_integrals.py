@@ -32,19 +32,19 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     "sets",
     metavar="LIST",
     multiple=True,
-    help="Search for a Hirota-Kimura basis of these monomials, e.g. 'x^2,y^2,1'; x~ is the image of x.",
+    help="Instead: a Hirota-Kimura basis of these polynomials, e.g. 'x^2,y^2,1'; x~ is the image of x.",
 )
 @click.option(
     "--darboux",
     type=click.IntRange(1, 12),
     metavar="DEGREE",
-    help="Search for discrete Darboux polynomials up to this degree; with --flow for those of the vector field.",
+    help="Instead: discrete Darboux polynomials up to this degree; with --flow those of the differential equation.",
 )
-@click.option("--flow", is_flag=True, help="Compare with the integrals of the differential equation.")
+@click.option("--flow", is_flag=True, help="Integrals of the differential equation, compared with those of the map.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
-    """Search for rational integrals of the map of SYSTEM and prove them; measure how many there are.
+    """Search for integrals of the map of SYSTEM: their number, closed forms P/Q, and proofs.
 
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
@@ -58,26 +58,26 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals lorenz --parameter b=20 --flow --darboux 3
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
-    Without --eps the formulas contain eps (the time step is 2 eps). The number of independent integrals is known from
-    theorems, and measured along orbits modulo primes; every formula is verified as an identity. An integral may contain
-    the image x~ of x, the image x~~ of x~, and so on. --flow adds the limits of the integrals as eps -> 0, and the
-    integrals of the differential equation that the map loses.
+    Without --eps the formulas contain eps (the time step is 2 eps). The number of independent integrals follows from
+    theorems and from orbits, measured modulo primes; every formula is verified as an identity. If there is no formula
+    in x alone, it may contain x~, the image of x, x~~, the image of x~, and so on. --flow reports which integrals of
+    the differential equation are limits of integrals of the map as eps -> 0, and which are lost.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
-    record) for each combination of values. Values at which the map is undefined are listed at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
+    combination of values; with --json one record per line. Values without a map are listed at the end.
 
-    Exit status: 0 as many formulas were found as theorems and orbits predict, 2 usage error, 3 fewer, or orbits were
-    not measured.
+    Exit status: 0 if every integral that theorems give or orbits show has a formula, 2 for a usage error, 3 if some
+    have none, orbits were not measured, or the work or time limit was too small.
     """
     require_one_form(options)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
             raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
-        found = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
-        formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
-        line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
-        return Cell(line, lambda: record("find-integrals", found, search), lambda: None, found.reason)
+        result = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
+        formulas = "; ".join(f"{integral.text} ({integral.verdict})" for integral in result.integrals)
+        line = f"{_count(result).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
+        return Cell(line, lambda: record("find-integrals", result, search), lambda: None, result.reason)
 
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
@@ -95,41 +95,43 @@ def command(system: str | None, **options: Any) -> int:
         find = partial(lib.find_integrals, file, **search_arguments(options, "max_degree"), progress=search)
         if options["flow"]:
             stages = lib.budget_for("integrals", options["effort"]).share([1, 1])
-            found = find(flow=True, effort=next(stages))
-            beside = lib.flow_and_map(find(effort=next(stages)), None, found)
+            result = find(flow=True, effort=next(stages))
+            comparison = lib.flow_and_map(find(effort=next(stages)), None, result)
         else:
-            found, beside = find(), None
-    if beside is not None and options["as_json"]:
-        print_json(record("find-integrals", found, search, beside_map=beside.to_json()))
-        return 3 if found.reason else 0
-    every: list[Any] = [*found.integrals, *found.in_iterates]
-    named = [(one.name, one, f"{one.origin}: ") for one in every]
-    print_search("find-integrals", found, search, options, named, _count(found))
+            result, comparison = find(), None
+    if comparison is not None and options["as_json"]:
+        print_json(record("find-integrals", result, search, beside_map=comparison.to_json()))
+        return 3 if result.reason else 0
+    integrals: list[Any] = [*result.integrals, *result.in_iterates]
+    named = [(integral.name, integral, f"{integral.origin}: ") for integral in integrals]
+    print_search("find-integrals", result, search, options, named, _count(result))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
-        for one in found.time_dependent:
-            where = "" if found.flow else "of the n-th point: "
-            print_stdout(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\t{where}depends on time")
-        for status, text in () if beside is None else beside.lines(others=False):
+        for integral in result.time_dependent:
+            where = "" if result.flow else "of the n-th point: "
+            print_stdout(
+                f"{integral.name}\t{integral.integral.verdict}\t{formula(integral.text)}\n\t{where}depends on time"
+            )
+        for status, text in () if comparison is None else comparison.lines(others=False):
             print_stdout(f"{status}\t{formula(text)}")
-    return 3 if found.reason else 0
+    return 3 if result.reason else 0
 
 
-def _count(found: Any) -> str:
-    if not found.profile.nullities and not found.codimension:
+def _count(result: Any) -> str:
+    if not result.profile.nullities and not result.codimension:
         return "orbits\tnot measured"
-    return f"found\t{found.found} functionally independent; {found.count_text}"
+    return f"found\t{result.formula_count} functionally independent; {result.count_text}"
 
 
 def _darboux(system: str | None, options: dict[str, Any]) -> int:
     with SearchProgress(options) as search:
         file, degree = opt.load_system(system, options), options["darboux"]
-        found = lib.darboux_polynomials(file, degree, **search_arguments(options, "flow"), progress=search)
+        result = lib.darboux_polynomials(file, degree, **search_arguments(options, "flow"), progress=search)
     if options["as_json"]:
-        print_json(record("darboux-polynomials", found, search))
+        print_json(record("darboux-polynomials", result, search))
     else:
-        print_stdout(f"Darboux polynomials: {found.file.name}{scope(found)}")
-        print_stdout("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(found).split("\n")))
-    return 3 if found.reason else 0
+        print_stdout(f"Darboux polynomials: {result.file.name}{scope(result)}")
+        print_stdout("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(result).split("\n")))
+    return 3 if result.reason else 0
 
 
 def _bases(system: str | None, options: dict[str, Any]) -> int:

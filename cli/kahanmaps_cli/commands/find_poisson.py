@@ -21,10 +21,12 @@ from kahanmaps_cli.screen.terminal import print_stdout
     metavar="D",
     help="Largest degree of entries (default: 3 in dimension 3, else 2).",
 )
-@click.option("--denominator", metavar="EXPR", help="Common denominator of the entries, e.g. a density.")
+@click.option("--denominator", metavar="EXPR", help="Common denominator of all entries, e.g. a density.")
 @search_options("poisson")
 def command(system: str | None, **options: Any) -> int:
-    """Search for Poisson tensors P with polynomial entries that the map of SYSTEM preserves: dPhi P dPhi^T = P(x~).
+    """Search for Poisson tensors that the map of SYSTEM preserves.
+
+    These are skew matrices P(x) with polynomial entries and dPhi P dPhi^T = P(x~).
 
     \b
       kahanmaps find-poisson lotka_volterra
@@ -32,11 +34,11 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-poisson volterra_periodic_4 --degree 3
       kahanmaps find-poisson weierstrass --symbolic g2 --toml
 
-    Each is printed by its brackets {x_i, x_j} = P_ij, with its rank, the Jacobi identity, Casimirs, and integrals in
-    involution; products with polynomial integrals are omitted. Without --eps the formulas contain eps (the time step is
-    2 eps).
+    The output lists the brackets {x_i, x_j} = P_ij, the rank, the Jacobi identity, the Casimirs and the integrals in
+    involution. Products of polynomial integrals with other tensors are left out. Without --eps the formulas contain eps
+    (the time step is 2 eps).
 
-    Exit status: 0 found, 2 usage error, 3 none up to the degree tried.
+    Exit status: 0 if a tensor was found, 2 for a usage error, 3 if there is none up to the degree that was tried.
     """
     require_one_form(options)
     with SearchProgress(options) as search:
@@ -44,11 +46,9 @@ def command(system: str | None, **options: Any) -> int:
         settings, denominator = search_arguments(options), None
         if options["denominator"] is not None:
             denominator = lib.parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
-        found = lib.find_poisson(file, options["degree"], denominator=denominator, **settings, progress=search)
-    print_search(
-        "find-poisson", found, search, options, [(one.name, one, f"{one.statement}; ") for one in found.tensors]
-    )
+        result = lib.find_poisson(file, options["degree"], denominator=denominator, **settings, progress=search)
+    print_search("find-poisson", result, search, options, [(P.name, P, f"{P.statement}; ") for P in result.tensors])
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
-        for integral in found.integrals:
+        for integral in result.integrals:
             print_stdout(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
-    return 0 if found.tensors else 3
+    return 0 if result.tensors else 3

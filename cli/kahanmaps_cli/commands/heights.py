@@ -15,7 +15,7 @@ from kahanmaps_cli.screen.render import record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.screen.value_rows import Cell, table
 
-# Of the picture as well.
+# Shared with `plot heights`.
 height_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.eps_options,
     click.option(
@@ -43,7 +43,7 @@ height_options: Callable[[opt.F], opt.F] = opt.stack(
     cls=opt.Renamed,
     type=Whole(1),
     metavar="N",
-    help="Draw N random initial points (default 3).",
+    help="Number of random initial points (default 3).",
 )
 @click.option(
     "--start",
@@ -51,12 +51,12 @@ height_options: Callable[[opt.F], opt.F] = opt.stack(
     type=PointText(),
     multiple=True,
     metavar="X",
-    help="Initial point instead of random ones, e.g. 1/2,-1/3,0.25. Repeatable.",
+    help="Instead: this initial point, e.g. 1/2,-1/3,0.25. Repeatable.",
 )
 @height_options
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Measure how fast the heights of exact orbits of the map of SYSTEM grow.
+    """Measure the growth of heights along exact orbits of the map of SYSTEM, from several initial points.
 
     \b
       kahanmaps heights weierstrass
@@ -65,36 +65,40 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps heights henon_heiles -p c=-2..0:1/2
       kahanmaps heights --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
 
-    The height of a point is the bit length of its largest numerator or denominator. Integrable maps typically have
-    quadratic growth, others exponential growth; bounded and linear growth also occur on special curves. Without --eps
-    the values 1/10 and 3/11 are compared, since one may be special. The result is evidence, not proof.
+    The height of a point is the bit length of the largest integer in its coordinates over a common denominator.
+    Quadratic growth indicates an integrable map, exponential growth a nonintegrable one; on special curves growth may
+    also be bounded or linear. Without --eps the values 1/10 and 3/11 are compared, since one eps may be special. This
+    is evidence, not proof.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
-    record) for each combination of values. Values at which the map is undefined are listed at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
+    combination of values; with --json one record per line. Values without a map are listed at the end.
 
-    Exit status: 0 all decided orbits agree, 2 usage error, 3 undecided, the orbits disagree, or the budget was spent.
+    Exit status: 0 if all decided orbits agree, 2 for a usage error, 3 if no orbit is decided, the orbits disagree, or
+    the budget was spent.
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
-        found = surveyed(file, eps, options, search)
-        undecided = f"undecided: {found.text}" if found.kind is lib.Growth.UNDECIDED else ""
-        if not found.is_whole:
+        survey = surveyed(file, eps, options, search)
+        undecided = f"undecided: {survey.text}" if survey.kind is lib.Growth.UNDECIDED else ""
+        if not survey.is_whole:
             undecided = "stopped early: the budget was spent before all orbits were finished (--effort)"
-        return Cell(found.text, lambda: _record(file, options, found, search), lambda: _print(file, found), undecided)
+        return Cell(
+            survey.text, lambda: _record(file, options, survey, search), lambda: _print(file, survey), undecided
+        )
 
     return table(system, options, cell)
 
 
 def require_heights(options: dict[str, Any]) -> None:
-    """Options that contradict each other, or themselves."""
+    """Raise UsageError for options that contradict each other."""
     if options["count"] is not None and options["given"]:
         raise click.UsageError("give --start X or --random N, not both")
 
 
 def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> lib.HeightSurvey:
-    """The orbits that the options ask for."""
+    """Run the survey with the given options."""
     return lib.height_survey(
         file.map,
         eps,

@@ -14,14 +14,14 @@ from kahanmaps_cli.screen.render import envelope, print_json, record_of
 from kahanmaps_cli.screen.terminal import print_stdout
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
-_WALK = "To walk instead: kahanmaps orbit ... --steps N says when the start comes back"
-_LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from seconds to minutes
+_WALK = "Try instead: kahanmaps orbit ... --steps N reports when the orbit returns to its initial point"
+_LONG_PRIME, _MAX_PRIME = 90, 192  # bits; between them the computation takes seconds to minutes
 
 
 @click.command("period")
 @system_options
 @click.option("--start", type=PointText(), metavar="X", help="Initial point, e.g. 1/2,-1/3,0.25.")
-@click.option("--levels", type=int, metavar="N", help="Find the levels on which all orbits have period N instead.")
+@click.option("--levels", type=int, metavar="N", help="Instead: the levels on which all orbits have period N.")
 @eps_options
 @click.option(
     "--arithmetic",
@@ -31,10 +31,10 @@ _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from secon
     show_default=True,
     help="Arithmetic: exact or mod:P.",
 )
-@click.option("-v", "--verbose", is_flag=True, help="Print the normal form on standard error.")
+@click.option("-v", "--verbose", is_flag=True, help="Describe the normal form of the system on standard error.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """Compute the exact period of an orbit of a member of the commuting family without iterating it.
+    """Compute the exact period of an orbit of a member of the commuting family, without iterating the map.
 
     \b
       kahanmaps period paper_m3 --start 1,2,3,4,5,6 --eps 1/10
@@ -46,20 +46,21 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
       kahanmaps period nahm_tetrahedral --eps 1/10 --levels 5
 
     In every plane of its normal form the map is a translation on a cubic curve, and the period is the order of a point.
-    Modulo P it is computed; over Q the orbit is proved periodic or aperiodic.
+    Modulo P this order is computed; over Q the orbit is proved periodic or aperiodic.
 
-    SYSTEM need not be declared as a member. The translation extends the map through poles: if the orbit meets one, the
-    output says so, and the period is that of the extended orbit.
+    The command also recognizes systems of the family that are not declared as such. The translation is defined at
+    indeterminacy points of the map too: if the orbit meets one, the period is that of the continued orbit, and the
+    output says so.
 
-    --levels N prints the polynomial psi_N whose roots gamma = 1 - disc(h) level^2 are the levels with period N or a
-    divisor, and the rational gamma with period N; with SYSTEM and eps also these levels in each plane at a rational
-    root of chi, as values of the integral h/(1 + eps^2 D).
+    --levels N prints the polynomial psi_N: its roots gamma = 1 - disc(h) level^2 are the levels whose period is N or a
+    divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps also these levels in each plane
+    at a rational root of chi, as values of the integral h/(1 + eps^2 D).
 
-    Exit status: 0 found (or proved that there is none), 2 usage error or no normal form, 3 undecided, or the orbit
-    reaches a point where it cannot be continued.
+    Exit status: 0 if the period was found, or proved not to exist, 2 for a usage error or a system without a normal
+    form, 3 if undecided, or if the orbit cannot be continued at some point.
     """
     if (options["levels"] is None) == (options["start"] is None):
-        raise click.UsageError("give --start X, or --levels N, one of the two")
+        raise click.UsageError("give either --start X or --levels N")
     if options["levels"] is not None:
         return _levels(system, as_json, options)
     kind, prime = options["arithmetic"]
@@ -70,17 +71,17 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if not file.is_quadratic and isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(f"{no_period}: {normal_form.reason}. {_WALK}")
     eps = the_eps(options["eps"], options["time_step"])
-    # The same demands on eps, prime and start as orbits make, in the same words.
+    # Check eps, prime and initial point as for orbits, with the same messages.
     file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(options["start"])
     if isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(
-            f"{no_period}: {normal_form.reason}. Looked for a matrix A that makes it a member of "
-            f"the commuting family with distinct roots of chi, and so a translation. {_WALK}"
+            f"{no_period}: {normal_form.reason}. The map is a translation only if a matrix A makes the system a member "
+            f"of the commuting family with distinct roots of chi. {_WALK}"
         )
     if not quiet:
         if verbose:
             print_stderr(normal_form.text)
-        if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
+        if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _MAX_PRIME:
             print_stderr(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
     found = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
     message, status = found.text.splitlines()[0], _STATUS.get(found.status, 3)
@@ -119,7 +120,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 
 def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
-    """The levels with a period; in the planes of a system if one is given."""
+    """Print the levels with a period, and those in the planes of a system if one is given."""
     levels = lib.PeriodicLevels(options["levels"])
     data: dict[str, Any] = {
         **envelope("period levels"),

@@ -105,7 +105,7 @@ def of_integrals(found: Findings) -> Iterator[Statement]:
         yield Statement(PROVED, f"{number}, as a member of the commuting family")
     if found.pencil is not None:
         growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-        against = found.pencil.against(growth)
+        against = found.pencil.contradiction(growth)
         follows = f"but {against}" if against else found.pencil.motion(growth)
         text = "; ".join(filter(None, [found.pencil.text, follows]))
         yield Statement(UNDECIDED if against else MEASURED, text)
@@ -128,7 +128,7 @@ def of_densities(found: Findings) -> Iterator[Statement]:
             times = f"any function of {_listed(names)}" if names else "any integral"
             yield Statement(NOTE, f"so is dx/phi for this phi times {times}")
     else:
-        yield Statement(MEASURED if search.none_there else UNDECIDED, search.reason)
+        yield Statement(MEASURED if search.shows_none else UNDECIDED, search.reason)
     if search.anti_invariant is not None:
         text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.anti_invariant.text}"
         yield Statement(search.anti_invariant.verdict, text)

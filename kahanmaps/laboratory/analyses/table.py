@@ -93,7 +93,7 @@ def _curves(run: Run, effort: Budget, **_: Any) -> Pencil | None:
 def _curves_json(found: Findings) -> dict[str, Any]:
     """The curves, and what the map is on them; null where the degrees contradict them."""
     growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-    if found.pencil is None or found.pencil.against(growth):
+    if found.pencil is None or found.pencil.contradiction(growth):
         return {"invariant_curves": None}
     return {"invariant_curves": {**found.pencil.to_json(), "motion": found.pencil.motion(growth)}}
 

@@ -187,8 +187,8 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
         is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
     except (BudgetExceeded, SingularStep):
         return None
-    common = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (entry.below for entry in point))
-    forms = [entry.above * (common / entry.below) for entry in point] + [common]
+    common = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (entry.denominator for entry in point))
+    forms = [entry.numerator * (common / entry.denominator) for entry in point] + [common]
     # Coordinates are in lowest terms: this is the degree on projective space.
     if not is_identity and max(degree_in(form, n) for form in forms) != 1:
         return None

@@ -1,8 +1,9 @@
-"""Invariant measures dx/phi of a map with a polynomial phi, or a product of powers of polynomials, in closed form.
+"""The search for invariant volume forms dx/phi of a map, where phi is a polynomial or a product of powers of some.
 
 dx/phi is invariant if phi(x~) = det dPhi(x) phi(x): phi is a discrete Darboux polynomial with the cofactor det dPhi.
-All of them up to a degree are one null space modulo a prime. Products of powers of known polynomials, of any degree,
-are found by their exponents (products.py). Source: celledoni-2019.
+All polynomials phi up to a degree form one null space modulo a prime. Products of powers of known polynomials, of any
+degree, are found by their exponents (products.py). Everywhere here "density" means the denominator phi, not 1/phi.
+Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ _ONCE = CofactorProduct((1,), 1)
 
 @dataclass(frozen=True)
 class FoundDensity:
-    """A density phi(x, eps): the measure dx/phi is invariant, with the verdict on that; `product` is phi in factors."""
+    """A denominator phi(x, eps) of an invariant volume form dx/phi, with its verdict; `product` is phi in factors."""
 
     function: RationalFunction
     verdict: Certainty
@@ -72,12 +73,13 @@ class FoundDensity:
 
 @dataclass(frozen=True)
 class DensitySearch(Search):
-    """What `find_densities` found.
+    """The result of `find_densities`.
 
-    `densities` span all phi of the least degree that has some, after a proved one where these are not, or are
-    det(I - eps f') of a Hamiltonian system, which need not be of least degree; `degree` is the largest that was tried,
-    and `cut` says why not all that was asked for was tried, empty where it was. `period` is the number of points of
-    orbits that close. `turning` is a phi with phi(x~) = -det dPhi(x) phi(x): the map turns dx/phi into -dx/phi, and
+    `densities` is a basis of all phi of the least degree that has any. There are two exceptions: if none of these is
+    proved, a proved phi of another degree comes first, where there is one; for a Hamiltonian system the list is
+    det(I - eps f') alone, whose degree need not be the least. `degree` is the largest degree that was tried; `cut` says
+    why the search stopped before the requested degree, empty where it did not. `period` is the period of the map, if
+    orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
     |dx/phi| is invariant.
     """
 
@@ -88,59 +90,62 @@ class DensitySearch(Search):
     anti_invariant: FoundDensity | None = None
 
     @property
-    def none_there(self) -> bool:
-        """Whether all that was asked for was tried, and nothing is a density: measured."""
+    def shows_none(self) -> bool:
+        """Whether the whole request was tried without a density: a measured answer."""
         return not self.densities and not self.cut
 
     @property
-    def is_open(self) -> bool:
-        """Whether nothing was found of a map, so that factors of integrals may be tried."""
+    def may_use_integrals(self) -> bool:
+        """Whether the search found nothing for a map, so that factors of its integrals are to be tried."""
         return not (self.densities or self.anti_invariant or self.flow)
 
     @property
     def reason(self) -> str:
-        """Why the search ended without a density, or before all that was asked for was tried."""
-        if self.none_there:
+        """Why the search ended without a density, or before the requested degree."""
+        if self.shows_none:
             degree = f"no polynomial of degree at most {self.degree}"
             return f"{degree}, and no product of powers of known ones, is a density"
         return self.cut
 
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
-        """The one that stands for all, which are this one times integrals: the shortest, proved if any is."""
-        return tuple(sorted(self.densities, key=lambda one: (one.verdict is not Certainty.PROVED, len(one.text)))[:1])
+        """The density to print, the shortest, proved if any is; all others are this one times integrals."""
+        return tuple(sorted(self.densities, key=lambda phi: (phi.verdict is not Certainty.PROVED, len(phi.text)))[:1])
 
     @property
     def further(self) -> str:
-        """That there are more than the one that is shown; empty where there are not."""
+        """A sentence on the densities that are not shown; empty where there are none."""
         if len(self.densities) < 2:
             return ""
         others = len(self.densities) - 1
-        so = f"so {'is' if others == 1 else 'are'} {counted(others, 'further polynomial')}"
-        return f"phi times any integral is a density again: {so}, which --json lists"
+        kind = f"{counted(others, 'further polynomial')} of this kind"
+        return f"phi times any integral is a density again; --json lists {kind}"
 
     @property
     def note(self) -> str:
-        """That orbits close, and for which eps; of which phi the sign changes; empty where there is nothing to say."""
-        closes = closing_note(self.period, self.eps, self.file.map)
+        """Sentences on an anti-invariant density and on the period of the map; empty where there is neither."""
+        periodic = closing_note(self.period, self.eps, self.file.map)
         if self.anti_invariant is None:
-            return closes
-        turns = f"|dx/phi| is invariant for phi = {self.anti_invariant.text}: phi(x~) = -det dPhi(x) phi(x)"
-        return "; ".join(filter(None, (f"{turns} ({self.anti_invariant.verdict})", closes)))
+            return periodic
+        sentence = f"|dx/phi| is invariant for phi = {self.anti_invariant.text}: phi(x~) = -det dPhi(x) phi(x)"
+        return "; ".join(filter(None, (f"{sentence} ({self.anti_invariant.verdict})", periodic)))
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each formula, for `pandas.DataFrame(found.rows())` and the like."""
-        return [{"name": "phi", "formula": one.text, "verdict": str(one.verdict)} for one in self.densities]
+        """Return one row for each formula, e.g. for `pandas.DataFrame(result.rows())`."""
+        return [{"name": "phi", "formula": phi.text, "verdict": str(phi.verdict)} for phi in self.densities]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        more = attributes(self, "period", "note", "reason", "primes")
-        return {**self.of_flow, **attributes(self, "densities", degree_tried="degree"), **more}
+        return {
+            **self.of_flow,
+            **attributes(self, "densities", degree_tried="degree"),
+            **attributes(self, "period", "note", "reason", "primes"),
+        }
 
     def toml_section(self) -> str:
-        """The density that is shown as a section [density] of a system file, which `check-measure` accepts.
+        """Return the section [density] of a system file, for `check-measure`; empty without a density.
 
-        Empty where there is none; for a given eps a comment says that it holds there only.
+        If eps was given, a comment says that the formula holds at this eps only.
         """
         if not self.densities:
             return ""
@@ -160,23 +165,25 @@ def find_densities(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DensitySearch:
-    """The polynomials phi of the least degree for which the map preserves dx/phi; failing these, a product of powers.
+    """Search for densities phi: the map preserves the volume form dx/phi.
+
+    The result is a basis of the polynomials phi of the least degree or, if there are none, a product of powers.
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
-        symbols: names of parameters that formulas are to contain; the others have the values of the file.
-        eps: an exact number, or None for formulas that contain eps.
-        time_step: 2 eps, in its place.
-        flow: ask for those of the differential equation instead, div(f/phi) = 0.
-        max_degree: of phi; by default as the number of unknowns allows, at most 12.
-        integrals: those that are known: where nothing else is found phi may be a product of powers of their factors.
-            By default they are then sought.
-        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
-        seed: of everything random.
-        progress: is told what is being tried.
+        symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
+        eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
+        time_step: the time step 2 eps, instead of eps.
+        flow: search for densities of the differential equation instead, div(f/phi) = 0.
+        max_degree: the largest degree of phi; by default as the number of unknowns allows, at most 12.
+        integrals: the known integrals: if nothing else is found, products of powers of their factors are tried. By
+            default the integrals are then searched for.
+        effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
+        seed: the random seed.
+        progress: called with a sentence at each stage of the search.
 
     Returns:
-        A `DensitySearch`; formulas are exact, proved or supported. Finding none up to a degree is measured.
+        A `DensitySearch`; formulas are exact, proved or supported. That there is none up to a degree is measured.
 
     Raises:
         InputError: for unknown symbols, symbols in a [family] file, eps = 0, and a negative degree.
@@ -184,8 +191,8 @@ def find_densities(
     Source: celledoni-2019.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = find_densities(load("lotka_volterra"))
-    >>> [(one.text, str(one.verdict)) for one in found.densities]
+    >>> result = find_densities(load("lotka_volterra"))
+    >>> [(phi.text, str(phi.verdict)) for phi in result.densities]
     [('x*y', 'proved')]
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
@@ -202,7 +209,7 @@ def densities_of(
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DensitySearch:
-    """What `find_densities` finds, on the maps of a laboratory."""
+    """Run `find_densities` on the maps of a laboratory."""
     flow = laboratory.flow
     if laboratory.defect:
         return DensitySearch(*laboratory.asked, (), -1, laboratory.defect, flow=flow)
@@ -215,43 +222,42 @@ def densities_of(
         progress("densities that are products")
         stages = budget.share([1, 2, 2])  # products; polynomials; integrals, for their factors
         product, anti_invariant = _products(laboratory, max_degree, next(stages))
-        # The first search for integrals is worth as much as high degrees; a caller who has done it needs none.
+        # Reserve a share for the search for integrals, unless the caller gives them or a product is known already.
         second = budget if integrals is not None or product is not None else next(stages)
         densities, tried, cut = _search(laboratory, product, max_degree, second, progress)
-        none_proved = densities and all(one.verdict is not Certainty.PROVED for one in densities)
+        none_proved = densities and all(phi.verdict is not Certainty.PROVED for phi in densities)
         if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
-            # x_1 ... x_n where the lemma on Lotka-Volterra systems proves it, whatever its degree.
+            # The lemma on Lotka-Volterra systems may prove phi = x_1 ... x_n, whatever its degree.
             x = ring(laboratory.map.names).gens()
             phi = RationalFunction(prod(x[:dim], start=x[0] ** 0), x[0] ** 0)
             proof = product_density_invariant(laboratory.system, phi)
             densities = densities if proof is None else [FoundDensity(phi, Certainty.PROVED, proof), *densities]
-    found = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, anti_invariant, flow=flow)
-    if found.is_open:
+    result = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, anti_invariant, flow=flow)
+    if result.may_use_integrals:
         if integrals is None:
             file, symbols, eps, seed, _ = laboratory.asked
             searched = find_integrals(file, symbols=symbols, eps=eps, effort=budget, seed=seed, progress=progress)
             integrals = searched.integrals
         progress("densities that are products of factors of integrals")
-        found = with_factors(found, integrals, max_degree)
-    return found
+        result = with_factors(result, integrals, max_degree)
+    return result
 
 
 def with_factors(
-    found: DensitySearch, integrals: Sequence[FoundIntegral], max_degree: int | None = None
+    result: DensitySearch, integrals: Sequence[FoundIntegral], max_degree: int | None = None
 ) -> DensitySearch:
-    """What was found or, if that is nothing, a product of powers of factors of integrals that is a density."""
-    if not (found.is_open and integrals):
-        return found
-    laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed, algebraic=True)
+    """Complete a search that found no density by products of powers of factors of integrals."""
+    if not (result.may_use_integrals and integrals):
+        return result
+    laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed, algebraic=True)
     if laboratory.defect:
-        return found
-    product, anti_invariant = _products(
-        laboratory, max_degree, Budget(), integrals
-    )  # of a map: nothing is sought of a flow
+        return result
+    # The laboratory is that of a map, so `candidates` does not use the budget.
+    product, anti_invariant = _products(laboratory, max_degree, Budget(), integrals)
     if product is None:
-        return replace(found, anti_invariant=anti_invariant)
+        return replace(result, anti_invariant=anti_invariant)
     return replace(
-        found, densities=(product,), degree=product.degree(laboratory.map.dim), anti_invariant=anti_invariant
+        result, densities=(product,), degree=product.degree(laboratory.map.dim), anti_invariant=anti_invariant
     )
 
 
@@ -262,28 +268,31 @@ def _search(
     budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[list[FoundDensity], int, str]:
-    """Densities, the largest degree that was tried, and what ended it; the product where none is simpler."""
+    """Search for polynomial densities; the `product` is the answer where none is simpler.
+
+    Returns the densities, the largest degree that was tried, and what ended the search.
+    """
     dim = laboratory.map.dim
     top = max_degree if max_degree is not None else _MAX_DEGREE
-    top, until = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0), budget
+    top, degree_budget = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0), budget
     if product is not None:
-        # Only lower degrees are worth a part of the budget then, and the others of its own degree.
-        until, top = budget.part(1 / 3), min(top, product.degree(dim))
-    # Where the space of a degree is 0, so are those of lower ones: they are leapt over while monomials at least double.
-    leaps, tried = [top] if product is None else [max(top - 1, 0), top], -1
-    while leaps[0] > 0:
-        halved = (d for d in range(leaps[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + leaps[0], dim))
-        leaps.insert(0, next(halved, leaps[0] - 1))
+        # Higher degrees are not needed then, and the other degrees get a part of the budget only.
+        degree_budget, top = budget.part(1 / 3), min(top, product.degree(dim))
+    # If the space of a degree is 0, so are those of lower degrees: try only degrees that double the monomials.
+    degrees, tried = [top] if product is None else [max(top - 1, 0), top], -1
+    while degrees[0] > 0:
+        halved = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
+        degrees.insert(0, next(halved, degrees[0] - 1))
     try:
-        while tried < top and not until.is_spent:
-            degree = next(leap for leap in leaps if leap > tried)
+        while tried < top and not degree_budget.is_spent:
+            degree = next(d for d in degrees if d > tried)
             progress(f"densities of degree {degree}")
             model = _space(laboratory.maps[0], degree)
             if model.basis and degree > tried + 1:
-                leaps = list(range(top + 1))  # the least degree that has some is wanted
+                degrees = list(range(top + 1))  # go back: the answer is the least degree with a density
                 continue
             if model.basis and len(model.basis) == len(_space(laboratory.maps[1], degree, model).basis):
-                found, reason = list[FoundDensity](), ""
+                densities, reason = list[FoundDensity](), ""
 
                 def spaces_on(
                     map_: ModularMap, degree: int = degree, model: DarbouxSpace = model
@@ -296,10 +305,10 @@ def _search(
                 for P in [] if forms.bases is None else forms.bases[0]:
                     phi = RationalFunction(P, P.context().constant(1))
                     verdict, evidence = _certified(laboratory, phi)
-                    found += [FoundDensity(phi, verdict, evidence)] if verdict.holds else []
+                    densities += [FoundDensity(phi, verdict, evidence)] if verdict.holds else []
                     reason = f"a density of degree {degree} that was found modulo primes did not pass as an identity"
-                if found or product is None:
-                    return found, degree, "" if found else reason
+                if densities or product is None:
+                    return densities, degree, "" if densities else reason
             tried = degree
     except NoPoint as error:
         return [], tried, str(error)
@@ -310,25 +319,28 @@ def _search(
 def _products(
     laboratory: Laboratory, max_degree: int | None, budget: Budget, integrals: Sequence[FoundIntegral] = ()
 ) -> tuple[FoundDensity | None, FoundDensity | None]:
-    """A density that is a product of powers of known polynomials, or one that changes its sign, as far as there are."""
-    parts = [part for one in integrals for part in (one.function.numerator, one.function.denominator)]
+    """Search for a density that is a product of powers of known polynomials; return (invariant, anti-invariant).
+
+    At most one of the two is not None.
+    """
+    parts = [part for I in integrals for part in (I.function.numerator, I.function.denominator)]
     try:
-        found = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), budget, parts)).density
+        product = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), budget, parts)).density
     except NoPoint:
         return None, None
-    if found is None or (phi := found.function) is None:
+    if product is None or (phi := product.function) is None:
         return None, None
-    verdict, evidence = _certified(laboratory, phi, found.constant)
-    one = FoundDensity(phi, verdict, evidence, found.text)
-    if not verdict.holds or (max_degree is not None and one.degree(laboratory.map.dim) > max_degree):
+    verdict, evidence = _certified(laboratory, phi, product.constant)
+    density = FoundDensity(phi, verdict, evidence, product.text)
+    if not verdict.holds or (max_degree is not None and density.degree(laboratory.map.dim) > max_degree):
         return None, None
-    return (one, None) if found.constant.numerator == found.constant.denominator else (None, one)
+    return (density, None) if product.constant.numerator == product.constant.denominator else (None, density)
 
 
 def _certified(
     laboratory: Laboratory, phi: RationalFunction, factor: RationalFunction | None = None
 ) -> tuple[Certainty, Evidence]:
-    """The verdict on dx/phi: by the lemma on Lotka-Volterra systems, or as an identity."""
+    """Certify that dx/phi is invariant, by the lemma on Lotka-Volterra systems or as an identity."""
     if laboratory.system is not None and not laboratory.flow:
         proof = product_density_invariant(laboratory.system, phi)
         if proof is not None:
@@ -337,7 +349,7 @@ def _certified(
 
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:
-    """det(I - eps f') of a Hamiltonian system with numbers for parameters, made primitive; None for others."""
+    """Return the primitive part of det(I - eps f') for a Hamiltonian system without symbols; None for others."""
     if laboratory.symbols or laboratory.flow or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
         return None
     if constant_structures(laboratory.system).hamiltonian is None:
@@ -359,6 +371,6 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
 
 
 def _space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
-    """The P of degree at most `degree` with P(x~) = det dPhi P(x), and with the monomials of the model."""
+    """Compute the space of P of degree at most `degree` with P(x~) = det dPhi P(x), on the monomials of the model."""
     sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, *([] if model is None else [model])))
     return cofactor_space(sample, _ONCE, degree, model)

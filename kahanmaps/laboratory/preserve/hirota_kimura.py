@@ -1,19 +1,17 @@
-"""Hirota-Kimura bases: which polynomials of a given set vanish along orbits, modulo primes.
+"""Hirota-Kimura bases: polynomial relations along orbits, modulo primes.
 
 For a set of polynomials phi_1, ..., phi_M the null space K(x) of an orbit consists of the c with sum c_j phi_j = 0 at
-every point of it. Its reduced echelon basis depends on the orbit only, so that every coefficient that is not the same
-number for all orbits is an integral of the map. The codimension of the orbit's variety, which is the number of
-independent integrals that such relations see, is the rank of the gradients of the relations at a point of the orbit.
+every point of the orbit. Its reduced echelon basis depends on the orbit only, so that every coefficient that is not the
+same number for all orbits is an integral of the map. The codimension of the variety of the orbit, which is the number
+of independent integrals that such relations show, is the rank of the gradients of the relations at a point of it.
 
-All this is measured: modulo two primes, for two eps and several orbits; it proves nothing. Source:
-petrera-pfadler-suris-2009.
+All this is measured: modulo two primes, for two eps and several orbits; it proves nothing.
 
-The relations of one degree along orbits, written out: which monomials, which numbers, which integrals.
-
-Of the null space of an orbit the reduced echelon basis is taken for the monomials of the highest degree first, and what
-lower degrees imply is left out. A coefficient that differs for two orbits is an integral; these are named c1, c2, ...
-One that does not is a number, times a power of eps where the maps differ in eps, or, where no such number is found,
-some function of eps named e1, e2, ...
+`sparse_relations` writes out the relations of one degree: their monomials, numbers and integrals. It takes the reduced
+echelon basis of the null space with monomials of the highest degree first, and leaves out what relations of lower
+degrees imply. A coefficient that differs for two orbits is an integral; these are named c1, c2, ... A coefficient that
+does not is a number, times a power of eps where the maps differ in eps; if no such number fits, it is a function of eps
+and gets a name e1, e2, ... Source: petrera-pfadler-suris-2009.
 """
 
 from __future__ import annotations
@@ -55,22 +53,22 @@ from kahanmaps.laboratory.modular_points import (
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
 MAX_UNKNOWNS = 1800
-MAX_INDEPENDENT = 800  # monomials that relations of lower degrees leave: their matrix takes about a second
-_SETTLED = 4  # degrees
-_SPARE_BITS = 40  # of 122 modulo two primes, by which a number must be simpler than an accident
+MAX_INDEPENDENT = 800  # monomials that lower degrees leave independent; eliminating their matrix takes about a second
+_SETTLED_DEGREES = 4
+_SPARE_BITS = 40  # of 122 modulo two primes: a number counts only if it is so many bits shorter than a random residue
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 
 
 @dataclass(frozen=True)
 class OrbitRelations:
-    """The polynomials up to a degree that vanish along one orbit.
+    """The polynomials up to a degree that vanish along one orbit: a space of this `dimension`.
 
-    They span a space of this `dimension`; on the orbit `independent` monomials are independent. `form` is the reduced
-    echelon form of the values of the monomials of `exponents_up_to` that degree or, where multiples were left out, of
-    the others, whose relations the rest of the space follows from. `leading` are the monomials that depend on those
-    before them, and their multiples in any higher degree do; `normals` is a basis of the span of the gradients at a
-    `point`; `period` is the number of points of an orbit that closed, else None.
+    On the orbit, `independent` monomials are linearly independent. `form` is the reduced echelon form of the values of
+    the monomials in `exponents_up_to`; if multiples of leading monomials were left out, of the other ones, whose
+    relations imply the rest. `leading` are the monomials that depend linearly on those before them: all their multiples
+    do so too. `normals` is a basis of the span of the gradients at `point`; `period` is the number of points if the
+    orbit closed, otherwise None.
     """
 
     form: nmod_mat
@@ -88,7 +86,7 @@ class OrbitRelations:
 
     @cached_property
     def vectors(self) -> list[list[int]]:
-        """The reduced echelon basis, where no monomials were left out."""
+        """The reduced echelon basis of the relations; only valid if no monomials were left out."""
         return echelon(kernel(self.form, self.independent), self.form.modulus())
 
 
@@ -96,10 +94,10 @@ class OrbitRelations:
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimension` is that of the orbit's variety as far as these polynomials show it, `with_known` the same together
-    with the integrals that were known before. `period` is the number of points of orbits that close, else None;
-    `agree` tells whether all maps gave the same numbers, `complete` whether all degrees that were asked for were tried;
-    `cut` says why they were not.
+    `codimension` is the codimension of the variety of the orbit as far as these polynomials show it, `with_known` the
+    same together with integrals that were known before. `period` is the number of points of orbits that close, else
+    None. `agree`: all maps gave the same numbers. `complete`: all requested degrees were tried; otherwise `cut` says
+    why not.
     """
 
     dim: int
@@ -118,8 +116,8 @@ class Profile:
 
     @property
     def is_settled(self) -> bool:
-        """Whether several degrees were tried and the last one showed no more than the one before."""
-        return self.degree >= _SETTLED and self.codimensions[-1] == self.codimensions[-2]
+        """Whether at least 4 degrees were tried and the last one showed no further integral."""
+        return self.degree >= _SETTLED_DEGREES and self.codimensions[-1] == self.codimensions[-2]
 
     @property
     def first_degree(self) -> int | None:
@@ -140,37 +138,37 @@ class Profile:
 def relations_on_orbit(
     map_: ModularMap, degree: int, most: int | None = None, leading: frozenset[Exponent] = frozenset()
 ) -> OrbitRelations:
-    """The polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
+    """Compute the polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
 
-    `most` says how many monomials are independent on orbits at most, as far as one knows: so many points and a few are
-    as good as all. For from a generic point on the rank of the rows grows until it has its final value: relations of
-    the points 0 to k that hold at the point k + 1 as well are, a step later, those of the points 1 to k + 1, and so on.
-    `leading` are those of relations of lower degrees: proper multiples of them are left out, dependent as they are.
-    Raises NoPoint where orbits meet the singular set.
+    `most` is an upper bound of the number of independent monomials, if one is known: a few more points than that
+    suffice. For a generic point the rank of the rows grows until it is final, since relations of the points 0 to k that
+    hold at the point k + 1 are, one step later, relations of the points 1 to k + 1, and so on. `leading` are the
+    leading monomials of relations of lower degrees; their proper multiples are dependent and left out. Raises NoPoint
+    where orbits meet the singular set.
     """
     exponents = exponents_up_to(map_.dim, degree)
     support = _not_multiples(map_.dim, degree, leading)
     most = len(support) if most is None else min(most, len(support))
-    left = support if len(support) < len(exponents) else None
-    rows, point, period = map_.along_orbit(degree, most + _SPARE, left)
+    selected = support if len(support) < len(exponents) else None
+    rows, point, period = map_.along_orbit(degree, most + _SPARE, selected)
     form, independent = reduced(matrix(rows, map_.prime))
     first, free = split_columns(form, independent)
-    found = frozenset(exponents[support[k]] for k in free)
-    if independent > most or not leading <= found:
-        return relations_on_orbit(map_, degree)  # what was known is of special orbits
-    # The gradient of a relation is that of its last monomial minus what those of the independent ones make of it.
+    new_leading = frozenset(exponents[support[k]] for k in free)
+    if independent > most or not leading <= new_leading:
+        return relations_on_orbit(map_, degree)  # `most` or `leading` came from a special orbit
+    # The gradient of a relation: that of its dependent monomial minus the combination of those of the independent ones.
     count(len(exponents) / 2 + map_.dim * len(support) / 3)
     slopes = [[row[k] for k in support] for row in slope_values(point, degree, map_.prime)]
     of_first = [[row[k] for k in first] + [0] * (form.nrows() - independent) for row in slopes]
     gradients = matrix(slopes, map_.prime) - multiply(matrix(of_first, map_.prime), form)
     normals = echelon(integers(gradients.transpose()), map_.prime)
-    return OrbitRelations(form, independent, len(exponents) - independent, normals, period, point, found)
+    return OrbitRelations(form, independent, len(exponents) - independent, normals, period, point, new_leading)
 
 
 def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[int]:
-    """The places in `exponents_up_to` of the monomials that are no proper multiples of `leading`."""
+    """Return the indices in `exponents_up_to` of the monomials that are not proper multiples of any in `leading`."""
     exponents = exponents_up_to(dim, degree)
-    is_multiple: list[bool] = []  # or one of them itself
+    is_multiple: list[bool] = []  # a proper multiple or a leading monomial itself
     support = []
     for k, (exponent, factors) in enumerate(zip(exponents, monomial_tables(dim, degree), strict=True)):
         is_proper = any(is_multiple[place] for _, _, place in factors)
@@ -181,14 +179,17 @@ def _not_multiples(dim: int, degree: int, leading: frozenset[Exponent]) -> list[
 
 
 def span_of_relations(map_: ModularMap, degree: int, largest: float = inf) -> list[list[int]]:
-    """The reduced echelon basis of the span of the relations of all orbits, or of some once it exceeds `largest`."""
-    first, still = relations_on_orbit(map_, degree), 0
-    found, most = first.vectors, first.independent
-    while found and still < 2 and len(found) <= largest:
-        more = echelon([*found, *relations_on_orbit(map_, degree, most).vectors], map_.prime)
-        still = still + 1 if len(more) == len(found) else 0
-        found = more
-    return found
+    """Return the reduced echelon basis of the span of the relations of all orbits.
+
+    Orbits are added until two in a row do not enlarge the span, or its dimension exceeds `largest`.
+    """
+    first, unchanged = relations_on_orbit(map_, degree), 0
+    basis, most = first.vectors, first.independent
+    while basis and unchanged < 2 and len(basis) <= largest:
+        enlarged = echelon([*basis, *relations_on_orbit(map_, degree, most).vectors], map_.prime)
+        unchanged = unchanged + 1 if len(enlarged) == len(basis) else 0
+        basis = enlarged
+    return basis
 
 
 def orbit_profile(
@@ -199,18 +200,19 @@ def orbit_profile(
     known: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
-    """Dimensions and codimensions for degree 1, 2, ..., on one orbit of each of the maps, which are to agree.
+    """Measure the relations of degree 1, 2, ... on one orbit of each map; the maps are expected to agree.
 
     Args:
-        maps: the maps, with different primes and, where eps is not given, different eps.
+        maps: the maps, with different primes and, if eps is not given, different eps.
         max_degree: the last degree; by default it depends on the dimension and on the number of monomials.
-        budget: no degree is begun when it is spent; None for as long as it takes.
-        known: the gradients of known integrals at a point.
-        progress: is told what is being tried.
+        budget: no degree is begun once it is spent; None means no limit.
+        known: returns the gradients of known integrals at a point.
+        progress: called with the degree that is tried.
 
     Returns:
-        The `Profile`, measured. It ends where the codimension leaves curves (dim - 1; points, dim, where orbits
-        close), at `max_degree`, or, not complete, when there are too many monomials or the budget is spent.
+        The `Profile`, measured. The search ends when the codimension is dim - 1, so that orbits lie on curves (dim if
+        orbits close), or at `max_degree`. It ends earlier, and is not complete, if there are too many monomials or the
+        budget is spent.
 
     Raises:
         NoPoint: where orbits meet the singular set.
@@ -244,19 +246,20 @@ def orbit_profile(
         if cut:
             break
         progress(f"relations of degree {degree} along orbits")
-        found = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
-        leading = [one.leading for one in found]
-        agree = agree and len({(one.dimension, one.codimension) for one in found}) == 1
-        # A special orbit has more relations, never fewer.
-        nullities.append(min(one.dimension for one in found))
-        codimensions.append(min(one.codimension for one in found))
-        together = [
-            rank([*one.normals, *known(map_, one.point)], map_.prime) for map_, one in zip(maps, found, strict=True)
+        orbits = [relations_on_orbit(map_, degree, leading=lower) for map_, lower in zip(maps, leading, strict=True)]
+        leading = [orbit.leading for orbit in orbits]
+        agree = agree and len({(orbit.dimension, orbit.codimension) for orbit in orbits}) == 1
+        # A special orbit has more relations, never fewer: take the minimum.
+        nullities.append(min(orbit.dimension for orbit in orbits))
+        codimensions.append(min(orbit.codimension for orbit in orbits))
+        ranks = [
+            rank([*orbit.normals, *known(map_, orbit.point)], map_.prime)
+            for map_, orbit in zip(maps, orbits, strict=True)
         ]
-        with_known = max(with_known, min(together))
-        if period is None and len({one.period for one in found}) == 1:
-            period = found[0].period
-        # Orbits that close are points, whatever curves of lower degree go through them.
+        with_known = max(with_known, min(ranks))
+        if period is None and len({orbit.period for orbit in orbits}) == 1:
+            period = orbits[0].period
+        # An orbit that closes is a finite set, even if relations of low degree only show a curve through it.
         if codimensions[-1] >= (dim - 1 if period is None else dim):
             break
     return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, not cut, with_known, cut)
@@ -264,11 +267,11 @@ def orbit_profile(
 
 @dataclass(frozen=True)
 class Basis:
-    """A Hirota-Kimura basis: the set, and the null space of a generic orbit.
+    """A Hirota-Kimura basis: the set of functions, and the null space of a generic orbit.
 
-    `constant` tells for each entry of the reduced echelon basis whether it is the same number for all orbits; the
-    others are integrals. `agree` tells whether all orbits gave the same dimension, `period` is the number of points
-    of orbits that close, else None.
+    `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; the other
+    entries are integrals. `agree`: all orbits gave the same dimension. `period` is the number of points of orbits that
+    close, else None.
     """
 
     functions: tuple[str, ...]
@@ -280,20 +283,20 @@ class Basis:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         integrals = [[not same for same in row] for row in self.constant]
-        more = attributes(self, orbits_agree="agree", period="period")
-        return {**attributes(self, "functions", "dimension"), "integrals": integrals, **more}
+        agreement = attributes(self, orbits_agree="agree", period="period")
+        return {**attributes(self, "functions", "dimension"), "integrals": integrals, **agreement}
 
 
 def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpoly], names: Sequence[str]) -> Basis:
-    """The null space of the given polynomials along orbits, on two orbits of each of the maps.
+    """Measure the null space of the given polynomials along orbits, on two orbits of each of the maps.
 
     Args:
         maps: maps of one system, with different primes.
         functions: exact polynomials in the variables of the system, or in these and their iterates, at least one.
-        names: what to call them.
+        names: the texts of the functions.
 
     Returns:
-        The `Basis`, measured: its dimension is the smallest of all orbits.
+        The `Basis`, measured: its dimension is the smallest on any orbit.
 
     Raises:
         NoPoint: where orbits meet the singular set.
@@ -321,8 +324,11 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
             periods.add(len(points) if closed else None)
             ahead = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
             rows = [
-                [int(evaluate(function, field, [field.convert(c) for x in piece for c in x])) for function in functions]
-                for piece in zip(*(ahead[k : k + len(ahead) - iterates] for k in range(iterates + 1)), strict=True)
+                [
+                    int(evaluate(function, field, [field.convert(c) for x in segment for c in x]))
+                    for function in functions
+                ]
+                for segment in zip(*(ahead[k : k + len(ahead) - iterates] for k in range(iterates + 1)), strict=True)
             ]
             pair.append(null_space(rows, len(functions), map_.prime))
         bases += pair
@@ -342,10 +348,11 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
 
 @dataclass(frozen=True)
 class SparseRelation:
-    """A polynomial that vanishes along every orbit, with coefficients that are integrals.
+    """A polynomial with integrals as coefficients that vanishes along every orbit.
 
-    `terms` are pairs of a monomial and its coefficient: text of a number, perhaps with a power of eps, or a name, such
-    as "c3" for an integral and "e1" for a function of eps; `integrals` and `functions_of_eps` list these names.
+    `terms` are pairs of a monomial and its coefficient. A coefficient is the text of a number, perhaps with a power of
+    eps, or a name such as "c3" for an integral and "e1" for a function of eps; `integrals` and `functions_of_eps` list
+    these names.
     """
 
     terms: tuple[tuple[str, str], ...]
@@ -354,7 +361,7 @@ class SparseRelation:
 
     @property
     def text(self) -> str:
-        """E.g. m1^2 + m2^2 + c1*p3^2 + c2 = 0."""
+        """The equation, e.g. m1^2 + m2^2 + c1*p3^2 + c2 = 0."""
         parts = []
         for monomial, coefficient in self.terms:
             if monomial == "1":
@@ -372,76 +379,79 @@ class SparseRelation:
 
 
 def sparse_relations(
-    maps: Sequence[ModularMap], degree: int, variables: Sequence[str], most_terms: int = 12, first: int = 1
+    maps: Sequence[ModularMap], degree: int, variables: Sequence[str], max_terms: int = 12, first: int = 1
 ) -> tuple[SparseRelation, ...] | None:
-    """The relations of degree `degree` that those of lower degree do not imply; None where orbits disagree.
+    """Return the relations of degree `degree` that lower degrees do not imply; None where orbits disagree.
 
-    `maps` are two or more maps of one system, with different primes. A relation with more than `most_terms` terms is
-    left out. The names of integrals go through all relations of the degree, from c1 or the given `first` on; those
-    that are equal have one name. Raises NoPoint where orbits meet the singular set.
+    `maps` are two or more maps of one system, with different primes. Relations with more than `max_terms` terms are
+    left out. Integrals are numbered through all relations of the degree, from `first` on; equal ones share a name.
+    Raises NoPoint where orbits meet the singular set.
 
     Source: petrera-pfadler-suris-2009.
 
     >>> from kahanmaps.laboratory.laboratory import Laboratory
     >>> from kahanmaps.documents.catalog import load
     >>> top = load("euler_top")
-    >>> [one.text for one in sparse_relations(Laboratory(top).maps, 2, top.variables)]
+    >>> [relation.text for relation in sparse_relations(Laboratory(top).maps, 2, top.variables)]
     ['x1^2 + c1*x3^2 + c2 = 0', 'x2^2 + c3*x3^2 + c4 = 0']
     """
-    support = _falling(maps[0].dim, degree)
+    support = _descending_exponents(maps[0].dim, degree)
     tables = [_relations(map_, degree) for map_ in (maps[0], maps[0], maps[1])]
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
-    leads = []  # of the relations of lower degree, whose multiples they imply
+    leads = []  # leading monomials of relations of lower degree, which imply their multiples
     if degree > 1:
-        lower = _falling(maps[0].dim, degree - 1)
+        lower = _descending_exponents(maps[0].dim, degree - 1)
         leads = [lower[next(k for k, c in enumerate(row) if c)] for row in _relations(maps[0], degree - 1)]
-    found, context = [], ring(variables)
-    # The first letters that names like c1, c2, ... and e1, e2, ... may begin with, none of them being a variable.
+    relations, context = [], ring(variables)
+    # Letters for the names c1, c2, ... and e1, e2, ... such that no variable is named like that.
     taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
     integral, function = (next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES"))
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
-    for one, again, other in zip(*tables, strict=True):
-        used = [k for k, entry in enumerate(one) if entry]
+    # Two orbits of the first map tell integrals from constants; the second map gives constants as numbers.
+    for row, other_orbit, other_map in zip(*tables, strict=True):
+        used = [k for k, entry in enumerate(row) if entry]
         is_implied = any(all(map(ge, support[used[0]], lead)) for lead in leads)
-        if is_implied or len(used) > most_terms:
+        if is_implied or len(used) > max_terms:
             continue
         terms = []
         for k in used:
-            if one[k] != again[k]:
-                text = names.setdefault((one[k], again[k], other[k]), f"{integral}{first + len(names)}")
+            if row[k] != other_orbit[k]:
+                key = row[k], other_orbit[k], other_map[k]
+                text = names.setdefault(key, f"{integral}{first + len(names)}")
             else:
-                number = _number_text(one[k], other[k], maps[0], maps[1])
-                text = number or functions.setdefault((one[k], other[k]), f"{function}{first + len(functions)}")
+                number = _number_text(row[k], other_map[k], maps[0], maps[1])
+                text = number or functions.setdefault((row[k], other_map[k]), f"{function}{first + len(functions)}")
             terms.append((format_polynomial(context.from_dict({support[k]: 1})), text))
-        found.append(
+        relations.append(
             SparseRelation(
                 tuple(terms),
                 tuple(text for _, text in terms if text in names.values()),
                 tuple(text for _, text in terms if text in functions.values()),
             )
         )
-    return tuple(found)
+    return tuple(relations)
 
 
-def _falling(dim: int, degree: int) -> list[tuple[int, ...]]:
-    """The monomials of degree at most `degree`, those of the highest degree first."""
+def _descending_exponents(dim: int, degree: int) -> list[tuple[int, ...]]:
+    """Return the exponents of the monomials of degree at most `degree`, the highest degree first."""
     return sorted(exponents_up_to(dim, degree), key=lambda e: -sum(e))
 
 
 def _relations(map_: ModularMap, degree: int) -> list[list[int]]:
-    """The reduced echelon basis of the relations of a random orbit, on these monomials."""
-    order = [places_of(map_.dim, degree)[exponent] for exponent in _falling(map_.dim, degree)]
+    """Return the reduced echelon basis of the relations of a random orbit, on `_descending_exponents`."""
+    order = [places_of(map_.dim, degree)[exponent] for exponent in _descending_exponents(map_.dim, degree)]
     return echelon([[v[k] for k in order] for v in relations_on_orbit(map_, degree).vectors], map_.prime)
 
 
-def _number_text(one: int, other: int, map_: ModularMap, other_map: ModularMap) -> str | None:
-    """The coefficient as a number times a power of eps, modulo both primes simpler than by chance; None otherwise."""
+def _number_text(entry: int, other_entry: int, map_: ModularMap, other_map: ModularMap) -> str | None:
+    """Recognize a coefficient, given modulo two primes, as a simple number times a power of eps; None otherwise."""
     for power in _POWERS:
         residues = [
-            [entry * pow(at.eps, -power, at.prime) % at.prime] for entry, at in ((one, map_), (other, other_map))
+            [residue * pow(at.eps, -power, at.prime) % at.prime]
+            for residue, at in ((entry, map_), (other_entry, other_map))
         ]
         [residue] = chinese(residues[0], map_.prime, residues[1], other_map.prime)
         count(60)

@@ -1,10 +1,10 @@
-"""Integrals of a map in closed form, found without being told anything but the map.
+"""The search for integrals of a map in closed form, from the map alone.
 
-How many there are at least is found first: by theorems (hamiltonian_structure.py) and by the codimension of orbits,
-which is measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime
-(search.py); their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left
-as symbols; they are interpolated, and what comes out is put to the proof as an identity (laboratory.py). What the
-theorems give and was not found is added. What is missing then is sought with iterates of x as letters (iterates.py).
+First comes a lower bound of the number of integrals: from theorems (hamiltonian_structure.py) and from the codimension
+of orbits, which is measured (hirota_kimura.py). Then the search looks for spaces of polynomials with a common cofactor
+modulo a prime (search.py); their ratios are the integrals. The coefficients are functions of eps and of the parameters
+that stay symbols; they are interpolated, and every formula is verified as an identity (laboratory.py). Integrals that
+theorems give and the search missed are added. The remaining ones are sought as formulas in iterates (iterates.py).
 """
 
 from __future__ import annotations
@@ -42,19 +42,19 @@ from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
-    bases_of,
+    add_relation_spaces,
+    interpolate_bases,
     may_be_conjugate,
-    repeat,
-    search,
-    take_relations,
+    repeat_search,
+    search_spaces,
 )
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
-Formula = tuple[RationalFunction, str, str]  # where it comes from; in factors, where it is known so
-_CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
+Formula = tuple[RationalFunction, str, str]  # a function, its origin, and its factored form (empty if not known)
+_CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo these and the first prime with probability 1/32
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class FoundIntegral:
     origin: str
     verdict: Certainty
     evidence: Evidence
-    product: str = ""  # the formula in factors, where it is known so
+    product: str = ""  # the formula in factored form, where the search gives it
 
     @property
     def text(self) -> str:
@@ -75,7 +75,7 @@ class FoundIntegral:
 
     @property
     def short_text(self) -> str:
-        """The formula, or its size where it would fill pages."""
+        """The formula, or its number of terms if it has more than 500."""
         sizes = len(self.function.numerator), len(self.function.denominator)
         if sum(sizes) <= _SHOWN_TERMS:
             return self.text
@@ -94,9 +94,9 @@ class FoundIntegral:
 
 @dataclass(frozen=True)
 class TimeDependentIntegral:
-    """An integral c^-n I(x) that depends on time, x being the n-th point of an orbit: I(x~) = c I(x), c a number.
+    """A time-dependent integral c^-n I(x), where x is the n-th point of an orbit and I(x~) = c I(x) with a number c.
 
-    Of a flow it is exp(-c t) I(x), with I' = c I.
+    For a flow the integral is exp(-c t) I(x), with I' = c I.
     """
 
     name: str
@@ -127,14 +127,14 @@ class TimeDependentIntegral:
 
 @dataclass(frozen=True)
 class IntegralSearch(Search):
-    """What `find_integrals` found.
+    """The result of `find_integrals`.
 
-    `integrals` are functionally independent, also together with those that depend on time, `time_dependent`, or
-    those whose formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits
-    show (measured); `by_theorems` is how many independent integrals the Kahan map has by theorems
-    (hamiltonian_structure.py), `theorems` says which (with symbols: at random values). `reason` says what is
-    missing and why, empty where nothing is. `period_at_values` is the number of points of orbits that close where
-    the symbols have the values of the file.
+    `integrals` are functionally independent, also together with the `time_dependent` ones and with those whose
+    formulas contain iterates of x, `in_iterates`. `profile` holds the dimensions of the relations along orbits
+    (measured); `by_theorems` is the number of independent integrals that theorems give the Kahan map
+    (hamiltonian_structure.py), `theorems` names the theorems (with symbols: at random values). `reason` says what is
+    missing and why; it is empty if nothing is missing. `period_at_values` is the period of the map where the symbols
+    have the values of the file, if orbits close there.
     """
 
     integrals: tuple[FoundIntegral, ...]
@@ -148,36 +148,36 @@ class IntegralSearch(Search):
 
     @property
     def note(self) -> str:
-        """What is special about the orbits: that they close; empty where they do not."""
+        """A sentence on the period of the map; empty where orbits do not close."""
         if self.profile.period is None and self.period_at_values is not None:
             values = ", ".join(f"{name} = {self.file.parameters[name]}" for name in self.symbols)
             if self.flow:
-                return f"at {values} the right-hand side is 0, and every function an integral"
+                return f"at {values} the right-hand side is 0, and every function is an integral"
             return f"at {values} {closing_note(self.period_at_values, self.eps, self.file.map)}"
         return closing_note(self.profile.period, self.eps, self.file.map)
 
     @property
     def codimension(self) -> int:
-        """How many independent integrals are known: shown by orbits, given by theorems, or found in closed form."""
-        return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.found)
+        """The number of independent integrals that orbits show, theorems give or formulas prove: the largest."""
+        return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.formula_count)
 
     @property
     def formulas(self) -> list[tuple[str, Certainty]]:
-        """The formulas, those in iterates last, each with its verdict."""
-        every: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
-        return [(one.text, one.verdict) for one in every]
+        """Each formula with its verdict, those in iterates last."""
+        all_integrals: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
+        return [(integral.text, integral.verdict) for integral in all_integrals]
 
     @property
-    def found(self) -> int:
-        """How many have a formula."""
+    def formula_count(self) -> int:
+        """The number of integrals with a formula."""
         return len(self.integrals) + len(self.in_iterates)
 
     @property
     def is_exact(self) -> bool:
-        """Whether there can be no more than `codimension` integrals: else it is a lower bound.
+        """Whether there can be no more than `codimension` integrals; otherwise it is a lower bound.
 
-        Relations of higher degrees, which were not tried, can show more, until orbits lie on curves; points, where
-        they close.
+        Relations of higher degrees could show more integrals, unless orbits already lie on curves (or, for a periodic
+        map, on points).
         """
         dim, measured = self.profile.dim, bool(self.profile.nullities)
         closes = self.profile.period is not None or self.period_at_values is not None
@@ -185,7 +185,7 @@ class IntegralSearch(Search):
 
     @property
     def count_text(self) -> str:
-        """How many integrals there are, and how that is known."""
+        """The number of integrals, with the evidence for it."""
         tried = f"relations of degree up to {self.profile.degree} along orbits"
         if self.codimension == 0:
             if not self.profile.nullities:
@@ -195,38 +195,39 @@ class IntegralSearch(Search):
         if self.profile.nullities:
             shown = max(self.profile.codimension, self.profile.with_known, self.by_theorems)
             parts.append(f"measured: {tried} show {'no more' if shown == self.by_theorems else shown}")
-            if self.found > shown:
-                parts.append(f"{self.found} have formulas")
+            if self.formula_count > shown:
+                parts.append(f"{self.formula_count} have formulas")
         at_least = "" if self.is_exact else "at least "
         return f"in all {at_least}{self.codimension} independent ({'; '.join(parts)})"
 
     @property
     def is_complete(self) -> bool:
         """Whether there is a closed form for every integral that is known."""
-        return self.found >= self.codimension
+        return self.formula_count >= self.codimension
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each formula, for `pandas.DataFrame(found.rows())` and the like."""
-        return [{"name": one.name, "formula": one.text, "verdict": str(one.verdict)} for one in self.integrals]
+        """Return one row for each formula, e.g. for `pandas.DataFrame(result.rows())`."""
+        return [{"name": I.name, "formula": I.text, "verdict": str(I.verdict)} for I in self.integrals]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
             **self.of_flow,
             **attributes(self, "integrals"),
-            **attributes(self, "found", "time_dependent", "in_iterates"),
+            **attributes(self, found="formula_count"),
+            **attributes(self, "time_dependent", "in_iterates"),
             **attributes(self, "codimension", codimension_is_exact="is_exact"),
             **attributes(self, "by_theorems", relations="profile"),
             **attributes(self, "note", "reason", "primes"),
         }
 
     def toml_section(self) -> str:
-        """The integrals as a section [integrals] of a system file, which `check-integrals` accepts.
+        """Return the section [integrals] of a system file, for `check-integrals`; empty without integrals.
 
-        Empty where there are none; for a given eps a comment says that they hold there only.
+        If eps was given, a comment says that the formulas hold at this eps only.
         """
-        every: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
-        lines = [f'{one.name} = "{one.text}"' for one in every]
+        all_integrals: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
+        lines = [f'{integral.name} = "{integral.text}"' for integral in all_integrals]
         return "\n".join([*self.toml_comments, "[integrals]", *lines, ""]) if lines else ""
 
 
@@ -242,21 +243,21 @@ def find_integrals(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> IntegralSearch:
-    """Independent integrals of a map in closed form, each with its verdict.
+    """Search for independent integrals of a map in closed form, and verify each.
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
-        symbols: names of parameters that formulas are to contain; the others have the values of the file.
-        eps: an exact number, the formulas are then for this eps only; None: formulas contain eps.
-        time_step: 2 eps, in its place.
-        flow: ask for the rational integrals of the differential equation instead.
+        symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
+        eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
+        time_step: the time step 2 eps, instead of eps.
+        flow: search for rational integrals of the differential equation instead.
         max_degree: the largest degree of relations along orbits; by default as the dimension and the budget allow.
-        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
-        seed: of everything random.
-        progress: is told what is being tried.
+        effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
+        seed: the random seed.
+        progress: called with a sentence at each stage of the search.
 
     Returns:
-        An `IntegralSearch`. Its formulas are exact and proved or supported as identities; the number of integrals
+        An `IntegralSearch`. Its formulas are exact, and proved or supported as identities; the number of integrals
         that orbits show is measured modulo two primes.
 
     Raises:
@@ -265,8 +266,8 @@ def find_integrals(
     Source: petrera-pfadler-suris-2009, celledoni-2019, cmoq-2013.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = find_integrals(load("nahm_tetrahedral"))
-    >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
+    >>> result = find_integrals(load("nahm_tetrahedral"))
+    >>> [(integral.text, str(integral.verdict)) for integral in result.integrals], result.codimension
     ([('-y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
@@ -279,13 +280,13 @@ def find_integrals(
 def integrals_of(
     laboratory: Laboratory, max_degree: int | None, budget: Budget, progress: Callable[[str], None]
 ) -> IntegralSearch:
-    """What `find_integrals` finds, on the maps of a laboratory."""
+    """Run `find_integrals` on the maps of a laboratory."""
     flow, seed = laboratory.flow, laboratory.asked[3]
-    # Orbits; cheap searches and their formulas; products; larger relations and their formulas; iterates. What a stage
-    # leaves goes to those after it, and none can take what belongs to these.
+    # The stages: orbits; fast searches and their formulas; products; larger relations and their formulas; iterates.
+    # Work that a stage does not use goes to later stages, and no stage can use up the share of a later one.
     stages = budget.share([3, 4, 1, 3, 3])
     collected = _Collected(laboratory, progress)
-    # What theorems say of the integrals of a Kahan map, on each of the maps: without symbols these have one system.
+    # The integrals that theorems give a Kahan map, for each map of the laboratory: without symbols all have one system.
     inherited = list[InheritedIntegrals]()
     if laboratory.system is not None and not flow and laboratory.root is None:
         systems = {
@@ -298,7 +299,8 @@ def integrals_of(
         at = ", ".join(laboratory.free_symbols)
         theorems = inherited[0].text + (f", at random values of {at}" if at else "")
         if not laboratory.defect:
-            by_theorems = min(one.count(map_) for one, map_ in zip(inherited, laboratory.maps, strict=True))
+            pairs = zip(inherited, laboratory.maps, strict=True)
+            by_theorems = min(integrals.count(map_) for integrals, map_ in pairs)
     # The map modulo the first prime with the values that the file gives to the symbols, if it gives any.
     at_values, values = None, [laboratory.file.parameters.get(name) for name in laboratory.symbols]
     if values and None not in values:
@@ -308,9 +310,18 @@ def integrals_of(
     period_at_values = None if at_values is None or laboratory.defect else closing_period([at_values])
 
     def result(profile: Profile, reason: str) -> IntegralSearch:
-        integrals = tuple(collected.integrals), profile, reason, by_theorems, theorems
-        more = tuple(collected.time_dependent), tuple(collected.in_iterates)
-        return IntegralSearch(*laboratory.asked, *integrals, *more, period_at_values, flow=flow)
+        return IntegralSearch(
+            *laboratory.asked,
+            tuple(collected.integrals),
+            profile,
+            reason,
+            by_theorems,
+            theorems,
+            tuple(collected.time_dependent),
+            tuple(collected.in_iterates),
+            period_at_values,
+            flow=flow,
+        )
 
     def known(map_: ModularMap, x: Point) -> list[list[int]]:
         return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
@@ -325,17 +336,17 @@ def integrals_of(
         )
         stage = next(stages)
         cofactors = laboratory.cofactors()
-        # Of a system these would be too many, and few integrals of its map have other denominators than those.
-        factors = [one.polynomial for one in cofactors if one.polynomial is not None]
+        # For a vector field the candidates would be too many, and few integrals have other denominators than these.
+        factors = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, stage)
         denominators = denominators_among(factors, laboratory.map.dim)
 
         def quickly(map_: ModularMap) -> SpaceSearch:
-            # Half of what is left, on each map: the rest is for formulas.
-            return search(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
+            # Half of the remaining work, on each map: the other half is for the formulas.
+            return search_spaces(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
 
         base = laboratory.maps[0]
-        base, found, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, stage, progress)
+        base, space_search, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, stage, progress)
     except NoPoint as error:
         return result(empty, str(error))
     collected.offer(formulas)
@@ -345,84 +356,88 @@ def integrals_of(
     if len(collected.integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
         collected.add_products(cofactors, stage)
-    done, stage = result(profile, ""), next(stages)
-    if not done.is_complete:
-        # This may take longer than all that went before, whose formulas are therefore known by now.
-        steps = len(found.steps)
-        cut = take_relations(base, profile, found, LARGEST_SPAN, stage.part(0.5), progress)
-        if len(found.steps) > steps:
+    result_so_far, stage = result(profile, ""), next(stages)
+    if not result_so_far.is_complete:
+        # This may take longer than all earlier stages, so it comes after their formulas.
+        steps_before = len(space_search.steps)
+        cut = add_relation_spaces(base, profile, space_search, LARGEST_SPAN, stage.part(0.5), progress)
+        if len(space_search.steps) > steps_before:
 
             def thoroughly(map_: ModularMap) -> SpaceSearch:
-                again = search(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
-                take_relations(map_, profile, again, LARGEST_SPAN, stage.part(0.5), progress)
+                again = search_spaces(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
+                add_relation_spaces(map_, profile, again, LARGEST_SPAN, stage.part(0.5), progress)
                 return again
 
-            _, found, formulas, reason = _formulas(laboratory, base, found, thoroughly, stage, progress)
+            _, space_search, formulas, reason = _formulas(laboratory, base, space_search, thoroughly, stage, progress)
             collected.offer(formulas)
-            done = result(profile, "")
-    if not flow and not done.is_complete and laboratory.root is None:
-        collected.add_in_iterates(done.codimension, next(stages))
-        done = result(profile, "")
-    missing = done.codimension - done.found
+            result_so_far = result(profile, "")
+    if not flow and not result_so_far.is_complete and laboratory.root is None:
+        collected.add_in_iterates(result_so_far.codimension, next(stages))
+        result_so_far = result(profile, "")
+    missing = result_so_far.codimension - result_so_far.formula_count
     if missing <= 0:
         reason = ""
     elif not reason:
         have = "has" if missing == 1 else "have"
-        reason = f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q {found.tried}"
-        reason += ": coefficients of Hirota-Kimura bases are such integrals"
-    reasons = [reason, *([found.cut, cut] if missing > 0 else []), *collected.cut]
+        reason = f"{missing} of the {result_so_far.codimension} independent integrals {have} no closed form P/Q"
+        reason += f" {space_search.tried}: coefficients of Hirota-Kimura bases are such integrals"
+    reasons = [reason, *([space_search.cut, cut] if missing > 0 else []), *collected.cut]
     if at_values is not None:
-        # Formulas with symbols may depend on each other, or vanish, at the values of the file.
-        there = Independent(at_values)
-        rows = [there.gradient(one.function) for one in done.integrals]
-        rows += [gradient_of(one.ratio, laboratory.map, at_values, there.point) for one in done.in_iterates]
-        left = sum(map(there.add, rows))
-        if left < len(rows):
+        # Formulas with symbols may become dependent, or vanish, at the values of the file.
+        independent = Independent(at_values)
+        rows = [independent.gradient(integral.function) for integral in result_so_far.integrals]
+        point = independent.point
+        rows += [
+            gradient_of(integral.ratio, laboratory.map, at_values, point) for integral in result_so_far.in_iterates
+        ]
+        rank = sum(map(independent.add, rows))
+        if rank < len(rows):
             at = ", ".join(f"{name} = {value}" for name, value in zip(laboratory.symbols, values, strict=True))
-            how_many = f"only {left} of the {len(rows)} formulas {'is' if left == 1 else 'are'} independent"
+            how_many = f"only {rank} of the {len(rows)} formulas {'is' if rank == 1 else 'are'} independent"
             reasons.append(f"at {at} {how_many}: without --symbolic others may be found")
     if profile.cut and (profile.cut == SPENT or max_degree is not None or not profile.is_settled):
         reasons.append(f"relations of degree {profile.degree + 1} and more were not tried: {profile.cut}")
     elif not profile.agree:
         reasons.append("the orbits that were compared do not agree: try another --seed")
-    return replace(done, reason="; ".join(filter(None, reasons)))
+    return replace(result_so_far, reason="; ".join(filter(None, reasons)))
 
 
 def _formulas(
     laboratory: Laboratory,
     base: ModularMap,
-    found: SpaceSearch,
-    look: Callable[[ModularMap], SpaceSearch],
+    result: SpaceSearch,
+    search_on: Callable[[ModularMap], SpaceSearch],
     budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[ModularMap, SpaceSearch, list[Formula], str]:
-    """The ratios of the polynomials `found` on the map `base`, and why there are no others; first the map and spaces.
+    """Interpolate the ratios of the polynomials that a search found on the map `base`.
 
-    Where these may be conjugate over an extension of Q, `look` finds those on maps modulo other primes, where conjugate
-    ones do not occur. Raises NoPoint.
+    Where their spaces may be conjugate over an extension of Q, `search_on` repeats the search on maps modulo other
+    primes, until one has no conjugate spaces. Returns the map and the search that were used, the formulas, and the
+    reason why there are no others. Raises NoPoint.
     """
-    if may_be_conjugate(found):
+    if may_be_conjugate(result):
         for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
-            if not budget.is_spent and repeat(found, map_, base.prime) is None:
-                base, found = map_, look(map_)
-    if not found.steps:
-        return base, found, [], ""
+            if not budget.is_spent and repeat_search(result, map_, base.prime) is None:
+                base, result = map_, search_on(map_)
+    if not result.steps:
+        return base, result, [], ""
     progress("interpolating closed forms")
-    bases, reason = bases_of(laboratory, base.prime, found, budget)
-    origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
+    bases, reason = interpolate_bases(laboratory, base.prime, result, budget)
+    origins = [step.text for step, spaces in zip(result.steps, result.spaces, strict=True) for _ in spaces]
     formulas = list[Formula]()
-    for (Q, *more), origin in zip(bases, origins, strict=False):
-        for P in more:  # of P/Q and Q/P the one whose denominator becomes a number for eps = 0, if only one does
+    for (Q, *numerators), origin in zip(bases, origins, strict=False):
+        for P in numerators:  # prefer whichever of P/Q and Q/P has a constant denominator at eps = 0
             P_is_number, Q_is_number = (substitute(F, {"eps": fmpq(0)}).is_constant() for F in (P, Q))
             is_inverse = P_is_number and not Q_is_number
             formulas.append((RationalFunction(Q, P) if is_inverse else RationalFunction(P, Q), origin, ""))
-    return base, found, formulas, reason
+    return base, result, formulas, reason
 
 
 class _Collected:
-    """Integrals that do not depend on each other, with verdicts; none that was refuted.
+    """Functionally independent integrals with verdicts, none of them refuted.
 
-    `cut` says what was not tried for lack of budget.
+    `cut` names the searches that were skipped because the budget was spent.
     """
 
     def __init__(self, laboratory: Laboratory, progress: Callable[[str], None]) -> None:
@@ -434,10 +449,10 @@ class _Collected:
         self.in_iterates: list[IntegralInIterates] = []
 
     def offer(self, formulas: Sequence[Formula]) -> None:
-        """Take those that do not depend on others and pass as identities, short ones first."""
+        """Add the formulas that are independent of the others and pass as identities, short ones first."""
 
         def size(formula: Formula) -> tuple[int, int, list[list[int]]]:
-            """By size, then by monomials: the order must not depend on the primes."""
+            """The sort key: size, then monomials. The order must not depend on the primes."""
             P = formula[0].numerator
             return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
 
@@ -458,7 +473,7 @@ class _Collected:
                 self._add(row, function, origin, verdict, evidence, product)
 
     def _normalized(self, formula: Formula) -> Formula:
-        """The formula as it is shown: with its limit eps -> 0, an integral of the flow, where there is one."""
+        """Normalize the formula so that it tends to an integral of the flow as eps -> 0, where that is possible."""
         function, origin, product = formula
         if not self._has_limit:
             return formula
@@ -467,18 +482,18 @@ class _Collected:
 
     @property
     def _has_limit(self) -> bool:
-        """Whether the map approximates a flow, for every eps; or it is the flow itself."""
+        """Whether the limit eps -> 0 makes sense: the map approximates a flow for every eps, or it is the flow."""
         laboratory = self._laboratory
         of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
         return of_flow and laboratory.eps is None and laboratory.root is None
 
-    def _add(self, row: list[int], *known: Any) -> None:
+    def _add(self, row: list[int], *fields: Any) -> None:
         self._gradients.add(row)
         name = f"{'F' if self._laboratory.flow else 'I'}{len(self.integrals) + 1}"
-        self.integrals.append(FoundIntegral(name, *known))
+        self.integrals.append(FoundIntegral(name, *fields))
 
     def add_by_theorems(self, inherited: InheritedIntegrals) -> None:
-        """Those of the theorems, as far as they can be written out."""
+        """Add the integrals that theorems give, unless the formula is too long to expand."""
         laboratory = self._laboratory
         affine, context = len(inherited.quotient.integrals), ring((*laboratory.map.variables, "eps"))
         for k, row in enumerate(inherited.gradients(laboratory.maps[0], self._gradients.point)):
@@ -486,26 +501,28 @@ class _Collected:
                 continue
             if k < affine:
                 terms = zip(context.gens(), inherited.quotient.integrals[k], strict=False)
-                form = RationalFunction(sum((x * v for x, v in terms), context.constant(0)), context.constant(1))
-                self._add(row, form, AFFINE, Certainty.PROVED, _AFFINE_EVIDENCE)
+                affine_integral = RationalFunction(
+                    sum((x * v for x, v in terms), context.constant(0)), context.constant(1)
+                )
+                self._add(row, affine_integral, AFFINE, Certainty.PROVED, _AFFINE_EVIDENCE)
                 continue
             field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
             eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
             try:
                 value = inherited.modified(k - affine, field, eps, field.variables[:-1])
             except BudgetExceeded:
-                continue  # too long to be written out
-            function = RationalFunction.reduced(value.above, value.below)
+                continue  # too long to expand
+            function = RationalFunction.reduced(value.numerator, value.denominator)
             is_hamiltonian = inherited.forms[k - affine].rank() == len(inherited.quotient.free)
-            what = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
-            summary = f"{what} a constant skew matrix {'J' if is_hamiltonian else 'K'}"
+            form = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
+            summary = f"{form} a constant skew matrix {'J' if is_hamiltonian else 'K'}"
             summary = f"{summary}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
             evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k - affine))})
             formula = self._normalized((function, "modified Hamiltonian (cmoq-2013)", ""))
             self._add(row, *formula[:2], Certainty.PROVED, evidence)
 
     def add_products(self, cofactors: Sequence[Cofactor], budget: Budget) -> None:
-        """Products of powers of known polynomials, and such that depend on time."""
+        """Add products of powers of known polynomials, among them time-dependent integrals."""
         laboratory, origin = self._laboratory, "product of powers of known polynomials"
         if budget.is_spent:
             self.cut.append(f"products of powers of known polynomials were not tried: {SPENT}")
@@ -514,8 +531,8 @@ class _Collected:
             products = products_of(laboratory, candidates(laboratory, cofactors, budget))
         except NoPoint:
             return
-        written = ((one, one.function) for one in products.integrals)
-        self.offer([(function, origin, one.text) for one, function in written if function is not None])
+        expanded = ((product, product.function) for product in products.integrals)
+        self.offer([(function, origin, product.text) for product, function in expanded if function is not None])
         for product in products.time_dependent:
             function = product.function
             if function is None or len(self.integrals) + len(self.time_dependent) >= laboratory.map.dim:
@@ -527,22 +544,23 @@ class _Collected:
             if verdict.holds:
                 self._gradients.add(row)
                 name = f"T{len(self.time_dependent) + 1}"
-                one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
-                self.time_dependent.append(TimeDependentIntegral(name, one, product.constant, laboratory.flow))
+                integral = FoundIntegral(name, function, origin, verdict, evidence, product.text)
+                self.time_dependent.append(TimeDependentIntegral(name, integral, product.constant, laboratory.flow))
 
-    def add_in_iterates(self, wanted: int, budget: Budget) -> None:
-        """Those in iterates of x, and more of them in x, until there are as many as wanted."""
+    def add_in_iterates(self, required: int, budget: Budget) -> None:
+        """Add integrals in iterates of x, and further ones in x alone, until there are `required` in all."""
         laboratory = self._laboratory
-        self._gradients = Independent(laboratory.maps[0], [one.function for one in self.integrals])  # free of time
+        # Time-dependent integrals do not count here.
+        self._gradients = Independent(laboratory.maps[0], [integral.function for integral in self.integrals])
         try:
-            plain, ratios, cut = integrals_in_iterates(laboratory, wanted, self._gradients, budget, self._progress)
+            plain, ratios, cut = integrals_in_iterates(laboratory, required, self._gradients, budget, self._progress)
         except NoPoint:
             return
         self.cut += filter(None, [cut])
         self.offer(plain)
         too_long = set[int]()
-        for found, origin in ratios:
-            ratio = found.with_limit(2 * laboratory.map.dim) if self._has_limit else found
+        for raw_ratio, origin in ratios:
+            ratio = raw_ratio.with_limit(2 * laboratory.map.dim) if self._has_limit else raw_ratio
             verdict, evidence = verdict_on_ratio(laboratory, ratio, too_long)
             if verdict.holds:
                 name = f"I{len(self.integrals) + len(self.in_iterates) + 1}"

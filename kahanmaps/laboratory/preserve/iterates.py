@@ -1,13 +1,14 @@
-"""Integrals whose formulas contain iterates x~, x~~, ... as letters: coefficients of relations along orbits.
+"""Integrals whose formulas contain iterates x~, x~~, ...: coefficients of bilinear relations along orbits.
 
-Functions F_0, F_1, ... of (x, x^(k)), bilinear, whose values along every orbit span a line or a plane are found modulo
-a prime (darboux_spaces.py) and interpolated. On a line the ratios of the F are integrals, on a plane those of 2 x 2
-minors. Put to the proof is that such a ratio has the same value a step later, stated with x in the middle of the piece
-of orbit: then I(x, x~) = I(x_, x) contains one step forward and one backward, and can be multiplied out.
+The search looks modulo a prime for bilinear functions F_0, F_1, ... of (x, x^(k)) whose values along every orbit span a
+line or a plane (darboux_spaces.py), and interpolates them. On a line the ratios of the F are integrals, on a plane the
+ratios of 2 x 2 minors. The identity to be verified says that such a ratio I has the same value one step later. It is
+written with x in the middle of the orbit segment: I(x, x~) = I(x_, x) contains one step forward and one step backward
+instead of two forward, which keeps the expansion short.
 
-Affine integrals come first: on their levels, where x has fewer coordinates, relations of a low degree show what on the
-whole space has coefficients of higher degrees. The values c of the levels are symbols of the search, and v.x takes
-their place in what it finds. Source: petrera-suris-2018.
+If there are affine integrals, the search runs on their level sets, where x has fewer coordinates and relations of a
+lower degree suffice. The values c of the levels are symbols of this search; in the results v.x replaces c.
+Source: petrera-suris-2018.
 """
 
 from __future__ import annotations
@@ -44,16 +45,16 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     bases_with_spaces,
     pairs_of,
 )
-from kahanmaps.laboratory.preserve.search import bases_of
+from kahanmaps.laboratory.preserve.search import interpolate_bases
 from kahanmaps.maps.implicit import MapFamily
 
 
 @dataclass(frozen=True)
 class RatioOfIterates:
-    """A function I of a piece of an orbit: the ratio of two of the `functions` or, of rank 2, of two minors of them.
+    """A function I of an orbit segment: the ratio of two of the `functions` or, for rank 2, of two of their minors.
 
     The functions are polynomials in (variables, variables of the k-th iterate, symbols, eps). `numerator` and
-    `denominator` are the places of one function or of two: then F_a F_b~ - F_b F_a~ is meant.
+    `denominator` are indices into `functions`: one index a for F_a, two indices a, b for F_a F_b~ - F_b F_a~.
     """
 
     lift: TwoPointBasis
@@ -63,20 +64,20 @@ class RatioOfIterates:
 
     @property
     def length(self) -> int:
-        """How many successive points it is a function of."""
+        """The number of successive points that I depends on."""
         return self.lift.shift + self.lift.rank
 
     def with_limit(self, count: int) -> RatioOfIterates:
-        """The ratio of two functions that tend to one constant normalized, the first `count` letters being points."""
+        """Normalize a ratio that tends to a constant as eps -> 0; its first `count` variables are coordinates."""
         if self.lift.rank > 1:
             return self
-        found = normalized(self.formula[0], count)
-        parts = found.function.numerator, found.function.denominator
-        return RatioOfIterates(self.lift, parts, (0,), (1,)) if found.is_shifted else self
+        result = normalized(self.formula[0], count)
+        parts = result.function.numerator, result.function.denominator
+        return RatioOfIterates(self.lift, parts, (0,), (1,)) if result.is_shifted else self
 
     @property
     def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:
-        """The ratio, of rank 2 in letters F0, F1, ..., F0~, ... for the functions, and what these letters stand for."""
+        """The ratio, and the definitions of the letters F0, F1, ... in it: of rank 2 these abbreviate the functions."""
         if self.lift.rank == 1:
             return RationalFunction(self.functions[self.numerator[0]], self.functions[self.denominator[0]]), []
         taken = self.functions[0].context().names()
@@ -84,8 +85,8 @@ class RatioOfIterates:
         letter = next(c for c in letters if not any(name.startswith(c) for name in taken))
         names = [f"{letter}{k}" for k in range(len(self.functions))]
         gens = ring([*names, *(f"{name}~" for name in names)]).gens()
-        here, later = gens[: len(names)], gens[len(names) :]
-        P, Q = (here[a] * later[b] - here[b] * later[a] for a, b in (self.numerator, self.denominator))
+        F, F_next = gens[: len(names)], gens[len(names) :]
+        P, Q = (F[a] * F_next[b] - F[b] * F_next[a] for a, b in (self.numerator, self.denominator))
         used = sorted({*self.numerator, *self.denominator})
         return RationalFunction(P, Q), [(names[k], self.functions[k]) for k in used]
 
@@ -104,14 +105,14 @@ class RatioOfIterates:
     def sides(self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]) -> tuple[Any, Any]:
         """Numerator and denominator on successive points of an orbit, at the values of the symbols and eps."""
         rows = [
-            [evaluate(F, field, (*here, *there, *values)) for F in self.functions]
-            for here, there in zip(points, points[self.lift.shift :], strict=False)
+            [evaluate(F, field, (*x, *iterate, *values)) for F in self.functions]
+            for x, iterate in zip(points, points[self.lift.shift :], strict=False)
         ]
 
-        def minor(places: tuple[int, ...]) -> Any:
-            if len(places) == 1:
-                return rows[0][places[0]]
-            a, b = places
+        def minor(indices: tuple[int, ...]) -> Any:
+            if len(indices) == 1:
+                return rows[0][indices[0]]
+            a, b = indices
             return rows[0][a] * rows[1][b] - rows[0][b] * rows[1][a]
 
         return minor(self.numerator), minor(self.denominator)
@@ -119,7 +120,7 @@ class RatioOfIterates:
 
 @dataclass(frozen=True)
 class IntegralInIterates:
-    """An integral in the iterates of a point, with the verdict on its being conserved."""
+    """An integral in the iterates of a point, with the verdict on its conservation."""
 
     name: str
     ratio: RatioOfIterates
@@ -144,19 +145,20 @@ class IntegralInIterates:
 def verdict_on_ratio(
     laboratory: Laboratory, ratio: RatioOfIterates, too_long: set[int] | None = None
 ) -> tuple[Certainty, Evidence]:
-    """Whether I has the same value a step later, as an identity for the map of the laboratory.
+    """Decide whether I has the same value one step later, as an identity for the map of the laboratory.
 
-    `too_long` collects the lengths of orbits that cannot be multiplied out; no ratio of such a length or more is tried.
+    `too_long` collects the lengths of orbit segments that cannot be expanded; expansion is not tried again for these
+    lengths and longer ones.
     """
     map_, eps = laboratory.map, laboratory.eps
-    n, hopeless = map_.dim, too_long if too_long is not None else set[int]()
+    n, too_long = map_.dim, too_long if too_long is not None else set[int]()
 
-    def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
-        values = (*place[n:], step)
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        values = (*point[n:], eps_value)
         try:
-            points = orbit_about(map_.at(step, field, place[n:]), place[:n], ratio.length)
+            points = orbit_about(map_.at(eps_value, field, point[n:]), point[:n], ratio.length)
         except BudgetExceeded:
-            hopeless.add(ratio.length)
+            too_long.add(ratio.length)
             raise
         pairs = [ratio.sides(field, points[k:], values) for k in (0, 1)]
         (P, Q), (P_later, Q_later) = pairs
@@ -164,8 +166,8 @@ def verdict_on_ratio(
             return None
         return [P_later * Q], [P * Q_later]
 
-    where = [*(["every eps"] if map_.has_eps and eps is None else []), *([f"eps = {eps}"] if eps is not None else [])]
-    scope = " and ".join([*where, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
+    scopes = [*(["every eps"] if map_.has_eps and eps is None else []), *([f"eps = {eps}"] if eps is not None else [])]
+    scope = " and ".join([*scopes, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     subject = (map_.symbols, map_.subject, ratio.text, ratio.numerator, ratio.denominator)
     identity = Identity(
         n + len(map_.symbols),
@@ -176,94 +178,100 @@ def verdict_on_ratio(
         subject=subject,
     )
     return certified(
-        identity, laboratory.seed, expands=n <= MAX_DIMENSION and all(ratio.length < length for length in hopeless)
+        identity, laboratory.seed, expands=n <= MAX_DIMENSION and all(ratio.length < length for length in too_long)
     )
 
 
 def integrals_in_iterates(
     laboratory: Laboratory,
-    wanted: int,
+    required: int,
     known: Independent,
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]], str]:
-    """Integrals that do not depend on known ones: those in x alone, and those in iterates, each with its origin.
+    """Search for integrals independent of the known ones: in x alone, and in iterates, each with its origin.
 
     Args:
         laboratory: the map.
-        wanted: how many independent ones there are to be, with the known ones.
-        known: the known ones, on the first map of the laboratory.
-        budget: nothing is begun when it is spent.
-        progress: is told what is being tried.
+        required: the number of independent integrals at which the search stops, known ones included.
+        known: the known integrals, on the first map of the laboratory.
+        budget: no further basis is tried once it is spent.
+        progress: called with the basis that is tried.
 
     Returns:
-        Formulas that are to be put to the proof, those in x with an empty text for their factors; and what was not
-        tried for lack of budget. Raises NoPoint.
+        Formulas that are still to be verified, those in x with an empty text for their factored form; and a sentence
+        on what was skipped because the budget was spent. Raises NoPoint.
 
     Source: petrera-suris-2018.
     """
     known = copy(known)
-    known.rows = list(known.rows)  # nothing is added to what was given
+    known.rows = list(known.rows)  # the argument is not to be changed
     plain, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
     level = _level(laboratory)
-    inside, back = (laboratory, None) if level is None else level
-    base = inside.maps[0]
+    level_laboratory, replace_levels = (laboratory, None) if level is None else level
+    base = level_laboratory.maps[0]
     cut = ""
     for lift in TWO_POINT_BASES if level is not None else TWO_POINT_BASES[1:]:
-        if len(known.rows) >= wanted:
+        if len(known.rows) >= required:
             break
         if budget.is_spent:
             cut = f"{lift.text} were not tried: {SPENT}"
             break
-        for one, spaces in bases_with_spaces(base, [lift]):
-            progress(one.text)
-            found = SpaceSearch()
-            found.add(SearchStep("iterates", 2, None, one.text, one), sorted(spaces, key=lambda space: space.pattern))
-            bases, _ = bases_of(inside, base.prime, found, budget)
+        for forms, spaces in bases_with_spaces(base, [lift]):
+            progress(forms.text)
+            result = SpaceSearch()
+            step = SearchStep("iterates", 2, None, forms.text, forms)
+            result.add(step, sorted(spaces, key=lambda space: space.pattern))
+            bases, _ = interpolate_bases(level_laboratory, base.prime, result, budget)
             for basis in bases:
-                functions = [_lettered(P, one, inside.map) for P in basis]
-                functions = functions if back is None else [back(F, one.shift) for F in functions]
-                # The ratios that generate all others.
-                candidates = [RatioOfIterates(one, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
-                if one.rank == 2:
+                functions = [_bilinear_function(P, forms, level_laboratory.map) for P in basis]
+                if replace_levels is not None:
+                    functions = [replace_levels(F, forms.shift) for F in functions]
+                # These ratios generate all others.
+                candidates = [RatioOfIterates(forms, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
+                if forms.rank == 2:
                     pairs = [(first, k) for k in range(2, len(functions)) for first in (0, 1)]
-                    candidates = [RatioOfIterates(one, tuple(functions), pair, (0, 1)) for pair in pairs]
+                    candidates = [RatioOfIterates(forms, tuple(functions), pair, (0, 1)) for pair in pairs]
                 for ratio in candidates:
                     if not known.add(gradient_of(ratio, laboratory.map, laboratory.maps[0], known.point)):
                         continue
                     if lift.shift:
-                        ratios.append((ratio, one.text))
-                    else:  # no iterate is in it: a function of (variables, symbols, eps)
+                        ratios.append((ratio, forms.text))
+                    else:  # the ratio contains no iterate: make it a function of (variables, symbols, eps)
                         context = ring(laboratory.map.names)
                         gens, n = context.gens(), laboratory.map.dim
                         P, Q = (F.compose(*gens[:n], *gens, ctx=context) for F in ratio.functions)
-                        plain.append((RationalFunction(P, Q), one.text, ""))
+                        plain.append((RationalFunction(P, Q), forms.text, ""))
     return plain, ratios, cut
 
 
 def _letters(map_: MapFamily, shift: int) -> tuple[str, ...]:
-    """The names that formulas are in: variables, those of the iterate, symbols, eps."""
+    """The names in formulas: variables, variables of the iterate, symbols, eps."""
     names = map_.variables
     return (*names, *(name + "~" * max(shift, 1) for name in names), *map_.names[len(names) :])
 
 
-def _lettered(P: fmpq_mpoly, lift: TwoPointBasis, map_: MapFamily) -> fmpq_mpoly:
-    """The function of x and its iterate that a polynomial of degree 2 in (variables, symbols, eps) stands for."""
+def _bilinear_function(P: fmpq_mpoly, lift: TwoPointBasis, map_: MapFamily) -> fmpq_mpoly:
+    """Return the bilinear function of x and its iterate that a polynomial of degree 2 encodes (`TwoPointBasis`)."""
     n, context = map_.dim, ring(_letters(map_, lift.shift))
     one, gens = context.constant(1), context.gens()
     X, Y = (one, *gens[:n]), (one, *gens[n * min(lift.shift, 1) :][:n])
-    places = dict(zip(exponents_up_to(n, TWO_POINT_DEGREE), pairs_of(n), strict=True))
+    pairs = dict(zip(exponents_up_to(n, TWO_POINT_DEGREE), pairs_of(n), strict=True))
     total = context.constant(0)
     for monomial, coefficient in P.terms():
         exponents = tuple(map(int, monomial))
-        i, j = places[exponents[:n]]
-        rest = context.from_dict({(0,) * (2 * n) + exponents[n:]: coefficient})
-        total = total + rest * (X[i] * Y[j] + lift.sign * X[j] * Y[i])
+        i, j = pairs[exponents[:n]]
+        scalar = context.from_dict({(0,) * (2 * n) + exponents[n:]: coefficient})
+        total = total + scalar * (X[i] * Y[j] + lift.sign * X[j] * Y[i])
     return primitive_part(total)[1]
 
 
 def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, int], fmpq_mpoly]] | None:
-    """The map on levels of its affine integrals, the values of which are symbols; and what puts v.x in their place."""
+    """Restrict the map to level sets of its affine integrals, whose values become symbols.
+
+    Returns the laboratory of the restricted map and the function that replaces these symbols by v.x in a result; None
+    where there are no affine integrals or fewer than two coordinates remain.
+    """
     system, n = laboratory.system, laboratory.map.dim
     integrals = affine_integrals(system) if system is not None else ()
     quotient = quotient_by(integrals, n)
@@ -289,21 +297,21 @@ def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, in
         "system": {"rhs": rhs},
     }
     file = SystemFile(**DocumentReader(document, laboratory.file.name, {}).read())
-    inside = Laboratory(file, (*laboratory.symbols, *levels), laboratory.eps, laboratory.seed)
+    restricted = Laboratory(file, (*laboratory.symbols, *levels), laboratory.eps, laboratory.seed)
 
-    def back(F: fmpq_mpoly, shift: int) -> fmpq_mpoly:
-        whole = ring(_letters(laboratory.map, shift))
-        *letters, eps = whole.gens()
-        here, there, rest = letters[:n], letters[n : 2 * n], letters[2 * n :]
-        sums = [sum((a * g for a, g in zip(v, here, strict=True)), whole.constant(0)) for v in integrals]
-        kept = [[side[k] for k in quotient.free] for side in (here, there)]
-        return F.compose(*kept[0], *kept[1], *rest, *sums, eps, ctx=whole)
+    def replace_levels(F: fmpq_mpoly, shift: int) -> fmpq_mpoly:
+        context = ring(_letters(laboratory.map, shift))
+        *letters, eps = context.gens()
+        x, iterate, symbols = letters[:n], letters[n : 2 * n], letters[2 * n :]
+        sums = [sum((a * g for a, g in zip(v, x, strict=True)), context.constant(0)) for v in integrals]
+        free_x, free_iterate = ([side[k] for k in quotient.free] for side in (x, iterate))
+        return F.compose(*free_x, *free_iterate, *symbols, *sums, eps, ctx=context)
 
-    return inside, back
+    return restricted, replace_levels
 
 
 def gradient_of(ratio: RatioOfIterates, exact: MapFamily, map_: ModularMap, point: Point) -> list[int]:
-    """A multiple of the gradient with respect to the first point, on a map modulo a prime."""
+    """Return a multiple of the gradient of the ratio in the first point, on a map modulo a prime."""
     field = DualField(GF(map_.prime))
     values = [field.convert(value) for value in map_.values]
     eps = field.convert(map_.eps)

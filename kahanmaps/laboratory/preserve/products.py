@@ -1,17 +1,17 @@
-"""Integrals and densities that are products of powers of known polynomials: exponents from a lattice, of any degree.
+"""Integrals and densities that are products of powers of known polynomials, of any degree: exponents from a lattice.
 
-For polynomials g_1, ..., g_r let C_i = g_i(x~)/g_i(x). A product g_1^k_1 ... g_r^k_r, exponents of either sign, is an
-integral if C_1^k_1 ... C_r^k_r = 1, and phi of an invariant measure dx/phi if that is det dPhi. If it is another number
-c, c^-n times the product at step n does not depend on n: an integral that depends on time.
+For polynomials g_1, ..., g_r let C_i = g_i(x~)/g_i(x). A product g_1^k_1 ... g_r^k_r with exponents of either sign is
+an integral if C_1^k_1 ... C_r^k_r = 1, and the phi of an invariant volume form dx/phi if this product is det dPhi. If
+it is another number c, then c^-n times the product at step n does not depend on n: a time-dependent integral.
 
-On a random line modulo a prime all of these functions are quotients of polynomials in one variable. Written over a
-basis of coprime polynomials, which takes gcds and no factorization, each C_i is a vector of integers, and the k are a
-lattice. Polynomials in x without a common factor have none on a random line, but for a probability of about degree^2/p.
-What is left are numbers c, functions of eps and the symbols: they are interpolated, and their relations are a lattice
-again.
+On a random line modulo a prime all of these functions are quotients of polynomials in one variable. Over a basis of
+coprime polynomials, which takes gcds but no factorization, each C_i becomes a vector of integers, and the exponents k
+form a lattice. Polynomials in x without a common factor have none on a random line, except with a probability of about
+degree^2/p. The numbers c that remain are functions of eps and the symbols: they are interpolated, and their
+multiplicative relations are a lattice again.
 
-None of the polynomials need be a Darboux polynomial, of which alone celledoni-2019 forms products: for the map of
-Lyness, (x, y) -> (y, (a + y)/x), neither x nor y is one, and dx dy/(x y) is invariant. Source: celledoni-2019.
+The g_i need not be Darboux polynomials, unlike in celledoni-2019: for the Lyness map (x, y) -> (y, (a + y)/x), neither
+x nor y is one, and dx dy/(x y) is invariant. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ from kahanmaps.maps.implicit import ElementaryMap, MapFamily
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60
-_MAX_TERMS = 20_000  # of a product that is written out
-_FIRST = 10**6  # the weight of the exponent of det dPhi: it is made as small as can be before all others
+_MAX_TERMS = 20_000  # of an expanded product
+_DETERMINANT_WEIGHT = 10**6  # of the exponent of det dPhi, so that lattice reduction makes it small first
 
 
 @dataclass(frozen=True)
 class Product:
-    """The product I of powers g^k of the `factors`, a function of (variables, symbols, eps); there may be none.
+    """A product I of powers g^k of the `factors`, a function of (variables, symbols, eps); it may be empty.
 
-    `constant` is the number c with I(x~) = c I(x), a function of the symbols and eps: 1 for an integral. For a density
-    it is that in phi(x~) = c det dPhi(x) phi(x), 1 or -1. Of a flow what depends on time has c with I' = c I.
+    `constant` is c in I(x~) = c I(x), a function of the symbols and eps, and 1 for an integral. For a density it is c
+    in phi(x~) = c det dPhi(x) phi(x), which is 1 or -1. For a time-dependent integral of a flow it is c in I' = c I.
     """
 
     factors: tuple[tuple[fmpq_mpoly, int], ...]
@@ -66,12 +66,12 @@ class Product:
 
     @property
     def text(self) -> str:
-        """The product as a formula in factors."""
+        """The formula in factored form."""
         return format_product(self.factors)
 
     @property
     def function(self) -> RationalFunction | None:
-        """The product written out; None where it is too long."""
+        """The expanded product; None where it has too many terms."""
         parts = []
         for sign in (1, -1):
             powers = [(g, sign * k) for g, k in self.factors if sign * k > 0]
@@ -84,9 +84,9 @@ class Product:
 
 @dataclass(frozen=True)
 class Products:
-    """What `products_of` found: integrals, a density (None without one), and what depends on time.
+    """The result of `products_of`: integrals, a density (None without one), and time-dependent integrals.
 
-    Where there is no density, one that changes its sign takes its place: then |dx/phi| is invariant.
+    If there is no density, `density` is an anti-invariant phi (constant -1), if any: then |dx/phi| is invariant.
     """
 
     integrals: tuple[Product, ...]
@@ -95,41 +95,41 @@ class Products:
 
 
 def candidates(
-    laboratory: Laboratory, cofactors: Sequence[Cofactor], budget: Budget, more: Sequence[fmpq_mpoly] = ()
+    laboratory: Laboratory, cofactors: Sequence[Cofactor], budget: Budget, further: Sequence[fmpq_mpoly] = ()
 ) -> list[fmpq_mpoly]:
-    """Irreducible polynomials over Q in (variables, symbols, eps) that integrals and densities may be products of.
+    """Collect irreducible polynomials over Q in (variables, symbols, eps) as candidate factors of integrals.
 
-    They are the variables, the polynomials of the cofactors (affine Darboux functions of a system, and factors of
-    Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long, and of `more`;
-    for a flow its Darboux polynomials, as far as the budget goes.
+    For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
+    factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
+    of the `further` polynomials. For a flow they are its Darboux polynomials, as far as the budget goes.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
-    known = [one.polynomial for one in cofactors if one.polynomial is not None]
-    found = _irreducible((*context.gens()[:n], *known), n, laboratory.eps)
-    found |= _jacobians(laboratory.map, laboratory.eps, laboratory.system is not None)
-    found |= _irreducible(more, n, laboratory.eps)
-    return sorted(found.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]
+    known = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
+    factors = _irreducible((*context.gens()[:n], *known), n, laboratory.eps)
+    factors |= _jacobian_factors(laboratory.map, laboratory.eps, laboratory.system is not None)
+    factors |= _irreducible(further, n, laboratory.eps)
+    return sorted(factors.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]
 
 
 def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) -> dict[str, fmpq_mpoly]:
-    """The irreducible factors in the first n variables, primitive, by their text."""
-    found: dict[str, fmpq_mpoly] = {}
+    """Return the primitive irreducible factors that contain one of the first n variables, by their text."""
+    factors: dict[str, fmpq_mpoly] = {}
     for P in polynomials:
         if eps is not None:
             at: dict[str | int, int | fmpz | fmpq] = {"eps": eps}
             P = P.subs(at)
         for factor, _ in [] if P.is_zero() else irreducible_factors(P):
             if degree_in(factor, n):
-                one = primitive_part(factor)[1]
-                found.setdefault(str(one), one)
-    return found
+                primitive = primitive_part(factor)[1]
+                factors.setdefault(str(primitive), primitive)
+    return factors
 
 
-@counted_cache(4)  # searches for integrals and densities ask for the same, which may take half a second
-def _jacobians(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
-    """Factors of numerators and denominators of det dPhi^-1 and, with `both`, of det dPhi."""
+@counted_cache(4)  # may take half a second, and the searches for integrals and densities both need it
+def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
+    """Return the factors of numerator and denominator of det dPhi^-1 and, with `both`, of det dPhi."""
     n, sides = map_.dim, list[Function]()
     for backward in (False, True) if both else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
@@ -140,68 +140,70 @@ def _jacobians(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_
             sides += jacobian_determinant_sides(local, x[:n], local.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
-    return _irreducible((part for side in sides for part in (side.above, side.below)), n, eps)
+    return _irreducible((part for side in sides for part in (side.numerator, side.denominator)), n, eps)
 
 
 class _Line:
-    """A random line modulo the prime of a map, and its image (X : Z) without common factor, polynomials in t.
+    """A random line modulo the prime of a map, and its image.
 
-    det dPhi is `numerator` / (Z^n `denominator`) on it. Raises NoPoint.
+    Both are homogeneous coordinates (X : Z), polynomials in t without common factor. On the line, det dPhi is
+    `numerator` / (Z^n `denominator`) with Z of the image. Raises NoPoint.
     """
 
     def __init__(self, map_: ModularMap) -> None:
         p = map_.prime
         self.prime, self.map = p, map_
         start, slope = map_.random_point(), map_.random_point()
-        self.here = [*(nmod_poly([c, d], p) for c, d in zip(start, slope, strict=True)), nmod_poly([1], p)]
-        self.there, self.numerator, self.denominator = self.here, nmod_poly([1], p), nmod_poly([1], p)
-        for one in map_.map.factors:
-            self._step(one)
+        self.line = [*(nmod_poly([c, d], p) for c, d in zip(start, slope, strict=True)), nmod_poly([1], p)]
+        self.image, self.numerator, self.denominator = self.line, nmod_poly([1], p), nmod_poly([1], p)
+        for factor in map_.map.factors:
+            self._apply(factor)
 
-    def _step(self, one: ElementaryMap) -> None:
-        """One factor further: det of it is its numerator times Z^n over its denominator times Z~^n."""
-        p, n, curve = self.prime, one.dim, self.there
-        top, size = max(1, one.equation.degree), max(int(entry.degree()) for entry in curve)
+    def _apply(self, factor: ElementaryMap) -> None:
+        """Apply one factor of the map to the image; det of it is numerator Z^n / (denominator Z~^n)."""
+        p, n, curve = self.prime, factor.dim, self.image
+        top, size = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
         def step(t: int) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
-            """A point of the curve, its image and Z."""
+            """Return the point of the curve at t, its image and Z."""
             count(30 + 15 * n)
-            *X, Z = (one.field.convert(int(entry(t))) for entry in curve)
+            *X, Z = (factor.field.convert(int(entry(t))) for entry in curve)
             if Z == 0:
-                raise SingularStep("a point of a curve is at infinity", (), one.eps)
+                raise SingularStep("a point of a curve is at infinity", (), factor.eps)
             x = tuple(c / Z for c in X)
-            return x, one.step(x), int(Z)
+            return x, factor.step(x), int(Z)
 
         def homogeneous(t: int) -> list[int]:
             x, image, Z = step(t)
-            denominator = int(one.determinant(x)) * pow(Z, n * top, p)
+            denominator = int(factor.determinant(x)) * pow(Z, n * top, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
         raw = _interpolated(homogeneous, n * top * size, p)
         common = reduce(nmod_poly.gcd, raw)
-        self.there = [entry // common for entry in raw]
+        self.image = [entry // common for entry in raw]
         self.denominator = self.denominator * raw[-1]
-        after = self.there[-1]
+        image_Z = self.image[-1]
 
         def numerator(t: int) -> list[int]:
             x, image, Z = step(t)
-            return [int(det(one.numerator_matrix(x, image))) * pow(Z, n * (top - 1), p) * pow(int(after(t)), n, p) % p]
+            scale = pow(Z, n * (top - 1), p) * pow(int(image_Z(t)), n, p)
+            return [int(det(factor.numerator_matrix(x, image))) * scale % p]
 
-        reach = max(int(entry.degree()) for entry in self.there)
-        self.numerator = self.numerator * _interpolated(numerator, n * ((top - 1) * size + reach), p)[0]
+        image_degree = max(int(entry.degree()) for entry in self.image)
+        self.numerator = self.numerator * _interpolated(numerator, n * ((top - 1) * size + image_degree), p)[0]
 
-    def along(self, g: fmpq_mpoly, place: Sequence[nmod_poly]) -> nmod_poly:
-        """g on the line, or the numerator Z^deg g(X/Z) of g on its image."""
+    def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
+        """Evaluate g on a curve (X : Z): the numerator Z^deg g(X/Z)."""
         n, p = self.map.dim, self.prime
         field = GF(p)
-        rest = [field.convert(c) for c in (*self.map.values, self.map.eps)]
+        parameters = [field.convert(c) for c in (*self.map.values, self.map.eps)]
         top = degree_in(g, n)
-        powers = [list(accumulate(repeat(c, top), mul, initial=nmod_poly([1], p))) for c in place]
+        powers = [list(accumulate(repeat(c, top), mul, initial=nmod_poly([1], p))) for c in curve]
         total = nmod_poly([0], p)
         count(50 + 15 * len(g))
         for monomial, coefficient in g.terms():
             exponents = [int(e) for e in monomial]
-            factors = (c**e for c, e in zip(rest, exponents[n:], strict=True))
+            factors = (c**e for c, e in zip(parameters, exponents[n:], strict=True))
             value = nmod_poly([int(prod(factors, start=field.convert(coefficient)))], p)
             used = zip(powers, [*exponents[:n], top - sum(exponents[:n])], strict=True)
             total = total + reduce(mul, (row[e] for row, e in used if e), value)
@@ -209,7 +211,7 @@ class _Line:
 
 
 def _interpolated(values: Callable[[int], list[int]], top: int, p: int) -> list[nmod_poly]:
-    """The polynomials of degree at most `top` that have these values at t = 1, 2, ... Raises NoPoint."""
+    """Interpolate the polynomials of degree at most `top` with these values at t = 1, 2, ... Raises NoPoint."""
     nodes, rows, t, missed = list[int](), list[list[int]](), 0, 0
     while len(nodes) <= top:
         t += 1
@@ -219,12 +221,12 @@ def _interpolated(values: Callable[[int], list[int]], top: int, p: int) -> list[
         except SingularStep:
             missed += 1
             if missed > top + 20:
-                raise NoPoint("the map has no value at random points modulo a prime") from None
+                raise NoPoint("random points modulo a prime are indeterminacy points of the map") from None
     return [interpolated(nodes, column, p) for column in zip(*rows, strict=True)]
 
 
 def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
-    """Coprime polynomials, none constant, of which all those given are products up to constants.
+    """Return nonconstant coprime polynomials such that all given ones are products of them, up to constants.
 
     >>> P, Q = nmod_poly([1, 1], 101), nmod_poly([2, 1], 101)
     >>> [B.degree() for B in coprime_base([P * P * Q, P * Q])]
@@ -249,20 +251,20 @@ def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
 
 
 def _exponents(P: nmod_poly, base: Sequence[nmod_poly]) -> list[int]:
-    """How often the elements of a coprime base divide a polynomial."""
-    found = []
+    """Return the multiplicity of each element of a coprime base in a polynomial."""
+    multiplicities = []
     for B in base:
-        power = 0
-        quotient, rest = divmod(P, B)
-        while rest.is_zero():
-            power, P = power + 1, quotient
-            quotient, rest = divmod(P, B)
-        found.append(power)
-    return found
+        multiplicity = 0
+        quotient, remainder = divmod(P, B)
+        while remainder.is_zero():
+            multiplicity, P = multiplicity + 1, quotient
+            quotient, remainder = divmod(P, B)
+        multiplicities.append(multiplicity)
+    return multiplicities
 
 
 def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
-    """A basis over Z of all integer vectors k with sum k_i row_i = 0.
+    """Return a basis over Z of all integer vectors k with sum k_i row_i = 0.
 
     >>> relations([[2, 0], [3, 0], [0, 1]])
     [[3, -2, 0]]
@@ -276,7 +278,7 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
-    """The coefficients of polynomials, a polynomial a row, times one number that makes them integers.
+    """Return the coefficients of polynomials, one polynomial a row, times a common denominator.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> x, y = ring(["x", "y"]).gens()
@@ -290,7 +292,7 @@ def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
 
 
 def _reduced(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
-    """A basis of the same lattice, of short vectors, each entry times its weight."""
+    """Return a short basis of the lattice (LLL), where each entry counts times its weight."""
     if not vectors:
         return []
     weighted = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()
@@ -298,75 +300,75 @@ def _reduced(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[l
 
 
 def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Products:
-    """The integrals, the density and the integrals depending on time that are products of powers of the polynomials.
+    """Find the products of powers of the polynomials that are integrals, time-dependent integrals or a density.
 
-    Exponents are found modulo one prime: what comes out is to be put to the proof. Raises NoPoint.
+    The exponents are computed modulo one prime: the results are still to be verified. Raises NoPoint.
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("lotka_volterra"))
     >>> products_of(laboratory, candidates(laboratory, laboratory.cofactors(), Budget())).density.function.numerator
     x*y
     """
-    weights = [_FIRST, *map(len, polynomials)]  # short formulas before long ones
+    weights = [_DETERMINANT_WEIGHT, *map(len, polynomials)]  # prefers powers of short polynomials
     n, context, field = laboratory.map.dim, ring(laboratory.map.names), laboratory.field
-    one, minus = (RationalFunction(context.constant(c), context.constant(1)) for c in (1, -1))
+    one, minus_one = (RationalFunction(context.constant(c), context.constant(1)) for c in (1, -1))
     if field is not None and laboratory.flow:
-        # sum k K is 0 for integrals, div f for densities, free of x for what depends on time.
+        # With K the cofactor of P: sum k K is 0 for integrals, div f for densities, free of x for time-dependent ones.
         gens = context.gens()
         cofactors = [
             field.divergence.compose(*gens[: n + len(field.symbols)], ctx=context),
             *(field.derivative(P) / P for P in polynomials),
         ]
         numbers = [K.compose(*[context.constant(0)] * n, *gens[n:], ctx=context) for K in cofactors]
-        moving = [K - c for K, c in zip(cofactors, numbers, strict=True)]
+        parts_with_x = [K - c for K, c in zip(cofactors, numbers, strict=True)]
         time_dependent = []
-        for vector in _reduced(relations(coefficient_rows(moving)), weights):
+        for vector in _reduced(relations(coefficient_rows(parts_with_x)), weights):
             total = sum((k * c for k, c in zip(vector, numbers, strict=True)), context.constant(0))
             if vector[0] == 0 and not total.is_zero():
                 time_dependent.append((vector, RationalFunction(total, context.constant(1))))
         exact = _reduced(relations(coefficient_rows(cofactors)), weights)
         return _assembled(polynomials, n, exact, [(one, exact)], time_dependent)
     line = _Line(laboratory.maps[0])
-    here, there = ([line.along(g, place) for g in polynomials] for place in (line.here, line.there))
+    on_line, on_image = ([line.along(g, curve) for g in polynomials] for curve in (line.line, line.image))
     # det dPhi and the C_i on a random line, as vectors over a coprime base.
-    base = coprime_base([*here, *there, line.there[-1], line.numerator, line.denominator])
-    Z, N, M = (_exponents(P, base) for P in (line.there[-1], line.numerator, line.denominator))
+    base = coprime_base([*on_line, *on_image, line.image[-1], line.numerator, line.denominator])
+    Z, N, M = (_exponents(P, base) for P in (line.image[-1], line.numerator, line.denominator))
     rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]
-    for g, P, Q in zip(polynomials, here, there, strict=True):
+    for g, P, Q in zip(polynomials, on_line, on_image, strict=True):
         d = degree_in(g, n)
         rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
-    vectors = _reduced(relations(rows), weights)  # the exponent of det dPhi first
+    vectors = _reduced(relations(rows), weights)  # entry 0 is the exponent of det dPhi
 
     def constants(map_: ModularMap) -> list[int]:
-        """prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
-        p, residues, found = map_.prime, GF(map_.prime), list[int]()
-        at = [residues.convert(c) for c in (*map_.values, map_.eps)]
+        """Return prod C_i^k_i det dPhi^k_0 at a random point, for each vector k. Raises NoPoint."""
+        p, residues, products = map_.prime, GF(map_.prime), list[int]()
+        parameters = [residues.convert(c) for c in (*map_.values, map_.eps)]
         for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
             count(50 + 10 * n)
             total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
             for g, k in zip(polynomials, vector[1:], strict=True):
                 if k:
                     before, after = (
-                        int(evaluate(g, residues, [*map(residues.convert, place), *at])) for place in (x, image)
+                        int(evaluate(g, residues, [*map(residues.convert, point), *parameters])) for point in (x, image)
                     )
                     if not before or not after:
                         raise NoPoint("a polynomial vanishes at a random point modulo a prime")
                     total = total * pow(after, k, p) * pow(before, -k, p) % p
-            found.append(total)
-        return found
+            products.append(total)
+        return products
 
     values = constants_of(laboratory, constants)
     known = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
 
-    def with_constant_1(more: list[RationalFunction]) -> list[list[int]]:
-        """The vectors whose constant is 1 or, up to such factors, one of those given: a basis."""
-        combinations = multiplicative_relations([*(c for _, c in known), *more])
+    def with_constant(allowed: list[RationalFunction]) -> list[list[int]]:
+        """Return a basis of the vectors whose constant is 1 or a product of powers of the allowed ones."""
+        combinations = multiplicative_relations([*(c for _, c in known), *allowed])
         chosen = [_combined(a[: len(known)], [v for v, _ in known]) for a in combinations if any(a[: len(known)])]
         return _reduced(chosen, weights)
 
-    exact = with_constant_1([])
+    exact = with_constant([])
     time_dependent = [(v, c) for v, c in known if v[0] == 0 and c != one]
-    return _assembled(polynomials, n, exact, [(one, exact), (minus, with_constant_1([minus]))], time_dependent)
+    return _assembled(polynomials, n, exact, [(one, exact), (minus_one, with_constant([minus_one]))], time_dependent)
 
 
 def _assembled(
@@ -376,11 +378,14 @@ def _assembled(
     of_densities: Sequence[tuple[RationalFunction, Sequence[list[int]]]],
     time_dependent: Sequence[tuple[list[int], RationalFunction]],
 ) -> Products:
-    """The products: integrals and a density by their vectors, for each constant of one; what depends on time."""
+    """Build the result from exponent vectors.
+
+    `exact` are those with constant 1, `of_densities` those allowed for a density by its constant (1 first, then -1).
+    """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
     for v in (v for v in exact if v[0] == 0):
-        # Of I and 1/I the one of positive degree or, where that is 0, whose first exponent is positive.
+        # Choose between I and 1/I: positive degree or, for degree 0, positive first exponent.
         total = sum(k * d for k, d in zip(v, degrees, strict=True))
         integrals.append(v if (total, next((k for k in v if k), 0)) > (0, 0) else [-k for k in v])
 
@@ -388,7 +393,7 @@ def _assembled(
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
     def cost(vector: Sequence[int]) -> tuple[int, int, int]:
-        """Few negative exponents are best, then a low degree."""
+        """Prefer a denominator of low degree, then a numerator of low degree."""
         denominator, numerator = (
             sum(sign * k * d for k, d in zip(vector, degrees, strict=True) if sign * k > 0) for sign in (-1, 1)
         )
@@ -397,7 +402,7 @@ def _assembled(
     density = None
     for constant, choice in of_densities:
         vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
-        while vector is not None and density is None:  # times integrals, as long as single ones help
+        while vector is not None and density is None:  # multiply by integrals as long as that lowers the cost
             others = [_combined((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
             best = min(others, key=cost, default=vector)
             if cost(best) >= cost(vector):
@@ -408,13 +413,13 @@ def _assembled(
 
 
 def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:
-    """Numbers that are known on every map, as functions of the symbols and eps; None where these were not found."""
+    """Interpolate numbers that are known on every map as functions of the symbols and eps; None where that fails."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
 
-    def box(prime: int, place: tuple[int, ...]) -> list[int] | None:
+    def constants_at(prime: int, values: tuple[int, ...]) -> list[int] | None:
         try:
-            return constants(laboratory.map_for(prime, place))
+            return constants(laboratory.map_for(prime, values))
         except (NoPoint, BadPrime):
             return None
 
@@ -422,12 +427,12 @@ def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[
     if all(is_one):
         return [one] * len(is_one)
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
-    answer = reconstruct_at(laboratory.root, box, names, seed=laboratory.seed)
+    answer = reconstruct_at(laboratory.root, constants_at, names, seed=laboratory.seed)
     if answer.functions is None:
-        return [one if good else None for good in is_one]
+        return [one if is_known else None for is_known in is_one]
     gens = [gen for gen, name in zip(context.gens(), laboratory.map.names, strict=True) if name in names]
-    moved = [over_one_denominator([c], context, gens) for c in answer.functions]
-    return [RationalFunction(numerator, denominator) for [numerator], denominator in moved]
+    quotients = [over_one_denominator([c], context, gens) for c in answer.functions]
+    return [RationalFunction(numerator, denominator) for [numerator], denominator in quotients]
 
 
 def _combined(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[int]:
@@ -435,7 +440,7 @@ def _combined(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[
 
 
 def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list[int]]:
-    """A basis over Z of all k for which the product of the powers f_i^k_i is 1; none of the functions is 0.
+    """Return a basis over Z of all k with f_1^k_1 ... f_r^k_r = 1, for functions other than 0.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> functions = [parse_rational_function(text, ["a"]) for text in ("-4*a^2", "2*a", "3", "-1")]
@@ -448,15 +453,15 @@ def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list
         for part, sign in ((function.numerator, 1), (function.denominator, -1)):
             number, factors = part.factor()
             for factor, k in factors:
-                c, one = primitive_part(factor)
+                c, primitive = primitive_part(factor)
                 number = number * c ** int(k)
-                row[str(one)] = row.get(str(one), 0) + sign * int(k)
+                row[str(primitive)] = row.get(str(primitive), 0) + sign * int(k)
             row["sign"] = row.get("sign", 0) + (number < 0)
-            for whole, s in ((number.p, sign), (number.q, -sign)):
-                for q, k in abs(whole).factor():
+            for integer, s in ((number.p, sign), (number.q, -sign)):
+                for q, k in abs(integer).factor():
                     row[str(q)] = row.get(str(q), 0) + s * int(k)
         rows.append(row)
     keys = sorted({key for row in rows for key in row} | {"sign"})
-    # A sign counts modulo 2: one more unknown, which is left out of the answer, takes twice it.
+    # Signs count modulo 2: an additional row 2 * sign allows that; its weight is dropped from the answer.
     table = [*([row.get(key, 0) for key in keys] for row in rows), [2 * (key == "sign") for key in keys]]
     return [vector[:-1] for vector in relations(table)]

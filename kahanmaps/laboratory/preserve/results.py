@@ -1,4 +1,4 @@
-"""What the searches for preserved things have in common: what they were asked, and the words for it."""
+"""The part that the results of all searches for invariants share: the request, and the note on periodic orbits."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_told
 from kahanmaps.maps.implicit import MapFamily
 
-_CLOSES_WITHIN = 64  # points of an orbit: as many as relations of some degree take
+_CLOSES_WITHIN = 64  # points of an orbit, about as many as the search for relations of a low degree uses
 
 
 @dataclass(frozen=True)
 class Search(PrintableResult):
-    """What was asked: the map of a file, the symbols that formulas contain, and eps, None for every eps.
+    """The request of a search: the system file, the symbols that formulas contain, and eps (None: a symbol as well).
 
-    With `flow` it is the differential equation that was asked for. Random points were taken modulo the `primes`.
+    With `flow` the search concerns the differential equation, not its map. Random points are points modulo the
+    `primes`.
     """
 
     file: SystemFile
@@ -33,12 +34,12 @@ class Search(PrintableResult):
 
     @property
     def of_flow(self) -> dict[str, Any]:
-        """What plain data begin with: that it is the flow, or nothing."""
+        """The first key of the JSON record where the search concerns the flow; empty otherwise."""
         return {"flow": True} if self.flow else {}
 
     @property
     def toml_comments(self) -> list[str]:
-        """The line of a system file that says that formulas hold at one eps only; none where eps is in them."""
+        """The comment of a system file that formulas hold at one eps only; empty where the formulas contain eps."""
         if self.eps is None:
             return []
         step = eps_told(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
@@ -46,7 +47,7 @@ class Search(PrintableResult):
 
 
 def closing_period(maps: Sequence[ModularMap]) -> int | None:
-    """The number of points of orbits that close soon, on all maps; None where they do not."""
+    """Return the common period of random orbits of all maps; None where an orbit does not close within 64 points."""
     try:
         [*others, period] = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in maps}
     except NoPoint:
@@ -55,7 +56,7 @@ def closing_period(maps: Sequence[ModularMap]) -> int | None:
 
 
 def closing_note(period: int | None, eps: fmpq | None, map_: MapFamily) -> str:
-    """What orbits that close after `period` steps mean at this eps (None: at every one); empty where they do not.
+    """Return the sentence on orbits that close after `period` steps at this eps (None: any); empty without a period.
 
     >>> from kahanmaps.documents.catalog import load
     >>> closing_note(4, fmpq(1), load("weierstrass").map)

@@ -1,16 +1,17 @@
 """The search for spaces of polynomials with a common cofactor, recorded so that it can be repeated on another map.
 
-A search runs on one map: modulo a prime, at one eps, at one value of each symbol. What it found are steps: affine
-integrals, the relations of a degree, a product of cofactors. Repeating the steps on maps with other primes, eps and
-values of the symbols gives the coefficients of the same polynomials there, from which closed forms are interpolated.
+A search runs on one map: modulo a prime, at one eps, at one value of each symbol. It records the steps that gave a
+space: affine integrals, the relations of a degree, a product of cofactors. Repeating the steps on maps with other
+primes, eps and values of the symbols gives the coefficients of the same polynomials there, from which closed forms are
+interpolated.
 
-Spaces that look alike are told apart on every map, so that one rational function belongs to each of them. Two pencils
-may have zeros at the same places: then nothing on a single map, modulo one prime and at one value of the symbols, says
-which of them is which. Take a coefficient w in which they differ. Its values w_1, ..., w_k on the k spaces are the
-roots of chi(T) = (T - w_1) ... (T - w_k), whose coefficients do not depend on the order of the spaces: they can be
-interpolated. The factors of chi over Q are the spaces again: a linear one is the w_i of one space as a function of the
-symbols and eps, by whose value this space is known on any other map. A factor of higher degree belongs to spaces that
-are conjugate over an extension and have no formula over Q.
+Interpolation needs the same space on every map, but two spaces may have bases with the same zero pattern: then a single
+map, modulo one prime and at one value of the symbols, does not determine which space is which. Take a coefficient w in
+which they differ. Its values w_1, ..., w_k on the k spaces are the roots of chi(T) = (T - w_1) ... (T - w_k), whose
+coefficients do not depend on the order of the spaces, so that they can be interpolated. A linear factor of chi over Q
+gives the coefficient w_i of one space as a function of the symbols and eps, and its value identifies this space on any
+other map. A factor of higher degree belongs to spaces that are conjugate over an extension of Q and have no formula
+over Q.
 """
 
 from __future__ import annotations
@@ -58,39 +59,39 @@ from kahanmaps.maps.kahan import KahanMap
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
-_MOST_TERMS = 1000
+_MAX_TERMS = 1000
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
 
-_SAMPLES = (150, 600, 3000)  # a simple coefficient is looked for before many values are taken for one
+_SAMPLES = (150, 600, 3000)  # every coefficient is tried with few samples before one is tried with many
 _COEFFICIENTS = 6
-NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
+NO_BRANCHES: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8
 AFFINE = "v.x with v.f(x) = 0"
-_CHANCE = 20  # bits by which a fraction is simpler than one of a random residue
+_CHANCE = 20  # bits by which a fraction must be shorter than that of a random residue
 
 
 @dataclass(frozen=True)
 class Branches:
-    """Spaces of one pattern by the values of their coefficient at `place`: `roots` are its functions, one a space."""
+    """Spaces of one zero pattern, distinguished by the coefficient at `place`: its formula is `roots[i]` on space i."""
 
     place: tuple[int, int]
     roots: tuple[RationalFunction, ...]
 
     def in_order(self, alike: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
-        """The spaces on a map in the order of the roots; None where two agree there, or one is missing."""
+        """Return the spaces on a map in the order of the roots; None where two roots agree there or one is missing."""
         field = GF(map_.prime)
-        at = [field.convert(value) for value in (*map_.values, map_.eps)]
+        parameters = [field.convert(value) for value in (*map_.values, map_.eps)]
         row, column = self.place
         by_value = {space.basis[row][column]: space for space in alike}
-        values = [root.value(field, at[: len(root.names)]) for root in self.roots]
+        values = [root.value(field, parameters[: len(root.names)]) for root in self.roots]
         if len(by_value) < len(alike) or None in values:
             return None
-        found = [by_value.get(int(value)) for value in values]
-        return None if None in found else [space for space in found if space is not None]
+        ordered = [by_value.get(int(value)) for value in values]
+        return None if None in ordered else [space for space in ordered if space is not None]
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
-    """The span of 1 and the affine integrals v.x, for Kahan maps those with v.f = 0; None where there are none."""
+    """Return the span of 1 and the affine integrals v.x (for Kahan maps: v.f = 0); None where there are none."""
     n, prime = map_.dim, map_.prime
     changes = [[b - a for a, b in zip(x, image, strict=True)] for x, image in map_.pairs(n + _SPARE)]
     vectors = null_space(changes, n, prime)
@@ -99,7 +100,7 @@ def affine_space(map_: ModularMap) -> DarbouxSpace | None:
     return DarbouxSpace.spanned_by(n, 1, [[1] + [0] * n, *([0, *vector] for vector in vectors)], prime)
 
 
-def search(
+def search_spaces(
     map_: ModularMap,
     profile: Profile,
     cofactors: Sequence[Cofactor],
@@ -108,167 +109,174 @@ def search(
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SpaceSearch:
-    """Spaces whose ratios are as many independent integrals as the profile shows, as far as cheap searches find them.
+    """Search for spaces whose ratios give as many independent integrals as the profile shows, by fast methods only.
 
-    These are the span of few relations along orbits, and polynomials with known cofactors or over known denominators.
-    Nothing but affine integrals is begun when the `budget` is spent. Raises NoPoint.
+    The fast methods are: affine integrals, relations along orbits that span few dimensions, polynomials with known
+    cofactors, and polynomials over known denominators. Once the `budget` is spent only affine integrals are tried.
+    Raises NoPoint.
     """
-    found, wanted = SpaceSearch(), profile.codimension
+    result, required = SpaceSearch(), profile.codimension
     is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
     affine = affine_space(map_)
     if affine is not None:
-        found.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
-    if is_of_field:  # whose denominators are factors of a determinant, which is longer than few relations
-        take_relations(map_, profile, found, SMALL_SPAN, budget, progress)
-    if gradient_rank(map_, found.all_spaces) >= wanted:
-        return found
-    dim, top = map_.dim, _COFACTOR_DEGREE.get(map_.dim, 2)
-    while comb(dim + top, top) > _MOST_TERMS:
-        top -= 1
-    progress(f"polynomials of degree up to {top} with {comb(dim + top, top)} terms and known cofactors")
-    more = search_cofactors(map_, cofactors, denominators, found.all_spaces, wanted, top, budget)
-    steps, spaces = [*found.steps, *more.steps], [*found.spaces, *more.spaces]
-    found = replace(more, steps=steps, spaces=spaces, searched=found.searched)
+        result.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
+    if is_of_field:  # its denominators divide det(I - eps f'): relations of small span cost less than these factors
+        add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
+    if gradient_rank(map_, result.all_spaces) >= required:
+        return result
+    dim, max_degree = map_.dim, _COFACTOR_DEGREE.get(map_.dim, 2)
+    while comb(dim + max_degree, max_degree) > _MAX_TERMS:
+        max_degree -= 1
+    progress(
+        f"polynomials of degree up to {max_degree} with {comb(dim + max_degree, max_degree)} terms and known cofactors"
+    )
+    cofactor_result = search_cofactors(map_, cofactors, denominators, result.all_spaces, required, max_degree, budget)
+    steps, spaces = [*result.steps, *cofactor_result.steps], [*result.spaces, *cofactor_result.spaces]
+    result = replace(cofactor_result, steps=steps, spaces=spaces, searched=result.searched)
     if not is_of_field:
-        take_relations(map_, profile, found, SMALL_SPAN, budget, progress)
-    return found
+        add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
+    return result
 
 
-def take_relations(
+def add_relation_spaces(
     map_: ModularMap,
     profile: Profile,
-    found: SpaceSearch,
+    result: SpaceSearch,
     largest: int,
     budget: Budget,
     progress: Callable[[str], None],
 ) -> str:
-    """Add the spaces that are seen in the span of the relations of a degree, until there are as many as wanted.
+    """Add spaces contained in the span of the relations of a degree until the integrals of the profile are reached.
 
-    Taken are the degrees in which the relations of all orbits span at most `largest` dimensions. Returns what was not
-    tried for lack of budget.
+    Only degrees in which the relations of all orbits span at most `largest` dimensions are tried. Returns a sentence
+    on the degrees that were skipped because the budget was spent; empty otherwise.
     """
-    few = takewhile(lambda size: size < largest, profile.nullities)
-    for degree in [degree for degree, size in enumerate(few, 1) if size]:
-        known = found.all_spaces
+    small_nullities = takewhile(lambda size: size < largest, profile.nullities)
+    for degree in [degree for degree, size in enumerate(small_nullities, 1) if size]:
+        known = result.all_spaces
         independent = gradient_rank(map_, known)
         if independent >= profile.codimension:
             break
-        if degree in found.searched:
+        if degree in result.searched:
             continue
         if budget.is_spent:
             return f"relations of degree {degree} and more were not searched: {SPENT}"
         progress(f"closed forms from the relations of degree {degree}")
         spaces = darboux_spaces(map_, degree, known, largest)
         if spaces is not None:
-            found.searched.append(degree)
+            result.searched.append(degree)
         if spaces and gradient_rank(map_, [*known, *spaces]) > independent:
             step = SearchStep("relations", degree, None, f"relations of degree {degree} along orbits")
-            found.add(step, sorted(spaces, key=lambda space: space.pattern))
+            result.add(step, sorted(spaces, key=lambda space: space.pattern))
     return ""
 
 
-def repeat(
-    found: SpaceSearch,
+def repeat_search(
+    original: SpaceSearch,
     map_: ModularMap,
     reference: int,
-    branches: Mapping[int, Mapping[Pattern, Branches]] = NOTHING,
+    branches: Mapping[int, Mapping[Pattern, Branches]] = NO_BRANCHES,
 ) -> SpaceSearch | None:
-    """The same steps on another map; None where they give spaces of another shape (a special value).
+    """Repeat the steps of a search on another map; return None where the spaces have another shape (a special value).
 
-    `reference` is the prime of `found`. Spaces of the same shape come in any order where there are no `branches` of
-    their step, by which they are told apart.
+    `reference` is the prime of the search. Spaces with the same zero pattern come in any order unless `branches`
+    distinguishes those of the step.
     """
-    again = SpaceSearch(cofactors=found.cofactors)
-    steps = list(zip(found.steps, found.spaces, strict=True))
+    repeated = SpaceSearch(cofactors=original.cofactors)
+    steps = list(zip(original.steps, original.spaces, strict=True))
     needed = [points_needed(map_.dim, step.degree, *model) for step, model in steps if step.product is not None]
-    sample = Sample.of(map_, found.cofactors, max(needed, default=0))
+    sample = Sample.of(map_, original.cofactors, max(needed, default=0))
     for number, (step, model) in enumerate(steps):
         if step.kind == "affine":
             affine = affine_space(map_)
-            group = [affine] if affine is not None else []
+            spaces = [affine] if affine is not None else []
         elif step.product is not None:
             if step.up_to_numbers:
-                group = [space for _, space in cofactor_spaces(sample, step.product, step.degree, model)]
+                spaces = [space for _, space in cofactor_spaces(sample, step.product, step.degree, model)]
             else:
-                group = [cofactor_space(sample, step.product, step.degree, *model)]
+                spaces = [cofactor_space(sample, step.product, step.degree, *model)]
         elif step.lift is not None:
-            group = two_point_spaces(map_, step.lift)
+            spaces = two_point_spaces(map_, step.lift)
         else:
-            group = darboux_spaces(map_, step.degree, again.all_spaces) or []
-        # In the order of the model, by the places of their zeros and, where these agree, by branches. There may be more
-        # of them than in the model, see `may_be_conjugate`.
-        by_pattern, of_step, waiting = classes(group), branches.get(number, {}), dict[Pattern, list[DarbouxSpace]]()
-        for kind, wanted in classes(model).items():
+            spaces = darboux_spaces(map_, step.degree, repeated.all_spaces) or []
+        # Sort as in the model: by zero pattern and, where patterns agree, by branches. There may be more spaces than in
+        # the model, see `may_be_conjugate`.
+        by_pattern, of_step, waiting = (
+            group_by_pattern(spaces),
+            branches.get(number, {}),
+            dict[Pattern, list[DarbouxSpace]](),
+        )
+        for kind, model_spaces in group_by_pattern(model).items():
             alike = by_pattern.get(kind, [])
             if kind in of_step:
                 alike = of_step[kind].in_order(alike, map_) or []
-            elif len(alike) > len(wanted):
-                alike = _most_alike(alike, wanted, map_.prime, reference)
-            if len(alike) < len(wanted):
+            elif len(alike) > len(model_spaces):
+                alike = _most_similar(alike, model_spaces, map_.prime, reference)
+            if len(alike) < len(model_spaces):
                 return None
             waiting[kind] = alike
-        again.add(step, [waiting[space.pattern].pop(0) for space in model])
-    return again
+        repeated.add(step, [waiting[space.pattern].pop(0) for space in model])
+    return repeated
 
 
-def classes(group: Sequence[DarbouxSpace]) -> dict[Pattern, list[DarbouxSpace]]:
-    """The spaces by the places of their zeros."""
-    found: dict[Pattern, list[DarbouxSpace]] = {}
-    for space in group:
-        found.setdefault(space.pattern, []).append(space)
-    return found
+def group_by_pattern(spaces: Sequence[DarbouxSpace]) -> dict[Pattern, list[DarbouxSpace]]:
+    """Group the spaces by the zero pattern of their bases."""
+    by_pattern: dict[Pattern, list[DarbouxSpace]] = {}
+    for space in spaces:
+        by_pattern.setdefault(space.pattern, []).append(space)
+    return by_pattern
 
 
-def may_be_conjugate(found: SpaceSearch) -> bool:
-    """Whether spaces of one degree have the same monomials, as spaces have that are conjugate over an extension of Q.
+def may_be_conjugate(result: SpaceSearch) -> bool:
+    """Whether two spaces of one step have the same zero pattern, as spaces conjugate over an extension of Q have.
 
-    These exist only modulo primes where the extension splits, and have no formula over Q.
+    Conjugate spaces exist only modulo primes at which the extension splits, and have no formula over Q.
     """
-    return any(len(classes(group)) < len(group) for group in found.spaces)
+    return any(len(group_by_pattern(group)) < len(group) for group in result.spaces)
 
 
-def _most_alike(
-    alike: list[DarbouxSpace], wanted: list[DarbouxSpace], prime: int, reference: int
+def _most_similar(
+    alike: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
-    """Those spaces that share most numbers with the wanted ones: conjugate ones, which are too many, share none.
+    """Return for each model the space that shares most coefficients with it; conjugate spaces share none.
 
-    Two coefficients seem to be the same rational number if one simple fraction has them modulo both primes.
+    Two coefficients count as the same rational number if one simple fraction reduces to them modulo both primes.
     """
-    waiting = list(alike)
-    found = []
-    for model in wanted:
+    remaining = list(alike)
+    chosen = []
+    for model in models:
         counts = []
-        for space in waiting:
+        for space in remaining:
             rows = zip(space.basis, model.basis, strict=True)
             pairs = [(a, b) for row in rows for a, b in zip(*row, strict=True) if b and b != 1]
             count_work(60 * len(pairs))
             residues = chinese([a for a, _ in pairs], prime, [b for _, b in pairs], reference)
             counts.append(sum(simple_fraction(c, prime * reference, _CHANCE) is not None for c in residues))
-        found.append(waiting.pop(counts.index(max(counts))))
-    return found
+        chosen.append(remaining.pop(counts.index(max(counts))))
+    return chosen
 
 
-def bases_of(
-    laboratory: Laboratory, reference: int, found: SpaceSearch, budget: Budget
+def interpolate_bases(
+    laboratory: Laboratory, reference: int, result: SpaceSearch, budget: Budget
 ) -> tuple[list[list[fmpq_mpoly]], str]:
-    """Bases of all spaces, polynomials in (variables, symbols, eps); none, and a reason, where that failed.
+    """Interpolate bases of all spaces as polynomials in (variables, symbols, eps).
 
-    `reference` is the prime modulo which the spaces were found.
+    `reference` is the prime of the search. Returns the bases and an empty text, or no bases and the reason.
     """
-    if repeat(found, laboratory.maps[1], reference) is None:
-        return [], "what was found at one eps was not found at another"
+    if repeat_search(result, laboratory.maps[1], reference) is None:
+        return [], "the polynomials found at one eps do not exist at another"
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
 
     @cache
     def again_at(prime: int, values: tuple[int, ...]) -> SpaceSearch | None:
         try:
-            return repeat(found, laboratory.map_for(prime, values), reference)
+            return repeat_search(result, laboratory.map_for(prime, values), reference)
         except (NoPoint, BadPrime):
             return None
 
-    branches: dict[int, dict[Pattern, Branches]] = {}  # what tells spaces apart that have zeros at the same places
-    for number, group in enumerate(found.spaces):
-        for kind, model in classes(group).items():
+    branches: dict[int, dict[Pattern, Branches]] = {}  # by step and zero pattern, where several spaces share it
+    for number, group in enumerate(result.spaces):
+        for kind, model in group_by_pattern(group).items():
             if len(model) == 1:
                 continue
 
@@ -276,26 +284,26 @@ def bases_of(
                 prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
             ) -> list[DarbouxSpace] | None:
                 other = again_at(prime, values)
-                return None if other is None else classes(other.spaces[number])[kind]
+                return None if other is None else group_by_pattern(other.spaces[number])[kind]
 
-            known = tell_apart(model, alike, names, laboratory.seed, budget, laboratory.root)
-            if known is None:
-                why = f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
-                why = SPENT if budget.is_spent else why
-                return [], f"integrals were found modulo primes, but no closed form: {why}"
-            branches.setdefault(number, {})[kind] = known
+            distinguished = find_branches(model, alike, names, laboratory.seed, budget, laboratory.root)
+            if distinguished is None:
+                cause = f"no rational coefficient distinguishes {len(model)} spaces of degree {model[0].degree}"
+                cause = SPENT if budget.is_spent else cause
+                return [], f"integrals were found modulo primes, but no closed form: {cause}"
+            branches.setdefault(number, {})[kind] = distinguished
 
     def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
-        again = repeat(found, map_, reference, branches)
+        again = repeat_search(result, map_, reference, branches)
         return None if again is None else again.all_spaces
 
-    forms = laboratory.formulas(found.all_spaces, spaces_on, budget)
+    forms = laboratory.formulas(result.all_spaces, spaces_on, budget)
     if forms.bases is None:
         return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
     return forms.bases, ""
 
 
-def tell_apart(
+def find_branches(
     model: Sequence[DarbouxSpace],
     alike: Alike,
     names: Sequence[str],
@@ -303,11 +311,10 @@ def tell_apart(
     budget: Budget,
     root: Root | None = None,
 ) -> Branches | None:
-    """What tells spaces of one pattern apart at every value of `names`; None where they are conjugate.
+    """Find a coefficient that distinguishes spaces of one zero pattern at every value of `names`.
 
-    None also where the budget is spent first.
-
-    `model` are the spaces on one map, `alike(prime, values)` those on others, in any order; None at special values.
+    `model` holds the spaces on one map; `alike(prime, values)` returns those on another map in any order, or None at
+    special values. Returns None where the spaces are conjugate over an extension of Q, or the budget is spent first.
     """
     places = [
         (i, k)

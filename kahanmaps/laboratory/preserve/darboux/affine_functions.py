@@ -1,17 +1,17 @@
-"""Affine functions that the flow of a quadratic system conserves, or keeps zero: exactly, over Q.
+"""Affine integrals and invariant hyperplanes of the flow of a quadratic system: exactly, over Q.
 
-The Kahan map inherits both, the second at each eps at which it is defined on the hyperplane (`under_map`). Where
-v . f = 0, it conserves v . x. If l = v . x + w has l' = l L along the flow (an affine Darboux function: the hyperplane
-l = 0 is invariant; L is its affine cofactor), the defining equation gives
+The Kahan map inherits both, an invariant hyperplane at each eps at which the map is defined on it (`under_map`). If
+v . f = 0, the map conserves v . x. If l = v . x + w satisfies l' = l L along the flow (an affine Darboux function: the
+hyperplane l = 0 is invariant, and L is the affine cofactor), the defining equation of the map gives
 
     l(x~) (1 - eps L(x)) = l(x) (1 + eps L(x~)),
 
 since v . (x~ - x)/(2 eps) is the polar form (l(x) L(x~) + l(x~) L(x))/2 of l L.
 
 Invariant hyperplanes are found by an extactic determinant (pereira-2001): on l = 0 the Taylor coefficients x_1, x_2,
-... of the solution through x are all orthogonal to v, so that l divides the polynomial det(x_1, ..., x_n), with the
-affine integrals taken out first. On a random line its rational zeros are the only candidates, and at each of them v is
-what is orthogonal to all x_k.
+... of the solution through x are all orthogonal to v, so that l divides the polynomial det(x_1, ..., x_n). (The affine
+integrals are eliminated first, since they make this determinant vanish.) The zeros of l on a random line are rational
+zeros of the determinant; at each of these the candidate v is the vector that is orthogonal to all x_k.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, Syst
 
 # The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.
 MAX_EXTACTIC_DIMENSION = 12
-_LINE = 10**6  # the size of the integers that give a random line
+_LINE = 10**6  # bound of the random integers that define a line
 _BUDGET = 20_000_000  # products of terms, for a determinant on a hyperplane
 
 
 @dataclass(frozen=True)
 class AffineDarboux:
-    """An affine function l with l' = l L along the flow: `function` is l, of coprime integers, `cofactor` is L."""
+    """An affine function l with l' = l L along the flow: `function` is l, with coprime integers; `cofactor` is L."""
 
     function: fmpq_mpoly
     cofactor: fmpq_mpoly
@@ -49,11 +49,11 @@ class AffineDarboux:
 
 @dataclass(frozen=True)
 class AffineDarbouxList:
-    """Affine Darboux functions, every one exact. `complete`: there are no others over Q; else `reason` tells why not.
+    """Affine Darboux functions, each one exact. `complete`: there are no others over Q; else `reason` says why not.
 
-    Constants and the affine integrals (cofactor 0) are left out. Completeness rests on one random line not being
-    parallel to an invariant hyperplane: its direction has random integers up to 10^6, so that this happens for a given
-    hyperplane with a probability below 10^-6.
+    Constants and the affine integrals (cofactor 0) are left out. The list is complete unless a random line is parallel
+    to an invariant hyperplane: its direction has random integers up to 10^6, so that for a given hyperplane this has a
+    probability below 10^-6.
     """
 
     functions: tuple[AffineDarboux, ...]
@@ -62,13 +62,13 @@ class AffineDarbouxList:
 
 
 def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:
-    """A basis of all v for which v . x is conserved by the flow, hence by the Kahan map for every eps.
+    """Return a basis of all v for which v . x is conserved by the flow, hence by the Kahan map for every eps.
 
     Args:
         system: a quadratic system over Q.
 
     Returns:
-        Vectors of coprime integers, a basis of { v : v . f = 0 }: exact, and all there are. Source: cmoq-2013.
+        Vectors of coprime integers, a basis of { v : v . f = 0 }; exact. Source: cmoq-2013.
 
     >>> affine_integrals(QuadraticSystem.from_text(["x", "y"], ["x*y", "-x*y"]))
     ((1, 1),)
@@ -84,10 +84,10 @@ def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:
 
 @dataclass(frozen=True)
 class QuotientForms:
-    """The linear forms modulo the affine integrals z = V x: represented by the coordinates x_i with i in `free`.
+    """The linear forms modulo the affine integrals z = V x, in terms of the coordinates y = (x_i with i in `free`).
 
-    `section` is the n x m matrix S of dx/dy for these coordinates y at fixed z, so that a form v is v S modulo the
-    integrals, and the system for y has the Jacobi matrix (rows `free` of f') S. `shift` is dx/dz: x = S y + shift z.
+    `section` is the n x m matrix S = dx/dy at fixed z: a form v becomes v S modulo the integrals, and the system for y
+    has the Jacobi matrix (rows `free` of f') S. `shift` is dx/dz, so that x = S y + shift z.
     """
 
     integrals: tuple[tuple[fmpz, ...], ...]
@@ -96,12 +96,14 @@ class QuotientForms:
     shift: fmpq_mat
 
     def rows(self, matrix: fmpq_mat) -> fmpq_mat:
-        """The rows of a matrix that belong to the free coordinates."""
+        """Return the rows of a matrix that belong to the free coordinates."""
         return fmpq_mat([[matrix[i, j] for j in range(matrix.ncols())] for i in self.free])
 
 
 def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
-    """The linear forms of n variables modulo the independent forms `integrals`; the first coordinates that do.
+    """Return the linear forms of n variables modulo the independent forms `integrals`.
+
+    The free coordinates are the first ones that complete the integrals to a basis.
 
     >>> quotient_by([(fmpz(1), fmpz(1), fmpz(0))], 3).free
     (0, 2)
@@ -109,9 +111,9 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
     free: list[int] = []
     rows: list[list[fmpq]] = [[fmpq(entry) for entry in vector] for vector in integrals]
     for j in range(n):
-        more = [*rows, [fmpq(int(i == j)) for i in range(n)]]
-        if rank(QQ, fmpq_mat(more)) == len(more):
-            rows = more
+        extended = [*rows, [fmpq(int(i == j)) for i in range(n)]]
+        if rank(QQ, fmpq_mat(extended)) == len(extended):
+            rows = extended
             free.append(j)
     coordinates = fmpq_mat([*rows[len(integrals) :], *rows[: len(integrals)]])  # (y, z) as forms of x
     inverse = coordinates.inv()
@@ -123,19 +125,19 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
 
 
 def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
-    """All affine functions over Q whose zero set the flow keeps: l' = l L with an affine L, exactly.
+    """Find all invariant hyperplanes l = 0 over Q: affine l with l' = l L along the flow, L affine.
 
     Args:
         system: a quadratic system over Q.
-        seed: decides the random line that candidates are read off from; what is listed is exact for every seed.
+        seed: the random seed of the line on which candidates are computed; the functions are exact for every seed.
 
     Returns:
-        An `AffineDarbouxList`. Not complete where the extactic determinant vanishes identically (there may be
-        infinitely many, as for x' = x, y' = y), or above dimension 12 (affine integrals not counted): then it lists
-        those among the factors of the right-hand sides. Source: pereira-2001.
+        An `AffineDarbouxList`. The list is not complete if the extactic determinant vanishes identically (there may be
+        infinitely many, as for x' = x, y' = y), or if more than 12 variables remain without the affine integrals: then
+        it has only those among the factors of the right-hand sides. Source: pereira-2001.
 
-    >>> found = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x*(2 - y)", "y*(3*x - 1)"]))
-    >>> [(str(d.function), str(d.cofactor)) for d in found.functions], found.complete
+    >>> result = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x*(2 - y)", "y*(3*x - 1)"]))
+    >>> [(str(d.function), str(d.cofactor)) for d in result.functions], result.complete
     ([('x', '-y + 2'), ('y', '3*x - 1')], True)
     """
     system = as_system(system)
@@ -147,15 +149,15 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
     coordinates = [[fmpq(int(i == j)) for i in range(n)] for j in range(n)]
 
     def only_factors(reason: str) -> AffineDarbouxList:
-        why = f"{reason}: only factors of the right-hand sides were tried"
-        return AffineDarbouxList(_factors_that_are(system, coordinates), False, why)
+        reason = f"{reason}: only factors of the right-hand sides were tried"
+        return AffineDarbouxList(_affine_darboux_factors(system, coordinates), False, reason)
 
     if m > MAX_EXTACTIC_DIMENSION:
         return only_factors(f"more than {MAX_EXTACTIC_DIMENSION} variables")
     if system.digits > LONG_COEFFICIENTS:
         return only_factors(f"coefficients of more than {LONG_COEFFICIENTS} digits")
     local = system.over(QQ)
-    # A hyperplane parallel to the line is not met by it, so the line must not be known to who writes the system.
+    # A line parallel to a hyperplane misses it. The seed depends on the system, so no system can be built for the line.
     rng = random.Random(f"affine {derive_seed(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
     along = _determinant_along(local, start, direction, quotient.free)
@@ -167,8 +169,8 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         x = [a + t * d for a, d in zip(start, direction, strict=True)]
         normals = nullspace(QQ, _taylor_rows(local, x, quotient.free))
         if len(normals) > 1:
-            # The flow on the hyperplane is degenerate itself. The normal is one of these that is a left eigenvector of
-            # f'(x), since v f'(x) = L(x) v on l = 0.
+            # The flow on the hyperplane is degenerate itself. The normal is a combination of these vectors that is a
+            # left eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
             basis = fmpq_mat([list(v) for v in normals])
             action = quotient.rows(local.jacobian(x)) * quotient.section
             normals = []
@@ -179,12 +181,12 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         for v in normals:
             entries = dict(zip(quotient.free, v, strict=True))
             candidates.append([entries.get(i, fmpq(0)) for i in range(n)])
-    reason = "" if complete else "the flow degenerates on an invariant hyperplane: others may hide behind it"
-    return AffineDarbouxList(_factors_that_are(system, candidates), complete, reason)
+    reason = "" if complete else "the flow degenerates on an invariant hyperplane: there may be further ones"
+    return AffineDarbouxList(_affine_darboux_factors(system, candidates), complete, reason)
 
 
 def _taylor_rows(local: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> fmpq_mat:
-    """The coordinates `free` of as many Taylor coefficients of the solution through x, one coefficient a row."""
+    """Return the coordinates `free` of the first len(free) Taylor coefficients of the solution through x, as rows."""
     series = [fmpq_mat(local.dim, 1, list(x))]
     forms: list[fmpq_mat] = []
     for k in range(len(free)):
@@ -199,9 +201,9 @@ def _taylor_rows(local: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> f
 def _determinant_along(
     local: SystemOver, start: Sequence[fmpq], direction: Sequence[fmpq], free: Sequence[int]
 ) -> fmpq_poly:
-    """The extactic determinant at start + t direction, by interpolation in t."""
+    """Interpolate the extactic determinant at start + t direction as a polynomial in t."""
     m = len(free)
-    count(1000 + 3 * m**5)  # of a search for hyperplanes, for which the rest is short
+    count(1000 + 3 * m**5)  # the work of the whole search for hyperplanes, of which this is the main part
     nodes = range(m * (m + 3) // 2 + 1)
     values = [
         _taylor_rows(local, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes
@@ -220,9 +222,9 @@ def _rational_roots(polynomial: fmpq_poly) -> list[fmpq]:
     return [-factor[0] / factor[1] for factor, _ in polynomial.factor()[1] if factor.degree() == 1]
 
 
-def _factors_that_are(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]) -> tuple[AffineDarboux, ...]:
-    """The affine Darboux functions among the factors of v . f, for v among `normals`: where l' = l L, l is one."""
-    found: dict[str, AffineDarboux] = {}
+def _affine_darboux_factors(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]) -> tuple[AffineDarboux, ...]:
+    """Return the affine Darboux functions l among the factors of v . f, for v among `normals` (l' = l L = v . f)."""
+    functions: dict[str, AffineDarboux] = {}
     for normal in normals:
         (component,) = linear_combinations(fmpq_mat([list(normal)]), system.rhs)
         if component.is_zero():
@@ -232,12 +234,12 @@ def _factors_that_are(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]
                 function = primitive_part(factor)[1]
                 cofactor = darboux_cofactor(system, function)
                 if cofactor is not None and not cofactor.is_zero():
-                    found[str(function)] = AffineDarboux(function, cofactor)
-    return tuple(sorted(found.values(), key=lambda d: _coefficients(d.function), reverse=True))
+                    functions[str(function)] = AffineDarboux(function, cofactor)
+    return tuple(sorted(functions.values(), key=lambda d: _coefficients(d.function), reverse=True))
 
 
 def darboux_cofactor(system: PolynomialField, function: fmpq_mpoly) -> fmpq_mpoly | None:
-    """The polynomial L with l' = l L along the flow for a polynomial l = `function`, not 0, or None. Exact.
+    """Return the polynomial L with l' = l L along the flow for a nonzero polynomial l = `function`, or None. Exact.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "x"])
     >>> x, y = system.rhs[1].context().gens()
@@ -249,17 +251,17 @@ def darboux_cofactor(system: PolynomialField, function: fmpq_mpoly) -> fmpq_mpol
 
 
 def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
-    """What the Kahan map at eps makes of a hyperplane that the flow keeps; exact.
+    """Decide how the Kahan map at eps acts on an invariant hyperplane of the flow; exact.
 
     Args:
         system: a quadratic system over Q, whose map at eps is birational.
         function: an affine Darboux function l of the flow.
-        eps: an exact number, half the time step.
+        eps: half the time step, an exact number.
 
     Returns:
-        "invariant" where det(I - eps f') and det(I + eps f') are not identically 0 on l = 0: the map of the system on
-        the hyperplane is birational then. "undefined" where the first one is 0 there, "contracted" where the second
-        one is: then the image of l = 0 is a smaller part of it. "undecided" where these are too long to expand.
+        "invariant" if det(I - eps f') and det(I + eps f') are not identically 0 on l = 0: the restriction of the map to
+        the hyperplane is birational then. "undefined" if det(I - eps f') is 0 there; "contracted" if det(I + eps f')
+        is: the image of l = 0 is then of lower dimension. "undecided" if these are too long to expand.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
     >>> x, y = system.rhs[0].context().gens()
@@ -269,22 +271,22 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     n, context = system.dim, function.context()
     *slopes, _ = _coefficients(function)
     k = next(i for i, slope in enumerate(slopes) if slope != 0)
-    place = list(context.gens())  # of a point of the hyperplane
-    place[k] = place[k] - function / slopes[k]
+    on_hyperplane = list(context.gens())
+    on_hyperplane[k] = on_hyperplane[k] - function / slopes[k]  # solves l = 0 for x_k
     rng = random.Random("a point of the hyperplane")
     free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
-    point = [evaluate(x, QQ, free) for x in place]
+    point = [evaluate(x, QQ, free) for x in on_hyperplane]
     for outcome, step in (("undefined", eps), ("contracted", -eps)):
-        if KahanFamily(system).at(step).determinant(point) != 0:  # at most points: then nothing is expanded
+        if KahanFamily(system).at(step).determinant(point) != 0:  # one point suffices: no need to expand
             continue
         field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
         entries = [
-            Function(field, int(i == j) - f.derivative(j).compose(*place, ctx=context) * step, one)
+            Function(field, int(i == j) - f.derivative(j).compose(*on_hyperplane, ctx=context) * step, one)
             for i, f in enumerate(system.rhs)
             for j in range(n)
         ]
         try:
-            if FunctionMatrix(field, n, n, entries).det().above.is_zero():
+            if FunctionMatrix(field, n, n, entries).det().numerator.is_zero():
                 return outcome
         except BudgetExceeded:
             return "undecided"
@@ -292,6 +294,6 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
 
 
 def _coefficients(function: fmpq_mpoly) -> list[fmpq]:
-    """The coefficients of an affine function, those of the variables first."""
+    """Return the coefficients of an affine function, those of the variables first."""
     n = function.context().nvars()
     return [fmpq(function[tuple(int(i == j) for i in range(n))]) for j in range(n + 1)]

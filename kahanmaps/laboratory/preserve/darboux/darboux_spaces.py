@@ -1,28 +1,28 @@
-"""Spaces of polynomials with one common cofactor, found without knowing the cofactor, modulo a prime.
+"""Spaces of discrete Darboux polynomials with one common, unknown cofactor, modulo a prime.
 
-If P o Phi = C P and Q o Phi = C Q with the same rational function C, then P/Q is an integral, P and Q are discrete
-Darboux polynomials, and P - c Q vanishes along the orbits on which P/Q = c. Read backwards:
+If P o Phi = C P and Q o Phi = C Q with the same rational function C, then P/Q is an integral, and P - c Q vanishes
+along the orbits on which P/Q = c. The search reverses this:
 
-1. All relations of degree d of all orbits (hirota_kimura.py) span a space W of polynomials; it contains P and Q.
-2. The antisymmetric matrices A on W with sum A_ab (w_a(x~) w_b(x) - w_b(x~) w_a(x)) = 0 for all x are a linear space
-   that contains the sum over a, b in U of every space U with a common cofactor.
-3. The matrices E with E A = A E^T for all these A are the scalars on each U; eigenvectors of a random E are the U.
-   Where the sum is not direct, the A of rank 2 are sought instead, by the vanishing of their 4 x 4 Pfaffians.
+1. All relations of degree d of all orbits (hirota_kimura.py) span a space W of polynomials, which contains P and Q.
+2. Let w_a be a basis of W. The antisymmetric matrices A with sum A_ab (w_a(x~) w_b(x) - w_b(x~) w_a(x)) = 0 for all x
+   form a linear space. For every space U with a common cofactor it contains all antisymmetric matrices on U.
+3. The matrices E with E A = A E^T for all these A are scalars on each U, so the U are eigenspaces of a random E. If the
+   sum of the spaces U is not direct, the search looks for the A of rank 2, by the vanishing of their 4 x 4 Pfaffians.
 
-What lower degrees explain is taken out first: W_T, the multiples of the spaces that are known. A matrix A that comes
-from multiples lives on W_T alone. So the component of A that joins the complement of W_T with W_T tells how elements
-of the complement are to be corrected to become Darboux polynomials.
+Multiples of known spaces of lower degree form a subspace W_T, which is split off first. A matrix A that comes from
+multiples has entries on W_T only. The entries of A between a complement of W_T and W_T are the corrections that turn
+elements of the complement into Darboux polynomials.
 
 Sources: petrera-pfadler-suris-2009 for the relations, celledoni-2019 for discrete Darboux polynomials.
 
-Functions of a point and its k-th iterate can stand in the place of polynomials of degree 2 (`TwoPointBasis`).
-With X = (1, x) and Y = (1, y), y the k-th iterate of x, the monomial X_i X_j stands for X_i Y_j + X_j Y_i, or for
-X_i Y_j - X_j Y_i. The first are polarised quadratic polynomials, the second Wronskians. Along an orbit they satisfy
-linear relations as monomials do, and the same null spaces tell which combinations have a common cofactor.
+The same search works for functions of a point and its k-th iterate instead of polynomials of degree 2
+(`TwoPointBasis`). With X = (1, x) and Y = (1, y), where y is the k-th iterate of x, the monomial X_i X_j stands for the
+polarized form X_i Y_j + X_j Y_i, or for the Wronskian X_i Y_j - X_j Y_i. Along an orbit these functions satisfy linear
+relations as monomials do, and the same null spaces give the combinations with a common cofactor.
 
-Where all s functions of a space satisfy s - 2 independent relations along every orbit, ratios of functions need not be
-integrals, but those of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are, ~ a step later: the values of F along
-an orbit lie in a plane, and its Pluecker coordinates are these minors. Source: petrera-suris-2018.
+If the s functions F of a space satisfy s - 2 independent relations along every orbit, ratios of two functions need not
+be integrals, but ratios of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are (~: one step later). For the values
+of F along an orbit lie in a plane, and these minors are its Pluecker coordinates. Source: petrera-suris-2018.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ from kahanmaps.laboratory.modular_points import (
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span_of_relations
 
 _SPARE = 8
-_ENOUGH = 12
-# Of W, whose dimension s gives s (s - 1)/2 unknown entries of A: 0.2 s and 10 s.
+_MAX_FORMS = 12
+# Bounds of dim W: the s (s - 1)/2 unknown entries of A take 0.2 seconds for s = 30 and 10 seconds for s = 60.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
-TWO_POINT_DEGREE = 2  # of monomials that stand for functions of a point and an iterate
+TWO_POINT_DEGREE = 2  # of the monomials that encode functions of a point and an iterate
 
 Vectors = list[list[int]]
 Pattern = tuple[tuple[bool, ...], ...]
@@ -61,11 +61,12 @@ Pattern = tuple[tuple[bool, ...], ...]
 
 @dataclass(frozen=True)
 class DarbouxSpace:
-    """Polynomials of degree at most `degree` with one common cofactor, modulo a prime.
+    """A space of polynomials of degree at most `degree` with one common cofactor, modulo a prime.
 
-    `basis` is on `exponents_up_to(dim, degree)`; ratios of two elements are integrals. Every element ends in a 1 at its
-    largest monomial. Two elements are the sparsest that there are, by degree, then by their number of terms; more are
-    the reduced echelon basis for the monomials in falling order. The first is the natural denominator.
+    `basis` has coefficient vectors on `exponents_up_to(dim, degree)`; ratios of two elements are integrals. The
+    coefficient of the largest monomial of each element is 1. If the dimension is 2, the basis consists of the sparsest
+    elements, by degree, then by number of terms; otherwise it is the reduced echelon basis for descending monomials.
+    The first element is the natural denominator.
     """
 
     dim: int
@@ -76,115 +77,113 @@ class DarbouxSpace:
     def spanned_by(
         cls, dim: int, degree: int, vectors: Vectors, prime: int, places: Sequence[int] | None = None
     ) -> DarbouxSpace:
-        """The space that vectors span modulo a prime: on all monomials, or on those with the numbers `places`."""
+        """Return the span of vectors modulo a prime, given on all monomials or on those with the indices `places`."""
         if places is not None:
-            whole = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
-            for row, vector in zip(whole, vectors, strict=True):
+            full = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
+            for row, vector in zip(full, vectors, strict=True):
                 for k, entry in zip(places, vector, strict=True):
                     row[k] = entry
-            vectors = whole
-        falling = echelon([vector[::-1] for vector in vectors], prime)
-        basis = [vector[::-1] for vector in reversed(falling)]
+            vectors = full
+        descending = echelon([vector[::-1] for vector in vectors], prime)
+        basis = [vector[::-1] for vector in reversed(descending)]
         return cls(dim, degree, _sparsest(basis, dim, degree, prime) if len(basis) == 2 else basis)
 
     @property
     def support(self) -> tuple[tuple[int, ...], ...]:
-        """The monomials that occur in it."""
-        everything = exponents_up_to(self.dim, self.degree)
-        return tuple(everything[k] for k in self.places)
+        """The exponents of the monomials that occur in the space."""
+        exponents = exponents_up_to(self.dim, self.degree)
+        return tuple(exponents[k] for k in self.places)
 
     @property
     def places(self) -> list[int]:
-        """The numbers of these monomials."""
+        """The indices of these monomials."""
         return [k for k, entries in enumerate(zip(*self.basis, strict=True)) if any(entries)]
 
     @property
     def pattern(self) -> Pattern:
-        """Where the basis has entries other than zero."""
+        """The zero pattern of the basis: True for each nonzero entry."""
         return tuple(tuple(bool(entry) for entry in vector) for vector in self.basis)
 
     def multiples(self, degree: int, prime: int) -> Vectors:
-        """A basis of the products with all monomials, up to a degree."""
+        """Return a basis of the products with all monomials, up to a degree."""
         factors = [[0] * k + [1] for k in range(len(exponents_up_to(self.dim, degree - self.degree)))]
         rows = [product_of(P, vector, self.dim, degree, prime) for P in factors for vector in self.basis]
         return echelon([row for row in rows if row is not None], prime)
 
 
 def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
-    """The two sparsest elements of a pencil: among those that lack a monomial which others have."""
+    """Return the two sparsest elements of a pencil, among those in which a monomial of the pencil is missing."""
     degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
     P, Q = basis
     count_work(len(P) + 2 * len(degrees))
     used = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
-    zeros: dict[int | None, set[int]] = {}  # of the members that lack something
+    zeros: dict[int | None, set[int]] = {}  # the missing monomials of each special member, by its parameter
     for k in used:
         zeros.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
-    supports = [([k for k in used if k not in lacking], min(lacking)) for lacking in zeros.values()]
-    found = []
-    for support, first in sorted(supports, key=lambda one: (degrees[one[0][-1]], len(one[0]), one[0]))[:2]:
+    supports = [([k for k in used if k not in missing], min(missing)) for missing in zeros.values()]
+    members = []
+    for support, first in sorted(supports, key=lambda pair: (degrees[pair[0][-1]], len(pair[0]), pair[0]))[:2]:
         member = [(Q[first] * p - P[first] * q) % prime for p, q in zip(P, Q, strict=True)]
         inverse = pow(member[support[-1]], -1, prime)
-        found.append([c * inverse % prime for c in member])
-    return found
+        members.append([c * inverse % prime for c in member])
+    return members
 
 
 def darboux_spaces(
     map_: ModularMap, degree: int, known: Sequence[DarbouxSpace] = (), largest: int = LARGEST_SPAN
 ) -> list[DarbouxSpace] | None:
-    """The spaces of degree `degree` that are not multiples of the `known` ones of lower degree.
+    """Find the spaces of degree `degree` that are not multiples of the `known` ones of lower degree.
 
-    Relations that no space accounts for have integrals for coefficients that are no P/Q of this degree. None are looked
-    for, and the answer is None, where relations span more than `largest` dimensions.
+    Returns None, without a search, if the relations span more than `largest` dimensions. Relations may remain that
+    belong to no space: their coefficients are integrals that are not of the form P/Q with P and Q of this degree.
     """
     prime = map_.prime
     span = span_of_relations(map_, degree, 2 * LARGEST_SPAN)
     if len(span) > 2 * LARGEST_SPAN:
         return None
-    explained = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
-    # Vectors of the span that together with those explained are a basis of the sum.
-    stacked = [*explained, *span]
+    multiples = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
+    # `fresh` completes the multiples of known spaces to a basis of the sum.
+    stacked = [*multiples, *span]
     independent = pivots(echelon(list(zip(*stacked, strict=True)), prime)) if stacked else []
-    fresh = [stacked[k] for k in independent if k >= len(explained)]
+    fresh = [stacked[k] for k in independent if k >= len(multiples)]
     if not fresh:
         return []
-    if not explained and _is_darboux(map_, fresh, degree):
+    if not multiples and _is_darboux(map_, fresh, degree):
         return [DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)]
-    if len(fresh) + len(explained) > largest:
+    if len(fresh) + len(multiples) > largest:
         return None
-    solutions = _antisymmetric(map_, [*fresh, *explained], degree)
-    bases = [basis for basis in _separate(solutions, fresh, explained, prime) if _is_darboux(map_, basis, degree)]
-    if not bases and not explained:
+    solutions = _antisymmetric(map_, [*fresh, *multiples], degree)
+    bases = [basis for basis in _separate(solutions, fresh, multiples, prime) if _is_darboux(map_, basis, degree)]
+    if not bases and not multiples:
         bases = [basis for basis in _of_rank_two(solutions, fresh, prime) if _is_darboux(map_, basis, degree)]
     return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
 
 
 def _values(map_: ModularMap, basis: Vectors, degree: int, points: int) -> tuple[nmod_mat, nmod_mat]:
-    """The values of the polynomials at random points and at their images: one row a point."""
+    """Return the values of the polynomials at random points and at their images, one row for each point."""
     prime = map_.prime
     polynomials = matrix(basis, prime).transpose()
-    here, there = (
+    at_points, at_images = (
         multiply(matrix(rows, prime), polynomials)
         for rows in zip(*(map_.moved(x, image, degree) for x, image in map_.pairs(points)), strict=True)
     )
-    return here, there
+    return at_points, at_images
 
 
 def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
-    """Whether all ratios of the polynomials are conserved, at random points."""
-    here, there = _values(map_, basis, degree, 6)
-    return all(
-        here[i, 0] * there[i, a] == here[i, a] * there[i, 0] for i in range(here.nrows()) for a in range(1, len(basis))
-    )
+    """Whether all ratios of the polynomials are conserved at random points."""
+    u, v = _values(map_, basis, degree, 6)
+    return all(u[i, 0] * v[i, a] == u[i, a] * v[i, 0] for i in range(u.nrows()) for a in range(1, len(basis)))
 
 
 def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_mat]:
-    """A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x."""
+    """Return a basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x."""
     size, prime = len(basis), map_.prime
     places = [(a, b) for a in range(size) for b in range(a + 1, size)]
-    here, there = _values(map_, basis, degree, len(places) + _SPARE)
+    at_points, at_images = _values(map_, basis, degree, len(places) + _SPARE)
     count_work(len(places) ** 2 / 2)
     rows = []
-    for x, y in zip(integers(here), integers(there), strict=True):
+    for x, y in zip(integers(at_points), integers(at_images), strict=True):
         rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
     solutions = []
     for vector in null_space(rows, len(places), prime):
@@ -196,14 +195,14 @@ def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_m
     return solutions
 
 
-def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, prime: int) -> list[Vectors]:
-    """The spaces with a common cofactor from the matrices A on fresh + explained.
+def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
+    """Compute the spaces with a common cofactor from the matrices A on fresh + multiples.
 
-    Their fresh parts are eigenspaces of a random E with E A = A E^T for all fresh-fresh parts of the A.
+    The fresh parts of the spaces are eigenspaces of a random E with E A = A E^T for the fresh-fresh block of every A.
     """
-    k, size, rng = len(fresh), len(fresh) + len(explained), random.Random(prime)
-    # Columns of the fresh-fresh parts span the fresh parts of the spaces, in coordinates: a basis in echelon form, in
-    # terms of which sum A'_ij b_i b_j^T has the entries at the pivots.
+    k, size, rng = len(fresh), len(fresh) + len(multiples), random.Random(prime)
+    # The columns of the fresh-fresh blocks span the fresh parts of the spaces. Take an echelon basis b_i of this span:
+    # then a block is sum A'_ij b_i b_j^T, and A' consists of its entries at the pivots.
     count_work(len(solutions) * k**2)
     coordinates = echelon([[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)], prime)
     n, places = len(coordinates), pivots(coordinates)
@@ -211,30 +210,31 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, pri
         return []
     count_work(len(solutions) * n**2)
     forms = [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
-    if len(forms) > _ENOUGH:  # what all satisfy can be read off a few random combinations
-        forms = [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
+    if len(forms) > _MAX_FORMS:  # a few random combinations give the same conditions on E
+        forms = [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_MAX_FORMS)]
     algebra = _intertwining(forms, n, prime)
     E = combination_of([rng.randrange(prime) for _ in algebra], algebra)
-    found = []
+    spaces = []
     count_work(10 + 2 * n**3)
     for factor, _ in E.charpoly().factor()[1]:
         if factor.degree() != 1:
-            continue  # spaces that are conjugate over an extension of the field
+            continue  # these spaces are conjugate over an extension of the field
         root = -int(factor[0]) * pow(int(factor[1]), -1, prime) % prime
         shifted = [[(int(E[i, j]) - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
         eigen = null_space(shifted, n, prime)
         if len(eigen) > 1:
-            lifted = _lift(solutions, echelon(combine(eigen, coordinates, prime), prime), k, size, prime)
-            if lifted is not None:
-                found.append(echelon(combine(lifted, [*fresh, *explained], prime), prime))
-    return found
+            block = echelon(combine(eigen, coordinates, prime), prime)
+            corrected = _add_corrections(solutions, block, k, size, prime)
+            if corrected is not None:
+                spaces.append(echelon(combine(corrected, [*fresh, *multiples], prime), prime))
+    return spaces
 
 
 def _intertwining(forms: list[nmod_mat], n: int, prime: int) -> list[nmod_mat]:
-    """A basis of the n x n matrices E with E A = A E^T for all of these antisymmetric A."""
+    """Return a basis of the n x n matrices E with E A = A E^T for all of these antisymmetric A."""
     rows = []
     count_work(n**3 + n**4 / 100)
-    for A in forms[:2]:  # few E are left to which the others apply
+    for A in forms[:2]:  # two A leave few E; the other A are applied to these
         for i in range(n):
             for j in range(i, n):
                 row = [0] * (n * n)
@@ -242,23 +242,23 @@ def _intertwining(forms: list[nmod_mat], n: int, prime: int) -> list[nmod_mat]:
                     row[i * n + m] = (row[i * n + m] + int(A[m, j])) % prime
                     row[j * n + m] = (row[j * n + m] - int(A[i, m])) % prime
                 rows.append(row)
-    found = [nmod_mat(n, n, entries, prime) for entries in null_space(rows, n * n, prime)]
+    basis = [nmod_mat(n, n, entries, prime) for entries in null_space(rows, n * n, prime)]
     for A in forms[2:]:
-        count_work(len(found) * (n**3 / 500 + n**2))
-        differences = [(E * A - A * E.transpose()).entries() for E in found]
-        weights = null_space([list(map(int, row)) for row in zip(*differences, strict=True)], len(found), prime)
-        found = [combination_of(each, found) for each in weights]
-    return found
+        count_work(len(basis) * (n**3 / 500 + n**2))
+        differences = [(E * A - A * E.transpose()).entries() for E in basis]
+        weights = null_space([list(map(int, row)) for row in zip(*differences, strict=True)], len(basis), prime)
+        basis = [combination_of(vector, basis) for vector in weights]
+    return basis
 
 
 def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[Vectors]:
-    """The row space of the only matrix of rank 2 among the combinations of few matrices; nothing where it is not one.
+    """Return the row space of the matrix of rank 2 among the combinations of few matrices, if there is exactly one.
 
-    The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. A single common zero c (up to a factor) shows in the
-    matrix c c^T, which spans what all of them annihilate.
+    The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
+    symmetric matrices that all these forms annihilate are the multiples of c c^T.
     """
     count = len(solutions)
-    if not 1 <= count <= _ENOUGH:
+    if not 1 <= count <= _MAX_FORMS:
         return []
     rng = random.Random(prime)
     size = len(fresh)
@@ -294,18 +294,18 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
     return [echelon(combine(coordinates, fresh, prime), prime)] if len(coordinates) == 2 else []
 
 
-def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: int) -> Vectors | None:
-    """The block with its corrections by explained polynomials, in coordinates of fresh + explained."""
+def _add_corrections(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: int) -> Vectors | None:
+    """Add to each vector of the block its correction by multiples, in coordinates of fresh + multiples."""
     if size == k:
         return block
-    # Combinations of the A whose fresh-fresh part lives on the block: their columns are combinations of it.
+    # Take the combinations of the A with a fresh-fresh block on `block`: its columns are combinations of the vectors.
     first = pivots(block)
     others = [i for i in range(k) if i not in first]
     conditions = []
     count_work(k * len(others) * len(solutions) * len(first) / 2)
     for b in range(k):
         for i in others:
-            # entry (i, b) must be what the block makes of the entries (pivot, b)
+            # entry (i, b) is determined by the entries (pivot, b)
             conditions.append(
                 [
                     (int(A[i, b]) - sum(int(A[p, b]) * row[i] for p, row in zip(first, block, strict=True))) % prime
@@ -318,7 +318,7 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
     for weights in combinations:
         A = combination_of(weights, solutions)
         for p in first:
-            # A = sum a_pq (p + w_p)(q + w_q)^T: the part of row p outside the fresh ones is sum_q a_pq w_q
+            # A = sum a_pq (p + w_p)(q + w_q)^T with corrections w: row p has the entries sum_q a_pq w_q on multiples
             system.append([int(A[p, q]) for q in first] + [int(A[p, t]) for t in range(k, size)])
     reduced = echelon(system, prime)
     if len(reduced) < n or any(reduced[i][j] != (i == j) for i in range(n) for j in range(n)):
@@ -327,12 +327,12 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
 
 
 def gradient_rank(map_: ModularMap, spaces: Sequence[DarbouxSpace]) -> int:
-    """The number of functionally independent integrals among the ratios of the spaces, at a random point."""
+    """Return the number of functionally independent integrals among the ratios of the spaces, at a random point."""
     return rank(gradients_of_ratios(map_.random_point(), spaces, map_.prime), map_.prime)
 
 
 def gradients_of_ratios(x: Point, spaces: Sequence[DarbouxSpace], prime: int) -> Vectors:
-    """Multiples of the gradients of the ratios of the spaces at a point."""
+    """Return multiples of the gradients of the ratios of the spaces at a point."""
     rows = []
     for space in spaces:
         values = [gradient_values(vector, x, space.degree, prime) for vector in space.basis]
@@ -343,7 +343,11 @@ def gradients_of_ratios(x: Point, spaces: Sequence[DarbouxSpace], prime: int) ->
 
 
 class TwoPointBasis(NamedTuple):
-    """Which functions: k, the sign, and the dimension of what they span along an orbit, 1 or 2."""
+    """A basis of bilinear forms in x and its k-th iterate.
+
+    `shift` is k; `sign` is 1 for symmetric forms and -1 for Wronskians; `rank` is the dimension, 1 or 2, of the span of
+    the values of a space of functions along an orbit.
+    """
 
     shift: int
     sign: int
@@ -351,7 +355,7 @@ class TwoPointBasis(NamedTuple):
 
     @property
     def text(self) -> str:
-        """How integrals are found among these functions, for people."""
+        """A phrase on the origin of integrals among these functions."""
         if self.shift == 0:
             return "relations of degree 2 along orbits on levels of the affine integrals"
         kind = "bilinear relations" if self.sign > 0 else "relations of Wronskians"
@@ -371,27 +375,27 @@ TWO_POINT_BASES = (
 
 @cache
 def pairs_of(dim: int) -> tuple[tuple[int, int], ...]:
-    """The places i <= j in (1, x) of the factors of each monomial of degree at most 2."""
-    found = []
+    """Return for each monomial of degree at most 2 the indices i <= j of its factors in (1, x)."""
+    pairs = []
     for exponent in exponents_up_to(dim, TWO_POINT_DEGREE):
         places = [k for k, e in enumerate(exponent, 1) for _ in range(e)]
         i, j = [0] * (TWO_POINT_DEGREE - len(places)) + places
-        found.append((i, j))
-    return tuple(found)
+        pairs.append((i, j))
+    return tuple(pairs)
 
 
 class TwoPointMap(ModularMap):
-    """A map modulo a prime on whose points monomials of degree at most 2 have the values of a `TwoPointBasis`."""
+    """A map modulo a prime that gives monomials of degree at most 2 the values of a `TwoPointBasis`."""
 
     def __init__(self, base: ModularMap, lift: TwoPointBasis) -> None:
-        # The same map; only what a monomial is differs.
+        # The same map and random generator; only the values of monomials differ.
         self.prime, self.eps, self.dim, self.values = base.prime, base.eps, base.dim, base.values
         self.rng, self.map, self.lift = base.rng, base.map, lift
 
     def _values(self, x: Point, y: Point) -> list[int]:
         p, sign, X, Y = self.prime, self.lift.sign, (1, *x), (1, *y)
         count_work(len(pairs_of(self.dim)) / 2)
-        # Squares have no Wronskian. Random numbers in their place are in no relation, as zeros would be.
+        # The Wronskian of a square is 0. Random numbers instead of zeros keep it out of all relations.
         return [
             self.rng.randrange(p) if sign < 0 and i == j else (X[i] * Y[j] + sign * X[j] * Y[i]) % p
             for i, j in pairs_of(self.dim)
@@ -400,7 +404,7 @@ class TwoPointMap(ModularMap):
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """The values along an orbit, as for other maps."""
+        """Return the values along an orbit, its first point, and its period if it closes."""
         points, shift = self.orbit(count + self.lift.shift), self.lift.shift
         closed = len(points) < count + shift
         ahead = points[shift % len(points) :] + (points[: shift % len(points)] if closed else [])
@@ -409,24 +413,24 @@ class TwoPointMap(ModularMap):
         return chosen, points[0], len(points) if closed else None
 
     def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
-        """The values at a point, and those a step later; each times its number of `by`."""
+        """Return the values at a point and one step later, times the two factors `by`."""
         points = [x, image]
         while len(points) < self.lift.shift + 2:
             after = self.step(points[-1])
             if after is None:
-                raise NoPoint("iterates of a random point modulo a prime have no value")
+                raise NoPoint("an iterate of a random point modulo a prime is an indeterminacy point")
             points.append(after)
-        here, there = (self._values(points[k], points[k + self.lift.shift]) for k in (0, 1))
-        return [by[0] * value for value in here], [by[1] * value for value in there]
+        at_point, at_image = (self._values(points[k], points[k + self.lift.shift]) for k in (0, 1))
+        return [by[0] * value for value in at_point], [by[1] * value for value in at_image]
 
 
 def two_point_spaces(map_: ModularMap, lift: TwoPointBasis) -> list[DarbouxSpace]:
-    """The spaces of functions with a common cofactor; of rank 2 the space of all functions that are in relations."""
-    lifted = TwoPointMap(map_, lift)
+    """Find the spaces of functions with a common cofactor; for rank 2 the space of all functions in relations."""
+    two_point_map = TwoPointMap(map_, lift)
     if lift.rank == 1:
-        return darboux_spaces(lifted, TWO_POINT_DEGREE) or []
-    span = span_of_relations(lifted, TWO_POINT_DEGREE)
-    if len(span) - relations_on_orbit(lifted, TWO_POINT_DEGREE).dimension != lift.rank:
+        return darboux_spaces(two_point_map, TWO_POINT_DEGREE) or []
+    span = span_of_relations(two_point_map, TWO_POINT_DEGREE)
+    if len(span) - relations_on_orbit(two_point_map, TWO_POINT_DEGREE).dimension != lift.rank:
         return []
     return [DarbouxSpace.spanned_by(map_.dim, TWO_POINT_DEGREE, span, map_.prime)]
 
@@ -434,12 +438,12 @@ def two_point_spaces(map_: ModularMap, lift: TwoPointBasis) -> list[DarbouxSpace
 def bases_with_spaces(
     map_: ModularMap, lifts: Sequence[TwoPointBasis] = TWO_POINT_BASES
 ) -> list[tuple[TwoPointBasis, list[DarbouxSpace]]]:
-    """The lifts that have spaces, with these: of rank 1 or, where there are none, of rank 2."""
-    found = []
+    """Return the bases of forms that have spaces, with the spaces: of rank 1 or, if there are none, of rank 2."""
+    pairs = []
     for lift in lifts:
-        for one in (lift, lift._replace(rank=2)):
-            spaces = two_point_spaces(map_, one)
+        for candidate in (lift, lift._replace(rank=2)):
+            spaces = two_point_spaces(map_, candidate)
             if spaces:
-                found.append((one, spaces))
+                pairs.append((candidate, spaces))
                 break
-    return found
+    return pairs

@@ -1,8 +1,8 @@
-"""Casimirs of a tensor that are functions of known integrals: products of powers, polynomials, Moebius functions.
+"""Candidates for Casimirs of a tensor among functions of known integrals: products of powers, polynomials, quotients.
 
-C is a Casimir if P grad C = 0. For C = prod I^k that is sum k_i P grad I_i / I_i = 0, for a polynomial a sum of
-multiples of the P grad I_i: equations at random points modulo a prime, linear in the exponents k or the coefficients,
-which may contain eps and the symbols. What comes out is to be put to the proof.
+C is a Casimir if P grad C = 0. For C = prod I_i^k_i this says sum k_i P grad I_i / I_i = 0; for a polynomial in the I_i
+it is a linear relation among multiples of the P grad I_i. At random points modulo a prime these are linear equations
+for the exponents k or the coefficients, which may contain eps and the symbols. The candidates are still to be verified.
 """
 
 from __future__ import annotations
@@ -27,58 +27,58 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral
 
 _DEGREE = 2  # of polynomials in the integrals
-_MOST_TERMS = 40  # of these
-_HIGHEST = 12  # exponent of a product
-_BUDGET = 200_000  # products of terms, for writing a candidate out
+_MAX_TERMS = 40  # of these polynomials
+_MAX_EXPONENT = 12  # in a product of powers
+_BUDGET = 200_000  # products of terms, to expand a candidate
 _SPARE = 4
 
 
 def casimir_candidates(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[tuple[str, RationalFunction]]:
-    """Functions of the integrals that may be Casimirs, as text in their names and written out.
+    """Yield functions of the integrals that may be Casimirs, each as text in their names and as an expanded function.
 
     Args:
         laboratory: the maps.
-        tensor: one that the map preserves.
-        integrals: known ones, by their names.
-        budget: for the coefficients of polynomials.
+        tensor: a tensor that the map preserves.
+        integrals: the known integrals.
+        budget: the work for the coefficients of polynomials.
 
     Yields:
-        Products of powers, polynomials of degree 2 at most, then quotients of affine functions: right modulo a prime.
-        Functions of single Casimirs may be among them.
+        Products of powers, polynomials of degree at most 2, then quotients of affine functions. They are Casimirs
+        modulo a prime; functions of single Casimirs may be among them.
     """
-    names = [one.name for one in integrals]
+    names = [integral.name for integral in integrals]
     if set(names) & {*laboratory.symbols, "eps"}:
         return
     field = FunctionField(laboratory.map.names, _BUDGET)
-    written = [Function(field, one.function.numerator, one.function.denominator) for one in integrals]
+    functions = [Function(field, I.function.numerator, I.function.denominator) for I in integrals]
     context = ring((*names, *laboratory.symbols, "eps"))
     try:
-        found = [
+        candidates = [
             *_products(laboratory.maps[0], tensor, integrals, context),
             *_polynomials(laboratory, tensor, integrals, budget),
             *_fractions(laboratory, tensor, integrals, budget),
         ]
     except NoPoint:
         return
-    for one in found:
+    for candidate in candidates:
         try:
-            place = [*written, *field.variables[laboratory.map.dim :]]
-            value = evaluate(one.numerator, field, place) / evaluate(one.denominator, field, place)
+            arguments = [*functions, *field.variables[laboratory.map.dim :]]
+            value = evaluate(candidate.numerator, field, arguments) / evaluate(candidate.denominator, field, arguments)
         except BudgetExceeded:
             continue
-        yield format_rational_function(one), RationalFunction.reduced(value.above, value.below)
+        yield format_rational_function(candidate), RationalFunction.reduced(value.numerator, value.denominator)
 
 
 def _products(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], context: fmpq_mpoly_ctx
 ) -> Iterator[RationalFunction]:
-    """The products of powers of at least two integrals, short ones, whose gradients the tensor kills."""
+    """Yield the products of powers of at least two integrals that are Casimirs."""
     p, rows = map_.prime, list[list[int]]()
     for _ in range(_SPARE + len(integrals)):
-        values, moved = _moved(map_, tensor, integrals)
-        columns = [[c * pow(I, -1, p) % p for c in v] for I, v in zip(values, moved, strict=True)]
+        values, fields = _hamiltonian_fields(map_, tensor, integrals)
+        columns = [[c * pow(I, -1, p) % p for c in v] for I, v in zip(values, fields, strict=True)]
         rows += [list(row) for row in zip(*columns, strict=True)]
     for vector in null_space(rows, len(integrals), p):
         exponents = rational_vector(vector, p)
@@ -86,7 +86,7 @@ def _products(
             continue
         common = lcm(*(int(e.q) for e in exponents))
         powers = [int(e * common) for e in exponents]
-        if sum(e != 0 for e in powers) > 1 and max(map(abs, powers)) <= _HIGHEST:
+        if sum(e != 0 for e in powers) > 1 and max(map(abs, powers)) <= _MAX_EXPONENT:
             numerator, denominator = (
                 prod(
                     (I ** max(0, sign * e) for I, e in zip(context.gens(), powers, strict=False)),
@@ -100,12 +100,12 @@ def _products(
 def _polynomials(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
-    """A basis of the polynomials of degree at most 2 in the integrals whose gradients the tensor kills."""
-    degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MOST_TERMS else 1
+    """Yield a basis of the polynomials of degree at most 2 in the integrals that are Casimirs."""
+    degree = _DEGREE if comb(len(integrals) + _DEGREE, _DEGREE) <= _MAX_TERMS else 1
     powers = exponents_up_to(len(integrals), degree)[1:]
 
-    def columns(values: list[int], moved: list[list[int]], p: int) -> list[list[int]]:
-        found = []
+    def columns(values: list[int], fields: list[list[int]], p: int) -> list[list[int]]:
+        rows = []
         for exponents in powers:
             weights = [
                 e * prod(pow(I, k - (i == j), p) for j, (I, k) in enumerate(zip(values, exponents, strict=True)) if k)
@@ -113,8 +113,8 @@ def _polynomials(
                 else 0
                 for i, e in enumerate(exponents)
             ]
-            found.append([sum(w * v for w, v in zip(weights, row, strict=True)) for row in zip(*moved, strict=True)])
-        return found
+            rows.append([sum(w * v for w, v in zip(weights, row, strict=True)) for row in zip(*fields, strict=True)])
+        return rows
 
     for P in _forms(laboratory, tensor, integrals, powers, columns, budget):
         if degree_in(P, len(integrals)) > 1 or len(P) > 1:
@@ -124,19 +124,19 @@ def _polynomials(
 def _fractions(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> Iterator[RationalFunction]:
-    """Quotients of affine functions of the integrals whose gradients the tensor kills.
+    """Yield quotients of affine functions of the integrals that are Casimirs.
 
-    With J = (1, I_1, ...) the gradient of (u.J)/(v.J) is killed if sum w_ab (J_a P grad J_b - J_b P grad J_a) = 0 for
+    With J = (1, I_1, ...) the quotient (u.J)/(v.J) is a Casimir if sum w_ab (J_a P grad J_b - J_b P grad J_a) = 0 for
     w = u ^ v: linear equations for w. Any two independent rows of w are combinations of u and v.
     """
     count = len(integrals)
-    if comb(count + 2, 2) > _MOST_TERMS:
+    if comb(count + 2, 2) > _MAX_TERMS:
         return
     pairs = list(combinations(range(count + 1), 2))
     powers = [tuple(int(k in (a - 1, b - 1)) for k in range(count)) for a, b in pairs]
 
-    def columns(values: list[int], moved: list[list[int]], p: int) -> list[list[int]]:
-        J, P = [1, *values], [[0] * len(moved[0]), *moved]
+    def columns(values: list[int], fields: list[list[int]], p: int) -> list[list[int]]:
+        J, P = [1, *values], [[0] * len(fields[0]), *fields]
         return [[J[a] * y - J[b] * x for x, y in zip(P[a], P[b], strict=True)] for a, b in pairs]
 
     for form in _forms(laboratory, tensor, integrals, powers, columns, budget):
@@ -161,44 +161,49 @@ def _forms(
     columns: Callable[[list[int], list[list[int]], int], list[list[int]]],
     budget: Budget,
 ) -> Sequence[fmpq_mpoly]:
-    """The relations among columns, one for each of the monomials `powers` in the integrals, as combinations of these.
+    """Interpolate the linear relations among columns, as polynomials in the integrals with the monomials `powers`.
 
-    `columns` makes them from what `_moved` gives at a point, and a prime. Coefficients may contain eps and the symbols.
+    `columns` computes one column for each monomial from the result of `_hamiltonian_fields` at a point, and a prime.
+    Coefficients of the relations may contain eps and the symbols.
     """
     count, degree = len(integrals), max(map(sum, powers))
-    every = exponents_up_to(count, degree)
-    places = [every.index(exponents) for exponents in powers]
+    all_exponents = exponents_up_to(count, degree)
+    places = [all_exponents.index(exponents) for exponents in powers]
 
     def space(map_: ModularMap) -> DarbouxSpace:
         p, rows = map_.prime, list[list[int]]()
         for _ in range(_SPARE + len(powers)):
-            found = columns(*_moved(map_, tensor, integrals), p)
-            rows += [[entry % p for entry in row] for row in zip(*found, strict=True)]
+            at_point = columns(*_hamiltonian_fields(map_, tensor, integrals), p)
+            rows += [[entry % p for entry in row] for row in zip(*at_point, strict=True)]
         return DarbouxSpace.spanned_by(count, degree, null_space(rows, len(powers), p), p, places)
 
     model = space(laboratory.maps[0])
     if not model.basis:
         return ()
     eps_enters = "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not"
-    names = [one.name for one in integrals]
+    names = [integral.name for integral in integrals]
     forms = laboratory.formulas([model], lambda map_: [space(map_)], budget, names, eps_enters)
     return forms.bases[0] if forms.bases is not None else ()
 
 
-def _moved(
+def _hamiltonian_fields(
     map_: ModularMap, tensor: MatrixPoissonTensor, integrals: Sequence[FoundIntegral]
 ) -> tuple[list[int], list[list[int]]]:
-    """The values of the integrals at a random point, and P times their gradients. Raises NoPoint at a pole or zero."""
+    """Return the values of the integrals at a random point, and P times their gradients.
+
+    Raises NoPoint where a value is 0 or does not exist.
+    """
     field = GF(map_.prime)
     x = [field.convert(c) for c in (*map_.random_point(), *map_.values)]
     eps = field.convert(map_.eps)
     P = tensor.value(field, eps, tuple(x))
-    values, moved = [], []
-    for one in integrals:
-        value, denominator = one.function.value(field, [*x, eps]), evaluate(one.function.denominator, field, [*x, eps])
+    values, fields = [], []
+    for integral in integrals:
+        function = integral.function
+        value, denominator = function.value(field, [*x, eps]), evaluate(function.denominator, field, [*x, eps])
         if P is None or value is None or value == 0:
-            raise NoPoint("an integral or the tensor has no value other than 0 at a random point modulo a prime")
-        column = (P * field.column(slopes(one.function, field, [*x, eps], map_.dim))).entries()
+            raise NoPoint("an integral or the tensor is 0 or infinite at a random point modulo a prime")
+        column = (P * field.column(slopes(function, field, [*x, eps], map_.dim))).entries()
         values.append(int(value))
-        moved.append([int(entry / (denominator * denominator)) for entry in column])
-    return values, moved
+        fields.append([int(entry / (denominator * denominator)) for entry in column])
+    return values, fields

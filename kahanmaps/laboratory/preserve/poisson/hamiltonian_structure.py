@@ -1,20 +1,20 @@
-"""All ways in which a quadratic system is Hamiltonian with a constant structure, f = J grad H, J skew: exactly, over Q.
+"""Hamiltonian structures of a quadratic system with a constant matrix: f = J grad H with skew J, exactly, over Q.
 
-With K = J^{-1} this means that K f is a gradient, so that K f'(x) is symmetric for all x: linear equations for K. A
-degenerate J has a kernel, whose vectors v give affine integrals v . x: the search is linear as well if the kernel is to
-be all of them. Then with (y, z) = T x, z the integrals, f_y = K^{-1} grad_y H with z as parameters.
+With K = J^{-1} the condition is that K f is a gradient, so that K f'(x) is symmetric for all x: linear equations for K.
+A degenerate J has a kernel, and its vectors v give affine integrals v . x. If the kernel consists of all affine
+integrals, the equations are linear as well: with coordinates (y, z) = T x, where z are the integrals, they say
+f_y = K^{-1} grad_y H with z as parameters.
 
-By cmoq-2013 the Kahan map of such a system conserves modified H = H + (2 eps/3) grad H^T (I - eps f')^{-1} f and has
-the invariant measure dx/det(I - eps f'), for every eps. All integrals that it has by theorems, and how many of them are
-independent:
+By cmoq-2013 the Kahan map of such a system conserves the modified Hamiltonian
+H + (2 eps/3) grad H^T (I - eps f')^{-1} f and has the invariant measure dx/det(I - eps f'), for every eps.
+`inherited_integrals` collects all integrals that a Kahan map has by theorems:
 
     v . x                              for every v with v . f = 0;
-    H + grad H . (x~ - x)/3            for every constant skew K with K f_y = grad_y H, in coordinates (y, z) with these
-                                       integrals z.
+    H + grad H . (x~ - x)/3            for every constant skew K with K f_y = grad_y H, in coordinates (y, z) as above.
 
-K need not be invertible: for an invertible one f = J grad H with J = K^{-1} (cmoq-2013); the proof for any K is in
-docs/mathematics.md. Forms and functions are exact. The gradients are taken at a point modulo a prime: a rank that is
-found there is not larger than the number of independent integrals.
+K need not be invertible. For invertible K, f = J grad H with J = K^{-1} (cmoq-2013); the proof for any K is in
+docs/mathematics.md. Forms and functions are exact. The rank of the gradients is computed at a point modulo a prime: it
+is a lower bound of the number of independent integrals.
 """
 
 from __future__ import annotations
@@ -45,17 +45,17 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
 MAX_DIMENSION = 30  # n (n - 1)/2 unknowns: a few seconds for 435 of them
-_GRID = 2000  # points at which a Pfaffian is shown to vanish identically
+_MAX_GRID = 2000  # points at which a Pfaffian must vanish to be identically 0
 
 
 @dataclass(frozen=True, eq=False)
 class ConstantStructures(PrintableResult):
-    """What `constant_structures` found; every form, function and matrix is exact.
+    """The result of `constant_structures`; every form, function and matrix is exact.
 
-    forms: a basis of the skew K for which K f is a gradient (invertible or not), of coprime integers.
-    functions: for each of them the H of degree at most 3 with grad H = K f and H(0) = 0, conserved by the flow.
-    hamiltonian: H and J with f = J grad H, if there are any; `casimirs` span the kernel of J.
-    reason: why there is no hamiltonian, else empty; `proved` tells whether that is proved.
+    forms: a basis of the skew K for which K f is a gradient (invertible or not), with coprime integer entries.
+    functions: for each form the H of degree at most 3 with grad H = K f and H(0) = 0; the flow conserves it.
+    hamiltonian: H and J with f = J grad H, if there are any; the gradients of `casimirs` span the kernel of J.
+    reason: why `hamiltonian` is None, else empty; `proved` says whether its absence is proved.
     """
 
     system: QuadraticSystem
@@ -67,7 +67,7 @@ class ConstantStructures(PrintableResult):
     proved: bool
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each form K, with the function that the flow conserves."""
+        """Return one row for each form K, with the function that the flow conserves."""
         pairs = zip(self.forms, self.functions, strict=True)
         return [{"K": str(plain(K)), "function": format_polynomial(H)} for K, H in pairs]
 
@@ -77,24 +77,24 @@ class ConstantStructures(PrintableResult):
 
 
 def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructures:
-    """All constant skew K with K f a gradient, and a Hamiltonian form f = J grad H with constant skew J.
+    """Find all constant skew K with K f a gradient, and a Hamiltonian form f = J grad H with constant skew J.
 
     Args:
         system: a quadratic system over Q, of dimension at most 30.
-        seed: decides which combinations of the forms are tried, where many would do.
+        seed: the random seed; it selects the combination of forms if several are possible.
 
     Returns:
-        A `ConstantStructures`. J = [[0, I], [-I, 0]] is preferred, then other invertible J of few terms, then a J
-        whose kernel is all affine integrals. A J with a kernel in between is not looked for.
+        A `ConstantStructures`. J = [[0, I], [-I, 0]] is preferred, then another invertible J of few terms, then a J
+        whose kernel is the space of all affine integrals. A kernel that is a proper subspace of it is not tried.
 
     Raises:
         InputError: for a dimension above 30.
 
-    >>> found = constant_structures(QuadraticSystem.from_text(["q", "p"], ["2*p", "-2*q^2"]))
-    >>> found.hamiltonian.H, found.hamiltonian.is_standard
+    >>> structures = constant_structures(QuadraticSystem.from_text(["q", "p"], ["2*p", "-2*q^2"]))
+    >>> structures.hamiltonian.H, structures.hamiltonian.is_standard
     (2/3*q^3 + p^2, True)
-    >>> found = constant_structures(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"]))
-    >>> found.hamiltonian is None, found.reason
+    >>> structures = constant_structures(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"]))
+    >>> structures.hamiltonian is None, structures.reason
     (True, 'the dimension is odd and there is no affine integral')
     """
     system = as_system(system)
@@ -104,15 +104,15 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
             f"found a system of dimension {n}, expected at most {MAX_DIMENSION}: the structure has n (n - 1)/2 unknowns"
         )
     rng = random.Random(f"structure {derive_seed(seed, system.rhs)}")
-    everything = quotient_by((), n)
-    forms = closed_forms(system, everything, rng)
-    functions = tuple(hamiltonian_function(system, everything, K) for K in forms)
+    all_variables = quotient_by((), n)
+    forms = closed_forms(system, all_variables, rng)
+    functions = tuple(hamiltonian_function(system, all_variables, K) for K in forms)
     integrals = affine_integrals(system)
     reason, proved = "the dimension is odd", True
     if n % 2 == 0:
         K, proved = _invertible(forms, n, rng)
         if K is not None:
-            return ConstantStructures(system, forms, functions, _hamiltonian(system, everything, K), (), "", True)
+            return ConstantStructures(system, forms, functions, _hamiltonian(system, all_variables, K), (), "", True)
         reason = "no skew K with K f a gradient is invertible" if forms else "no skew K makes K f a gradient"
         if not proved:
             reason = "a random skew K with K f a gradient is singular"
@@ -121,7 +121,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
     elif (n - len(integrals)) % 2:
         reason += f", and the {counted(len(integrals), 'affine integral')} would give J a kernel of dimension "
         reason += f"{len(integrals)}, impossible for a skew {n} x {n} matrix"
-        # For one integral the kernel is this or zero; of more integrals there are subspaces that were not tried.
+        # With one integral the kernel is its span or 0; with more there are proper subspaces, which are not tried.
         proved = proved and len(integrals) == 1
     else:
         quotient = quotient_by(integrals, n)
@@ -132,18 +132,18 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
             casimirs = linear_combinations(rows, ring(system.variables).gens())
             return ConstantStructures(system, forms, functions, H, casimirs, "", True)
         reason += ", and none has the affine integrals as its kernel"
-        # Of two integrals in even dimension the kernel is both or none; of three there are lines, which were not tried.
+        # With two integrals and even n the kernel is the whole span or 0; with three it may be a line, not tried.
         proved = proved and decided and len(integrals) <= 2
     return ConstantStructures(system, forms, functions, None, (), reason, proved)
 
 
 def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.Random) -> tuple[fmpq_mat, ...]:
-    """A basis of the skew K for which K f_y is a gradient with respect to the coordinates y of the quotient."""
+    """Return a basis of the skew K for which K f_y is a gradient with respect to the coordinates y of the quotient."""
     m, n = len(quotient.free), system.dim
     count_work(n**4 + 5 * n**3)
     local = system.over(QQ)
     units = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
-    # The symmetry at one random point leaves few forms; then at the origin and in each direction.
+    # K f'(x) must be symmetric. One random point first, since it leaves few forms; then the origin and each direction.
     parts = [local.jacobian([fmpq(rng.randint(-99, 99)) for _ in range(n)]), local.B]
     parts += [local.hessian_times(unit) for unit in units]
     pairs = [(i, j) for i in range(m) for j in range(i + 1, m)]
@@ -160,13 +160,13 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
     return tuple(_skew(m, dict(zip(pairs, row, strict=True))) for row in rows)
 
 
-def _skew(m: int, above: Mapping[tuple[int, int], int | fmpz]) -> fmpq_mat:
-    """The skew matrix with these entries above the diagonal, and zeros."""
-    return fmpq_mat(m, m, [above.get((a, b), 0) - above.get((b, a), 0) for a in range(m) for b in range(m)])
+def _skew(m: int, upper: Mapping[tuple[int, int], int | fmpz]) -> fmpq_mat:
+    """Return the skew matrix with these entries in the upper triangle, zero elsewhere."""
+    return fmpq_mat(m, m, [upper.get((a, b), 0) - upper.get((b, a), 0) for a in range(m) for b in range(m)])
 
 
 def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> CubicHamiltonian:
-    """The system as J grad H with J = S K^{-1} S^T, scaled to coprime integers, the first of them positive."""
+    """Write the system as J grad H with J = S K^{-1} S^T, scaled to coprime integers, the first one positive."""
     J = quotient.section * K.inv() * quotient.section.transpose()
     entries = tuple(J.entries())
     factor = next(
@@ -176,9 +176,10 @@ def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) 
 
 
 def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> fmpq_mpoly:
-    """The H with grad_y H = K f_y that vanishes for y = 0: the integral of y . K f_y from x - S y, where y = 0, to x.
+    """Return the H with grad_y H = K f_y and H = 0 for y = 0.
 
-    The integrand is a polynomial of degree 2 in the parameter, so Simpson's rule is exact.
+    It is the integral of y . K f_y along the segment from x - S y, where y = 0, to x. The integrand is a polynomial of
+    degree 2 in the parameter, so Simpson's rule is exact.
     """
     context = ring(system.variables)
     gens = context.gens()
@@ -196,7 +197,10 @@ def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fm
 
 
 def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[fmpq_mat | None, bool]:
-    """A simple invertible combination of skew m x m matrices, m even; or None, and whether that is proved."""
+    """Find a simple invertible combination of skew m x m matrices, m even.
+
+    Returns the matrix, or None if there is none, and whether the answer is proved.
+    """
     if m == 0:
         return fmpq_mat(0, 0), True
     if not forms:
@@ -210,22 +214,23 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
     for _ in range(3):
         generic = combination_of([rng.randrange(field.characteristic) for _ in modular], modular)
         if int(generic.det()):
-            # Simple combinations first. Random small integers end it: the Pfaffian is a polynomial that is not zero.
+            # Simple combinations first. The search ends, since the Pfaffian is a nonzero polynomial and random integers
+            # of growing size come last.
             n = len(forms)
-            random_ones = ([rng.randint(-(size // 10), size // 10) for _ in range(n)] for size in count(10))
-            small = chain([[int(j == i) for j in range(n)] for i in range(n)], [[1] * n], random_ones)
-            return next(K for K in (combination_of(c, forms) for c in small) if K.det() != 0), True
+            random_weights = ([rng.randint(-(size // 10), size // 10) for _ in range(n)] for size in count(10))
+            weights = chain([[int(j == i) for j in range(n)] for i in range(n)], [[1] * n], random_weights)
+            return next(K for K in (combination_of(c, forms) for c in weights) if K.det() != 0), True
     degrees = range(m // 2 + 1)
-    if len(degrees) ** len(forms) > _GRID:
+    if len(degrees) ** len(forms) > _MAX_GRID:
         return None, False
-    # A polynomial of degree at most m/2 in each variable that vanishes on this grid is zero.
+    # The Pfaffian has degree at most m/2 in each coefficient: if it vanishes on this grid, it is 0.
     grid = (combination_of(coefficients, forms) for coefficients in product(degrees, repeat=len(forms)))
     return next((K for K in grid if K.det() != 0), None), True
 
 
 @dataclass(frozen=True, eq=False)
 class InheritedIntegrals:
-    """What `inherited_integrals` found: the affine integrals are in `quotient`, the K with respect to y are `forms`."""
+    """The result of `inherited_integrals`: the affine integrals in `quotient`, and the K with respect to y, `forms`."""
 
     system: QuadraticSystem
     quotient: QuotientForms
@@ -233,15 +238,16 @@ class InheritedIntegrals:
 
     @property
     def text(self) -> str:
-        """What there is, in words; empty where there is nothing."""
+        """The numbers of integrals as a phrase; empty without any."""
         affine, modified = len(self.quotient.integrals), len(self.forms)
         parts = [counted(affine, "affine integral")] if affine else []
         return " and ".join([*parts, counted(modified, "modified Hamiltonian")] if modified else parts)
 
     def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
-        """Covectors that span those of all these integrals at a point; none where the map has no value there.
+        """Return covectors with the same span as the gradients of all these integrals at a point.
 
-        `map_` is that of the system modulo a prime that divides none of its denominators.
+        `map_` is the map of the system modulo a prime that divides none of its denominators. At an indeterminacy point
+        of the map only the affine integrals are included.
         """
         assert isinstance(map_.map, KahanMap)
         field, n, free = GF(map_.prime), map_.dim, self.quotient.free
@@ -249,21 +255,21 @@ class InheritedIntegrals:
         image = map_.step(x)
         if image is None or not self.forms:
             return rows
-        here, there = ([field.convert(c) for c in point] for point in (x, image))
+        point, image_point = ([field.convert(c) for c in coordinates] for coordinates in (x, image))
         S, local = field.convert_matrix(self.quotient.section), map_.map.local
-        A, A_there = (
+        A, A_image = (
             field.matrix(len(free), len(free), [slopes[i, j] for i in free for j in range(len(free))])
-            for slopes in (local.jacobian(point) * S for point in (here, there))
+            for slopes in (local.jacobian(at) * S for at in (point, image_point))
         )
-        one, eps = field.identity(len(free)), field.convert(map_.eps)
-        f = local.value(here)
+        identity, eps = field.identity(len(free)), field.convert(map_.eps)
+        f = local.value(point)
         f_y = field.column([f[i] for i in free])
-        u = field.column([there[i] - here[i] for i in free])
-        change = (one - A * eps).inv() * (one + A_there * eps) - one  # du/dy
+        u = field.column([image_point[i] - point[i] for i in free])
+        du_dy = (identity - A * eps).inv() * (identity + A_image * eps) - identity
         third = field.convert(fmpq(1, 3))
         for form in self.forms:
             K = field.convert_matrix(form)
-            slopes = K * f_y + (K * A * u + change.transpose() * K * f_y) * third
+            slopes = K * f_y + (K * A * u + du_dy.transpose() * K * f_y) * third
             row = [0] * n
             for i, slope in zip(free, slopes.entries(), strict=True):
                 row[i] = int(slope)
@@ -271,33 +277,33 @@ class InheritedIntegrals:
         return rows
 
     def count(self, map_: ModularMap) -> int:
-        """How many of them are independent, at a random point: at least so many integrals the map has."""
+        """Return the rank of their gradients at a random point, a lower bound of the number of integrals of the map."""
         return rank(self.gradients(map_, map_.random_point()), map_.prime)
 
     def hamiltonian(self, k: int) -> fmpq_mpoly:
-        """The H that belongs to the k-th form."""
+        """Return the H that belongs to the k-th form."""
         return hamiltonian_function(self.system, self.quotient, self.forms[k])
 
     def modified(self, k: int, field: Field, eps: Any, x: tuple[Any, ...]) -> Any:
-        """The integral that belongs to the k-th form, at a point over a field."""
+        """Evaluate the modified Hamiltonian of the k-th form at a point over a field."""
         H = self.hamiltonian(k)
         slopes = [H.derivative(i) for i in range(self.system.dim)]
         return modified(H, slopes, KahanFamily(self.system).at(eps, field), x)
 
 
 def inherited_integrals(system: QuadraticSystem, *, seed: int = 0) -> InheritedIntegrals:
-    """The integrals that a Kahan map has for every eps because the flow is what it is; all exact.
+    """Find the integrals that a Kahan map inherits from the flow for every eps, by theorems; all exact.
 
     Args:
         system: a quadratic system over Q.
-        seed: decides a random point at which the linear equations for K are reduced first.
+        seed: the random seed of a point at which the linear equations for K are reduced first.
 
     Returns:
         The `InheritedIntegrals`: all affine ones and, up to dimension 30, a basis of the K. Source: cmoq-2013.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = inherited_integrals(load("volterra_periodic_3").system)
-    >>> found.text, found.hamiltonian(0)
+    >>> inherited = inherited_integrals(load("volterra_periodic_3").system)
+    >>> inherited.text, inherited.hamiltonian(0)
     ('1 affine integral and 1 modified Hamiltonian', x1*x2*x3)
     """
     quotient = quotient_by(affine_integrals(system), system.dim)

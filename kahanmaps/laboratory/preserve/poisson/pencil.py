@@ -1,16 +1,16 @@
-"""The curves P = c Q on which a planar map with the integral P/Q moves: their genus, and the points that all have.
+"""The invariant curves P = c Q of a planar map with the integral P/Q: the genus and the base points of this pencil.
 
-All is computed modulo a prime, where a residue stands for eps, in random projective coordinates. A curve C is the
-component through a random point of the curve of the pencil there: it is irreducible over GF(p), and the point is
-smooth on it, so that it is irreducible over the closure. Where curves of the pencil have several components these are
-a pencil as well, and are taken instead. Two such curves of degree d meet in the base points only, and outside of them
-both are smooth, by Bertini's theorem (hartshorne-1977, III.10). The resultant tells how often they meet in each. Where
-that may be more than the square of the multiplicity m the point is blown up, and so are those infinitely near to it,
-until the curves are apart. Then (hartshorne-1977, V.3)
+The computation runs modulo a prime, with a residue for eps, in random projective coordinates. Take the curve of the
+pencil through a random point, and its component C through this point: C is irreducible over GF(p) and smooth at the
+point, hence irreducible over the algebraic closure. If curves of the pencil have several components, these components
+form a pencil as well, which is used instead. Two such curves of degree d meet in the base points only, and outside of
+the base points both are smooth, by Bertini's theorem (hartshorne-1977, III.10). The resultant gives the intersection
+number at each base point. If it may exceed the square of the multiplicity m, the point is blown up, and so are the
+points infinitely near to it, until the curves are separated. Then (hartshorne-1977, V.3)
 
     sum m_i^2 = d^2,        genus = (d - 1)(d - 2)/2 - sum m_i (m_i - 1)/2.
 
-Nothing is said where the first of these fails, or where primes disagree.
+There is no result if the first equation fails, or if two primes disagree.
 """
 
 from __future__ import annotations
@@ -38,15 +38,16 @@ from kahanmaps.laboratory.singular.jets import modulo
 
 MAX_DEGREE = 12
 _TRIES = 3
-_BITS = 31  # of primes: FLINT's Python cannot sort several factors with larger coefficients
-# Of the degrees of a planar map of infinite order that keeps all curves of a pencil, by genus: diller-favre-2001.
+_BITS = 31  # of primes: python-flint cannot sort factors with larger coefficients
+# The growth of degrees of a planar map of infinite order that preserves each curve of a pencil, by the genus of the
+# curves: diller-favre-2001.
 GROWTH_ON = {0: Growth.LINEAR, 1: Growth.QUADRATIC}
-_Local = dict[tuple[int, int], Any]  # a power series in x, y at a point, its coefficients by exponents
+_Local = dict[tuple[int, int], Any]  # a truncated power series in x, y at a point: coefficients by exponents
 
 
 @dataclass(frozen=True)
 class BasePoints:
-    """How many base points have a multiplicity, and how many of them are infinitely near to others."""
+    """The number of base points of one multiplicity, and how many of them are infinitely near to others."""
 
     multiplicity: int
     count: int
@@ -65,9 +66,10 @@ class BasePoints:
 
 @dataclass(frozen=True)
 class Pencil:
-    """What is measured of the curves I = c of a planar map, for generic c: I is the integral of this name.
+    """The curves I = c of a planar map for generic c (measured), where I is the integral of this name.
 
-    A curve has so many `components`; `degree`, `genus` and `base_points` are those of the pencil of these.
+    `components` is the number of components of a curve; `degree`, `genus` and `base_points` are those of the pencil of
+    components.
     """
 
     integral: str
@@ -78,7 +80,7 @@ class Pencil:
 
     @property
     def text(self) -> str:
-        """All of it in a line."""
+        """One sentence with all numbers."""
         kind = "is" if self.components == 1 else f"has {self.components} components"
         points = ", ".join(points.text for points in self.base_points)
         return (
@@ -87,19 +89,19 @@ class Pencil:
         )
 
     def motion(self, growth: Growth) -> str:
-        """What the map is on these curves, given how its degrees grow; empty where nothing follows.
+        """Return a sentence on the restriction of the map to these curves, given the growth of its degrees.
 
-        An automorphism of a curve of genus 1 is a translation or has finite order.
+        It is empty where nothing follows. An automorphism of a curve of genus 1 is a translation or has finite order.
         """
         if self.genus > 1:
-            return "the map has finite order, for on such a curve there are finitely many automorphisms"
+            return "the map has finite order, since such a curve has only finitely many automorphisms"
         if self.genus == 1 and growth is Growth.QUADRATIC:
-            who = "on it the map" if self.components == 1 else "on each of them an iterate of the map"
-            return f"{who} is a translation, for the degrees grow"
+            where = "on it the map" if self.components == 1 else "on each of them an iterate of the map"
+            return f"{where} is a translation, since the degrees grow"
         return ""
 
-    def against(self, growth: Growth) -> str:
-        """Why the degrees cannot grow so; empty where they can."""
+    def contradiction(self, growth: Growth) -> str:
+        """Return a sentence on why this growth of the degrees is impossible; empty where it is possible."""
         grows = growth in (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
         possible = not grows or growth is GROWTH_ON.get(self.genus)
         return "" if possible else f"{growth} growth is impossible where the generic curve has genus {self.genus}"
@@ -112,30 +114,30 @@ class Pencil:
 def pencil_of(
     name: str, integral: RationalFunction, eps: fmpq | None, *, seed: int = 0, effort: int | Budget = 1
 ) -> Pencil | None:
-    """Genus and base points of the generic curve I = c, measured modulo two primes.
+    """Measure genus and base points of the generic curve I = c, modulo two primes.
 
     Args:
-        name: of the integral.
+        name: the name of the integral.
         integral: a function that is not constant, in two variables and eps.
-        eps: an exact number, or None: then a random residue stands for it.
-        seed: of everything random.
-        effort: 1, or more: each more doubles the work after which it is given up, each less halves it.
+        eps: half the time step, an exact number; None: a random residue replaces it.
+        seed: the random seed.
+        effort: the work before the computation is given up: each step above 1 doubles it, each step below halves it.
 
     Returns:
-        None where the degree is above 12, where the budget was spent, and where anything was not as it has to be.
+        The `Pencil`; None if the degree is above 12, the budget was spent, or a consistency check failed.
 
     Source: docs/mathematics.md.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
-    >>> found = pencil_of("I", parse_rational_function("y^2 - x^3 - x", ["x", "y", "eps"]), None)
-    >>> found.text
+    >>> pencil = pencil_of("I", parse_rational_function("y^2 - x^3 - x", ["x", "y", "eps"]), None)
+    >>> pencil.text
     'the generic curve I = c is of degree 3 and genus 1; base points: 9 of multiplicity 1 (8 infinitely near)'
     """
     if max(degree_in(part, 2) for part in (integral.numerator, integral.denominator)) > MAX_DEGREE:
         return None
     rng = random.Random(f"pencil {derive_seed(seed, integral, eps)}")
     budget = budget_for("invariant curves", effort)
-    found: list[Pencil] = []
+    earlier: list[Pencil] = []
     for _ in range(_TRIES):
         try:
             _require(not budget.is_spent)
@@ -144,14 +146,14 @@ def pencil_of(
             pencil = _Reduced(field, rng, budget).pencil(name, integral, int(residue))
         except (BadPrime, _Unclear):
             continue
-        if pencil in found:
+        if pencil in earlier:
             return pencil
-        found.append(pencil)
+        earlier.append(pencil)
     return None
 
 
 class _Unclear(Exception):
-    """Something is not as it is for generic curves, or the budget was spent."""
+    """The curves are not generic, or the budget was spent."""
 
 
 def _require(condition: bool) -> None:
@@ -168,24 +170,24 @@ class _Reduced:
         self.points: Counter[tuple[int, bool]] = Counter()
 
     def pencil(self, name: str, integral: RationalFunction, eps: int) -> Pencil:
-        """The pencil of the components. Raises BadPrime, _Unclear."""
-        # Homogeneous, both of the same degree, and affine forms put for x, y and z.
+        """Compute the pencil of the components. Raises BadPrime, _Unclear."""
+        # Homogenize P and Q to the same degree and substitute random affine forms for x, y and z.
         x, y = self.ring.gens()
         forms = (modulo(f, self.field) for f in (integral.numerator, integral.denominator))
-        flat = [f.compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
-        top, zero = int(max(f.total_degree() for f in flat)), self.ring.constant(0)
+        at_eps = [f.compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
+        top, zero = int(max(f.total_degree() for f in at_eps)), self.ring.constant(0)
         count_work(500 + 60 * top**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
         X, Y, Z = (
             [line**k for k in range(top + 1)]
             for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
         )
-        P, Q = (sum((X[i] * Y[j] * Z[top - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in flat)
+        P, Q = (sum((X[i] * Y[j] * Z[top - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
         curves = [self._component(P, Q) for _ in range(3)]
         d = int(curves[0].total_degree())
         coefficients = [[int(C[i, j]) for i in range(d + 1) for j in range(d + 1 - i)] for C in curves]
         _require(all(C.total_degree() == d for C in curves) and nmod_mat(coefficients, self.prime).rank() == 2)
-        components, rest = divmod(int(max(P.total_degree(), Q.total_degree()) - P.gcd(Q).total_degree()), d)
-        _require(rest == 0)
+        components, remainder = divmod(int(max(P.total_degree(), Q.total_degree()) - P.gcd(Q).total_degree()), d)
+        _require(remainder == 0)
         self._find_points(curves[0], curves[1], d)
         _require(sum(count * m * m for (m, _), count in self.points.items()) == d * d)
         loss = sum(count * m * (m - 1) // 2 for (m, _), count in self.points.items())
@@ -199,7 +201,7 @@ class _Reduced:
         return self._rng.randrange(1, self.prime)
 
     def _component(self, P: nmod_mpoly, Q: nmod_mpoly) -> nmod_mpoly:
-        """That of the member through a random point on which the point is: irreducible over the closure of GF(p)."""
+        """Return the component through a random point of the curve of the pencil through this point."""
         at = [self._random(), self._random()]
         member = P * int(Q(*at)) - Q * int(P(*at))
         _require(not member.is_zero())
@@ -215,7 +217,7 @@ class _Reduced:
             eliminant[i] = int(c)
         _require(eliminant[-1] != 0)
         for factor, number in nmod_poly(eliminant, self.prime).factor()[1]:
-            if number < 4:  # less than 2^2: simple points, each but the first infinitely near to the one before
+            if number < 4:  # less than 2^2: a chain of simple points, each infinitely near to the one before
                 self._add_simple(int(factor.degree()), int(number), near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
@@ -230,7 +232,7 @@ class _Reduced:
             k = int(common.degree())
             _require(k > 0)
             b = -common[k - 1] / K(k)
-            _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates one point to each a
+            _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates there is one point for each a
             local = [_moved({(i, j): K(int(c)) for (i, j), c in F.terms()}, a, b, int(number)) for F in (C, D)]
             self._resolve(K, local[0], local[1], int(number), exact=True, near=False)
 
@@ -239,9 +241,10 @@ class _Reduced:
         self.points[1, True] += conjugates * (chain - 1)
 
     def _resolve(self, K: Any, f: _Local, g: _Local, most: int, *, exact: bool, near: bool) -> None:
-        """Count a point over K that two curves may share, and those infinitely near to it.
+        """Count a point over K that two curves may share, and the points infinitely near to it.
 
-        The curves meet there at most `most` times, or `exact`ly so often: terms of a higher degree make no difference.
+        The intersection number is at most `most`, or equal to it if `exact`: terms of a higher degree than that are not
+        needed.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())
@@ -255,7 +258,7 @@ class _Reduced:
         self.points[m, near] += K.degree()
         if m * m == most:
             return
-        shear = K(self._random())  # so that x = 0 touches neither curve
+        shear = K(self._random())  # afterwards x = 0 is tangent to neither curve
         f, g = (_sheared(F, shear) for F in (f, g))
         cones = [_polynomial(K, [F.get((m - j, j), K(0)) for j in range(m + 1)]) for F in (f, g)]
         _require(all(cone.degree() == m for cone in cones))
@@ -265,9 +268,9 @@ class _Reduced:
             L = fq_default_ctx(self.prime, K.degree() * k)
             embedded = _embedding(K, L)
             slope = _root(L, [embedded(c) for c in direction.coeffs()])
-            left = (most - m * m) // (k if len(directions) == 1 else 1)
-            blown = [_blown_up({e: embedded(c) for e, c in F.items()}, m, slope, left) for F in (f, g)]
-            self._resolve(L, blown[0], blown[1], left, exact=exact and len(directions) == 1, near=True)
+            bound = (most - m * m) // (k if len(directions) == 1 else 1)
+            blown = [_blown_up({e: embedded(c) for e, c in F.items()}, m, slope, bound) for F in (f, g)]
+            self._resolve(L, blown[0], blown[1], bound, exact=exact and len(directions) == 1, near=True)
 
 
 def _polynomial(K: Any, coefficients: list[Any]) -> Any:
@@ -279,7 +282,7 @@ def _root(K: Any, coefficients: list[Any]) -> Any:
 
 
 def _embedding(K: Any, L: Any) -> Any:
-    """A way to take elements of K into L, which contains it."""
+    """Return an embedding of the finite field K into L."""
     if K.degree() == L.degree():
         return lambda c: c
     gen = _root(L, [L(int(c)) for c in K.modulus().coeffs()])
@@ -288,15 +291,15 @@ def _embedding(K: Any, L: Any) -> Any:
 
 
 def _nonzero(terms: Iterable[tuple[tuple[int, int], Any]]) -> _Local:
-    """The sum of terms, without those that are 0."""
-    found: _Local = {}
+    """Add up terms and drop those that are 0."""
+    total: _Local = {}
     for exponents, c in terms:
-        found[exponents] = found.get(exponents, 0) + c
-    return {exponents: c for exponents, c in found.items() if not c.is_zero()}
+        total[exponents] = total.get(exponents, 0) + c
+    return {exponents: c for exponents, c in total.items() if not c.is_zero()}
 
 
 def _moved(F: _Local, a: Any, b: Any, most: int) -> _Local:
-    """F(x + a, y + b), as all that follows without what is 0 and what is of a degree above `most`."""
+    """Return F(x + a, y + b) without terms of a degree above `most`."""
     return _nonzero(
         ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
         for (i, j), c in F.items()
@@ -306,12 +309,12 @@ def _moved(F: _Local, a: Any, b: Any, most: int) -> _Local:
 
 
 def _sheared(F: _Local, s: Any) -> _Local:
-    """F(x + s y, y)."""
+    """Return F(x + s y, y)."""
     return _nonzero(((i - k, j + k), c * comb(i, k) * s**k) for (i, j), c in F.items() for k in range(i + 1))
 
 
 def _blown_up(F: _Local, m: int, slope: Any, most: int) -> _Local:
-    """F(x, x (y + slope))/x^m, where m is the multiplicity."""
+    """Return F(x, x (y + slope))/x^m, where m is the multiplicity, without terms of a degree above `most`."""
     return _nonzero(
         ((i + j - m, k), c * comb(j, k) * slope ** (j - k))
         for (i, j), c in F.items()

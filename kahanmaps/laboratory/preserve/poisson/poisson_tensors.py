@@ -1,12 +1,12 @@
-"""Poisson tensors that a map preserves, found: skew P(x) with polynomial entries and dPhi P(x) dPhi^T = P(x~).
+"""The search for Poisson tensors that a map preserves: skew P(x) with dPhi P(x) dPhi^T = P(x~), polynomial entries.
 
-At a random point modulo a prime the law is n (n - 1)/2 linear equations for the coefficients of P, so that all P up to
-a degree are one null space. A tensor is written as the polynomial sum P_ij d_i d_j, as bivectors are, with names d_i of
-their own: so its coefficients are lifted to functions of eps and the symbols as those of any polynomial. With a
-function psi for a common denominator it is B = psi P that is found: psi(x~) dPhi B(x) dPhi^T = psi(x) B(x~).
+At a random point modulo a prime this law gives n (n - 1)/2 linear equations for the coefficients of P, so that all P up
+to a degree form one null space. A tensor is represented by the bivector sum P_ij d_i d_j, a polynomial in x and in new
+variables d_i, so that its coefficients are interpolated as functions of eps and the symbols like those of any
+polynomial. With a common denominator psi the unknown is B = psi P: psi(x~) dPhi B(x) dPhi^T = psi(x) B(x~).
 
-The Jacobi identity is not linear in P. Where several tensors are found that satisfy it, one identity with a symbol for
-each of them decides whether all their combinations do.
+The Jacobi identity is not linear in P. If several tensors satisfy it, one identity for their sum, with a symbol as the
+factor of each, decides whether all combinations are Poisson tensors.
 """
 
 from __future__ import annotations
@@ -57,23 +57,22 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 2000
-_MOST_LOGARITHMIC = 16  # the largest dimension in which all monomials of degree 4 in x and d are listed
+_MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
 _SPARE = 8
-_SHOWN = 2000  # characters of the brackets of one tensor
-_MOST_INTEGRALS = 12  # of these all subsets are tried
-_LARGEST_PENCIL = 8  # so many tensors whose combinations are put to the Jacobi identity
+_SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
+_MAX_INTEGRALS = 12  # all subsets of so many integrals are tried for involution
+_MAX_PENCIL = 8  # tensors whose combinations are tested for the Jacobi identity
 
 Exponents = tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class FoundTensor:
-    """A tensor that the map preserves, with the verdict on that, and on the Jacobi identity (`jacobi`).
+    """A tensor that the map preserves, with the verdicts on that and on the Jacobi identity (`jacobi`).
 
-    `rank` is that at random points. Of the integrals that are known, `casimirs` names those whose gradient the tensor
-    kills and, where there are more Casimirs among functions of the integrals, products and polynomials of them, as
-    I1/I2; `in_involution` names as many integrals as there are in involution with each other, `involution` being the
-    verdict on that, None without any.
+    `rank` is the rank at random points. `casimirs` names the known integrals that are Casimirs and, if there are more
+    Casimirs among functions of the integrals, formulas such as I1/I2. `in_involution` names a largest set of integrals
+    in involution with each other; `involution` is the verdict on that, None without any.
     """
 
     name: str
@@ -94,20 +93,20 @@ class FoundTensor:
 
     @property
     def short_text(self) -> str:
-        """The brackets, or how many there are where they would fill pages."""
-        if len(self.text) <= _SHOWN:
+        """The brackets, or their number if they have more than 2000 characters."""
+        if len(self.text) <= _SHOWN_CHARACTERS:
             return self.text
         return f"{counted(len(self.tensor.brackets), 'bracket')} that find-poisson writes out"
 
     @property
     def is_liouville_integrable(self) -> bool:
-        """Whether as many integrals are known to be in involution as the theorem of Liouville asks for."""
+        """Whether enough integrals are known to be in involution for the theorem of Liouville."""
         enough = len(self.in_involution) >= self.tensor.dim - self.rank // 2
         return enough and self.involution is not None and bool(self.involution.holds) and bool(self.jacobi.holds)
 
     @property
     def statement(self) -> str:
-        """What is known of it beside the law, in words."""
+        """The further properties of the tensor as a phrase: rank, Jacobi identity, Casimirs, involution."""
         parts = [f"rank {self.rank}"]
         if self.jacobi.holds:
             parts.append(f"a Poisson tensor ({self.jacobi})")
@@ -143,11 +142,10 @@ class FoundTensor:
 
 @dataclass(frozen=True)
 class PoissonSearch(Search):
-    """What `find_poisson` found: tensors up to `degree`, and why the search ended where it found none.
+    """The result of `find_poisson`: tensors up to `degree`, and the reason if there are none.
 
-    They span all of these, together with products of polynomial integrals and tensors of lower degrees.
-
-    `pencil` is the verdict on all combinations of several tensors being Poisson tensors, None where that was not asked.
+    All tensors up to the degree are combinations of these and of products of polynomial integrals with tensors of lower
+    degree. `pencil` is the verdict on all combinations of several tensors being Poisson tensors, None if not tested.
     """
 
     tensors: tuple[FoundTensor, ...]
@@ -159,7 +157,7 @@ class PoissonSearch(Search):
 
     @property
     def note(self) -> str:
-        """What is to be said of all tensors together; empty where there is nothing."""
+        """A sentence on the compatibility of the tensors; empty where that was not tested."""
         if self.pencil is None:
             return ""
         if self.pencil.holds:
@@ -167,21 +165,21 @@ class PoissonSearch(Search):
         return "not every combination of them is a Poisson tensor"
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each tensor, for `pandas.DataFrame(found.rows())` and the like."""
-        return [{"name": one.name, "brackets": one.text, "verdict": str(one.verdict)} for one in self.tensors]
+        """Return one row for each tensor, e.g. for `pandas.DataFrame(result.rows())`."""
+        return [{"name": P.name, "brackets": P.text, "verdict": str(P.verdict)} for P in self.tensors]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
             **attributes(self, "tensors"),
-            "integrals": {one.name: one.text for one in self.integrals},
+            "integrals": {integral.name: integral.text for integral in self.integrals},
             "degree_tried": self.degree,
             "denominator": None if self.denominator is None else format_rational_function(self.denominator),
             **attributes(self, "pencil", "note", "reason", "primes"),
         }
 
     def toml_section(self) -> str:
-        """The first tensor as a section [poisson], which `check-poisson --tensor` reads; empty where there is none."""
+        """Return the first tensor as a section [poisson], for `check-poisson --tensor`; empty without tensors."""
         if not self.tensors:
             return ""
         return "\n".join([*self.toml_comments, self.tensors[0].tensor.toml_section()])
@@ -200,32 +198,32 @@ def find_poisson(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> PoissonSearch:
-    """All tensors P with polynomial entries of at most a degree that the map of a file preserves.
+    """Search for the tensors P with polynomial entries up to a degree that a map preserves.
 
     Args:
-        system: the map; a system stands for its Kahan map.
-        degree: of the entries in the variables, or of their numerators; by default 3 in dimension 3, and else 2.
-        symbols: names of parameters that formulas are to contain; the others have the values of the file.
-        eps: an exact number, or None for formulas that contain eps.
-        time_step: 2 eps, in its place.
-        denominator: a function of the variables and eps by which the entries are divided; None: where there are no
-            tensors without one, the factors of a density that is a product are tried, if that is little work.
-        integrals: those whose brackets are asked for; None: they are searched, if there is a tensor.
-        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
-        seed: of everything random.
-        progress: is told what is being tried.
+        system: the map; a differential equation stands for its Kahan map.
+        degree: the largest degree of the entries, or of their numerators; by default 3 in dimension 3, otherwise 2.
+        symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
+        eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
+        time_step: the time step 2 eps, instead of eps.
+        denominator: a function of the variables and eps by which the entries are divided. None: no denominator; if
+            there is no such tensor, the factors of a density that is a product are tried, if that is little work.
+        integrals: the integrals whose brackets are computed; None: they are searched for, if there is a tensor.
+        effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
+        seed: the random seed.
+        progress: called with a sentence at each stage of the search.
 
     Returns:
-        A `PoissonSearch`; formulas are exact, proved or supported. What products of polynomial integrals and other
-        tensors span is left out. Finding none up to a degree is measured.
+        A `PoissonSearch`; formulas are exact, proved or supported. Combinations of products of polynomial integrals and
+        other tensors are left out. That there is none up to a degree is measured.
 
     Raises:
         InputError: for unknown symbols, eps = 0, a negative degree, and a denominator that is identically 0 at this
             eps.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = find_poisson(load("lotka_volterra"))
-    >>> [(one.text, str(one.verdict), one.rank) for one in found.tensors]
+    >>> result = find_poisson(load("lotka_volterra"))
+    >>> [(P.text, str(P.verdict), P.rank) for P in result.tensors]
     [('{x,y} = x*y', 'proved', 2)]
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
@@ -234,7 +232,7 @@ def find_poisson(
         raise InputError(f"found the degree {degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed)
     budget = budget_for("Poisson tensors", effort)
-    dim, asked = file.dim, degree
+    dim, requested = file.dim, degree
     pairs = dim * (dim - 1) // 2
     if denominator is not None:
         context = ring(laboratory.map.names)  # with the symbols
@@ -249,22 +247,22 @@ def find_poisson(
             )
     while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree -= 1
-    found: list[FoundTensor] = []
+    tensors: list[FoundTensor] = []
     reason = laboratory.defect
-    cut = f"degrees above {degree} were not tried" if degree < asked else ""
+    cut = f"degrees above {degree} were not tried" if degree < requested else ""
     if pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
     if not reason:
         progress(f"tensors of degree up to {degree}")
-        # Tensors, those of one kind, those over a density, verification, and brackets.
+        # The stages: all tensors; log-canonical ones; tensors over a density; verification; brackets.
         stages = budget.share([3, 1, 2, 2, 3])
         forms, reason = _tensors(laboratory, degree, denominator, next(stages))
         logarithmic, over_density = next(stages), next(stages)
-        if not forms and degree < 2 <= asked and dim <= _MOST_LOGARITHMIC and denominator is None:
+        if not forms and degree < 2 <= requested and dim <= _MAX_LOG_CANONICAL_DIM and denominator is None:
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             forms, _ = _tensors(laboratory, 2, None, logarithmic, log_canonical(dim))
         if not forms and denominator is None:
-            # Over the factors of a known density, each once, with numerators as much higher in degree.
+            # Try the product of the factors of a known density as denominator, and raise the degree by that of it.
             density = None
             with suppress(NoPoint):
                 density = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), over_density)).density
@@ -272,53 +270,53 @@ def find_poisson(
             higher = degree + sum(degree_in(g, dim) for g in factors)
             if factors and pairs * comb(dim + higher, dim) <= _MAX_UNKNOWNS // 2:
                 psi = reduce(lambda a, b: a * b, factors)
-                over = RationalFunction(psi, psi.context().constant(1))
-                forms, _ = _tensors(laboratory, higher, over, over_density)
-                denominator = over if forms else None
-                more = f", and none of degree at most {higher} over {format_rational_function(over)}"
-                reason = "" if forms else reason + more
+                density_denominator = RationalFunction(psi, psi.context().constant(1))
+                forms, _ = _tensors(laboratory, higher, density_denominator, over_density)
+                denominator = density_denominator if forms else None
+                addition = f", and none of degree at most {higher} over {format_rational_function(density_denominator)}"
+                reason = "" if forms else reason + addition
         for k, tensor in enumerate(forms, 1):
             progress(f"verifying tensor {k} of {len(forms)}")
             law = transformation_identity(laboratory.map, tensor, laboratory.eps)
-            # In many dimensions the law is too long to be multiplied out: nothing is spent on it.
+            # In high dimension the law is too long to expand, so no budget is given to it.
             verdict, evidence = _verdict(laboratory, law, budget if dim <= MAX_DIMENSION else Budget(0))
             if not verdict.holds:
                 continue
             jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, laboratory.eps), budget)
             P = _at(tensor, laboratory.maps[0], laboratory.maps[0].random_point())
             rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], laboratory.maps[0].prime)
-            found.append(FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P))
-        if len(found) < len(forms):
+            tensors.append(FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P))
+        if len(tensors) < len(forms):
             reason = "a tensor that was found modulo primes did not pass as an identity"
-        # Poisson tensors first, those of a high rank before others.
-        found.sort(key=lambda one: (not one.jacobi.holds, -one.rank))
-        found = [replace(one, name=f"P{k}" if len(found) > 1 else "P") for k, one in enumerate(found, 1)]
+        # Poisson tensors first, then by descending rank.
+        tensors.sort(key=lambda P: (not P.jacobi.holds, -P.rank))
+        tensors = [replace(P, name=f"P{k}" if len(tensors) > 1 else "P") for k, P in enumerate(tensors, 1)]
     if cut:
         cut = f"{cut}: such tensors have too many coefficients"
-        reason = f"{reason}; {cut}" if reason and not found else cut
+        reason = f"{reason}; {cut}" if reason and not tensors else cut
     pencil = None
-    if 1 < len(found) <= _LARGEST_PENCIL and all(one.jacobi.holds for one in found):
-        identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
+    if 1 < len(tensors) <= _MAX_PENCIL and all(P.jacobi.holds for P in tensors):
+        identity = jacobi_identity(_pencil([P.tensor for P in tensors]), laboratory.eps)
         pencil, _ = _verdict(laboratory, identity, budget)
-    search = PoissonSearch(*laboratory.asked, tuple(found), (), degree, denominator, pencil, reason)
-    if found and integrals is None:
+    search = PoissonSearch(*laboratory.asked, tuple(tensors), (), degree, denominator, pencil, reason)
+    if tensors and integrals is None:
         progress("integrals, for their brackets")
         half = budget.part(0.5)
-        with suppress(KahanmapsError):  # of maps without a search
+        with suppress(KahanmapsError):  # some maps do not support the search for integrals
             integrals = find_integrals(file, symbols=symbols, eps=laboratory.eps, effort=half, seed=seed).integrals
     return with_brackets(search, integrals or (), budget)
 
 
-def with_brackets(found: PoissonSearch, integrals: Sequence[FoundIntegral], budget: Budget) -> PoissonSearch:
-    """The tensors with what is known of their brackets with integrals: Casimirs, and integrals in involution."""
-    tensors = found.tensors
+def with_brackets(result: PoissonSearch, integrals: Sequence[FoundIntegral], budget: Budget) -> PoissonSearch:
+    """Add to each tensor its Casimirs and the integrals in involution, among known integrals."""
+    tensors = result.tensors
     if tensors and integrals:
-        laboratory = Laboratory(found.file, found.symbols, found.eps, found.seed)
-        tensors = tuple(_with_brackets(laboratory, one, integrals, budget) for one in tensors)
+        laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed)
+        tensors = tuple(_with_brackets(laboratory, tensor, integrals, budget) for tensor in tensors)
     if tensors and budget.is_spent:
-        cut = f"not all identities were multiplied out, or all Casimirs sought: {SPENT}"
-        found = replace(found, reason="; ".join(filter(None, [found.reason, cut])))
-    return replace(found, tensors=tensors, integrals=tuple(integrals))
+        cut = f"some identities were not expanded, or some Casimirs not sought: {SPENT}"
+        result = replace(result, reason="; ".join(filter(None, [result.reason, cut])))
+    return replace(result, tensors=tensors, integrals=tuple(integrals))
 
 
 def _tensors(
@@ -328,7 +326,10 @@ def _tensors(
     budget: Budget,
     monomials: frozenset[Exponents] | None = None,
 ) -> tuple[list[MatrixPoissonTensor], str]:
-    """A basis of the tensors over the denominator in closed form, of these monomials, or a reason why there is none."""
+    """Compute a basis of the tensors over the denominator in closed form, on these monomials.
+
+    Returns the tensors and an empty text, or no tensors and the reason.
+    """
     try:
         model, other = (tensor_space(map_, degree, denominator, monomials) for map_ in laboratory.maps)
     except NoPoint as error:
@@ -336,31 +337,31 @@ def _tensors(
     if not model.basis:
         return [], f"no tensor of degree at most {degree} is preserved (measured modulo a prime)"
     if len(other.basis) != len(model.basis):
-        return [], "what was found at one eps was not found at another"
+        return [], "the tensors found at one eps do not exist at another"
     support = frozenset(model.support)
     variables = laboratory.map.variables
     prefix = "d_"
     while any(name.startswith(prefix) for name in variables):
         prefix += "_"
-    names = (*variables, *(prefix + name for name in variables))  # the latter for the directions
+    names = (*variables, *(prefix + name for name in variables))  # x and the d_i
     forms = laboratory.formulas([model], lambda map_: [tensor_space(map_, degree, denominator, support)], budget, names)
     if forms.bases is None:
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
-    # Left out is what products of an integral and a tensor span together with the elements before.
+    # Leave out tensors in the span of the earlier ones and of products of a polynomial integral with a tensor.
     map_, n = laboratory.maps[0], len(variables)
     integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
     places, rows = places_of(2 * n, degree), list[list[int]]()
     for integral in integrals.basis:
         if any(integral[1:]):
-            wide = [0] * len(places)
+            in_x_and_d = [0] * len(places)
             for exponent, c in zip(exponents_up_to(n, degree), integral, strict=True):
-                wide[places[(*exponent, *[0] * n)]] = c
-            products = (product_of(wide, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
+                in_x_and_d[places[(*exponent, *[0] * n)]] = c
+            products = (product_of(in_x_and_d, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
             rows += [P for P in products if P is not None]
-    context, spanned, found = ring(laboratory.map.names), rank(rows, map_.prime), list[MatrixPoissonTensor]()
-    over, times = context.constant(1), context.constant(1)
+    context, spanned, tensors = ring(laboratory.map.names), rank(rows, map_.prime), list[MatrixPoissonTensor]()
+    divisor, multiplier = context.constant(1), context.constant(1)
     if denominator is not None:
-        over, times = denominator.numerator, denominator.denominator
+        divisor, multiplier = denominator.numerator, denominator.denominator
     for vector, bivector in zip(model.basis, forms.bases[0], strict=True):
         rows.append(vector)
         if rank(rows, map_.prime) == spanned:
@@ -370,15 +371,15 @@ def _tensors(
         for monomial, coefficient in bivector.terms():
             pair = tuple(k for k in range(n) if monomial[n + k])
             entries.setdefault(pair, {})[(*monomial[:n], *monomial[2 * n :])] = coefficient
-        upper = {pair: context.from_dict(terms) * times for pair, terms in entries.items()}
+        upper = {pair: context.from_dict(terms) * multiplier for pair, terms in entries.items()}
         zero = context.constant(0)
         matrix = [[upper.get((i, j), zero) - upper.get((j, i), zero) for j in range(n)] for i in range(n)]
-        found.append(MatrixPoissonTensor([[RationalFunction.reduced(P, over) for P in row] for row in matrix]))
-    return found, ""
+        tensors.append(MatrixPoissonTensor([[RationalFunction.reduced(P, divisor) for P in row] for row in matrix]))
+    return tensors, ""
 
 
 def log_canonical(dim: int) -> frozenset[Exponents]:
-    """The monomials x_i x_j d_i d_j, of which brackets {x_i, x_j} = c_ij x_i x_j consist."""
+    """Return the monomials x_i x_j d_i d_j of log-canonical brackets {x_i, x_j} = c_ij x_i x_j."""
     pairs = (tuple(int(k in pair) for k in range(dim)) for pair in combinations(range(dim), 2))
     return frozenset((*pair, *pair) for pair in pairs)
 
@@ -389,14 +390,14 @@ def tensor_space(
     denominator: RationalFunction | None = None,
     support: frozenset[Exponents] | None = None,
 ) -> DarbouxSpace:
-    """All bivectors sum P_ij d_i d_j of degree at most `degree` that the map preserves, modulo its prime.
+    """Compute all bivectors sum P_ij d_i d_j of degree at most `degree` that the map preserves, modulo its prime.
 
-    They are polynomials in x and the directions; the basis may be empty. With a `support` only those of its monomials.
+    They are polynomials in x and the d_i; the basis may be empty. With a `support` only its monomials are used.
     Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
     number, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))
-    unknowns = []  # for each monomial x^a d_i d_j its number among all monomials, that of d_i d_j and of x^a
+    unknowns = []  # for each monomial x^a d_i d_j: its index, the index of the pair (i, j), and that of x^a
     for p, pair in enumerate(pairs):
         directions = tuple(int(k in pair) for k in range(n))
         for m, exponent in enumerate(exponents_up_to(n, degree)):
@@ -404,98 +405,103 @@ def tensor_space(
                 unknowns.append((number[(*exponent, *directions)], p, m))
 
     def factor(x: Point) -> int:
-        """The value of the denominator at a point, 1 without one. Raises NoPoint at its poles, which are everywhere."""
+        """Return the value of the denominator at a point, or 1. Raises NoPoint where its own denominator is 0."""
         if denominator is None:
             return 1
         field = GF(prime)
         value = denominator.value(field, [field.convert(c) for c in (*x, *map_.values, map_.eps)])
         if value is None:
-            raise NoPoint("the denominator has no value at a random point modulo a prime")
+            raise NoPoint("the denominator of the tensor is infinite at a random point modulo a prime")
         return int(value)
 
     by_pair = [sum(p == q for _, q, _ in unknowns) for p in range(len(pairs))]
     rows = []
     for x, image in map_.pairs(max(by_pair, default=0) + _SPARE):
         J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
-        here, there = map_.moved(x, image, degree, (factor(image), factor(x)))
+        monomials, image_monomials = map_.moved(x, image, degree, (factor(image), factor(x)))
         count(30 + 10 * n + len(pairs) * (len(pairs) + len(unknowns) / 5))
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
-            rows.append([minors[p] * here[m] - there[m] if p == row else minors[p] * here[m] for _, p, m in unknowns])
+            rows.append(
+                [
+                    minors[p] * monomials[m] - image_monomials[m] if p == row else minors[p] * monomials[m]
+                    for _, p, m in unknowns
+                ]
+            )
     vectors = null_space(rows, len(unknowns), prime)
     return DarbouxSpace.spanned_by(2 * n, degree + 2, vectors, prime, [place for place, _, _ in unknowns])
 
 
 def _at(tensor: MatrixPoissonTensor, map_: ModularMap, x: Sequence[int]) -> Any:
-    """The matrix of a tensor at a point modulo a prime."""
+    """Return the matrix of a tensor at a point modulo a prime."""
     field = GF(map_.prime)
     return tensor.value(field, field.convert(map_.eps), tuple(field.convert(c) for c in (*x, *map_.values)))
 
 
 def _with_brackets(
-    laboratory: Laboratory, found: FoundTensor, integrals: Sequence[FoundIntegral], budget: Budget
+    laboratory: Laboratory, found_tensor: FoundTensor, integrals: Sequence[FoundIntegral], budget: Budget
 ) -> FoundTensor:
-    """The tensor with its Casimirs, and with the integrals that are in involution."""
-    tensor, map_ = found.tensor, laboratory.maps[0]
-    field, there = GF(map_.prime), Independent(map_)  # the gradients of Casimirs
-    P = _at(tensor, map_, there.point)
-    rows = [there.gradient(one.function) for one in integrals]
+    """Add to the tensor its Casimirs, and the integrals that are in involution."""
+    tensor, map_ = found_tensor.tensor, laboratory.maps[0]
+    field, casimir_gradients = GF(map_.prime), Independent(map_)
+    P = _at(tensor, map_, casimir_gradients.point)
+    rows = [casimir_gradients.gradient(integral.function) for integral in integrals]
     casimirs: list[str] = []
 
     def add_casimir(name: str, function: RationalFunction, row: list[int]) -> None:
-        is_killed = all(entry == 0 for entry in (P * field.column(row)).entries())
-        if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), budget)[0].holds:
+        is_in_kernel = all(entry == 0 for entry in (P * field.column(row)).entries())
+        if is_in_kernel and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), budget)[0].holds:
             casimirs.append(name)
-            there.add(row)
+            casimir_gradients.add(row)
 
-    for one, row in zip(integrals, rows, strict=True):
-        add_casimir(one.name, one.function, row)
-    most = min(tensor.dim - found.rank, rank(rows, map_.prime))
-    if len(there.rows) < most and len(integrals) <= _MOST_INTEGRALS and not budget.is_spent:
+    for integral, row in zip(integrals, rows, strict=True):
+        add_casimir(integral.name, integral.function, row)
+    most = min(tensor.dim - found_tensor.rank, rank(rows, map_.prime))
+    if len(casimir_gradients.rows) < most and len(integrals) <= _MAX_INTEGRALS and not budget.is_spent:
         for name, function in casimir_candidates(laboratory, tensor, integrals, budget):
-            row = there.gradient(function)
-            if len(there.rows) < most and there.adds(row):
+            row = casimir_gradients.gradient(function)
+            if len(casimir_gradients.rows) < most and casimir_gradients.adds(row):
                 add_casimir(name, function, row)
-    # The most of the gradients whose brackets with each other are 0 at the point, the first such choice.
-    moved = [(P * field.column(row)).entries() for row in rows]
-    vanish = [[sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in moved] for row in rows]
-    some = range(min(len(rows), _MOST_INTEGRALS))
-    choices = (choice for size in range(len(some), 0, -1) for choice in combinations(some, size))
+    # The first largest set of integrals whose brackets with each other vanish at the point.
+    fields = [(P * field.column(row)).entries() for row in rows]
+    vanish = [[sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in fields] for row in rows]
+    indices = range(min(len(rows), _MAX_INTEGRALS))
+    choices = (choice for size in range(len(indices), 0, -1) for choice in combinations(indices, size))
     best = next((choice for choice in choices if all(vanish[i][j] for i, j in combinations(choice, 2))), ())
     chosen = [integrals[k] for k in best]
     involution = None
     if chosen:
-        functions = [one.function for one in chosen]
+        functions = [integral.function for integral in chosen]
         involution, _ = _verdict(laboratory, _brackets(laboratory, tensor, functions, False), budget)
-    names = tuple(one.name for one in chosen)
-    return replace(found, casimirs=tuple(casimirs), in_involution=names, involution=involution)
+    names = tuple(integral.name for integral in chosen)
+    return replace(found_tensor, casimirs=tuple(casimirs), in_involution=names, involution=involution)
 
 
 def _verdict(laboratory: Laboratory, identity: Identity, budget: Budget) -> tuple[Certainty, Evidence]:
-    """The verdict on an identity, which is not multiplied out when the budget is spent."""
+    """Certify an identity; it is not expanded if the budget is spent."""
     return certified(identity, laboratory.seed, expands=not budget.is_spent)
 
 
 def _brackets(
     laboratory: Laboratory, tensor: MatrixPoissonTensor, functions: Sequence[RationalFunction], of_variables: bool
 ) -> Identity:
-    """That all brackets of two functions vanish or, `of_variables`, those of a function and a variable."""
+    """Return the identity that the brackets of the functions vanish; `of_variables`: brackets with all variables."""
     n = tensor.dim
 
-    def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides | None:
-        P = tensor.value(field, eps, place)
+    def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
+        P = tensor.value(field, eps, point)
         if P is None:
             return None
         with field.working():
-            columns = [field.column(slopes(one, field, (*place, eps), n)) for one in functions]
-            found: list[Any] = []
+            columns = [field.column(slopes(function, field, (*point, eps), n)) for function in functions]
+            brackets: list[Any] = []
             for k, column in enumerate(columns):
-                moved = P * column
+                hamiltonian_field = P * column
                 if of_variables:
-                    found += moved.entries()
+                    brackets += hamiltonian_field.entries()
                 else:
-                    found += [(columns[j].transpose() * moved)[0, 0] for j in range(k)]
-        return found, [field.zero] * len(found)
+                    brackets += [(columns[j].transpose() * hamiltonian_field)[0, 0] for j in range(k)]
+        return brackets, [field.zero] * len(brackets)
 
     subject = ("brackets", tensor.subject, list(functions), of_variables)
     has_eps = laboratory.map.has_eps or tensor.has_eps
@@ -503,7 +509,7 @@ def _brackets(
 
 
 def _pencil(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
-    """The sum of the tensors, each times a symbol of its own."""
+    """Return the sum of the tensors, each times a symbol of its own."""
     names = tensors[0].rows[0][0].names
     letter = "c"
     while any(name.startswith(letter) for name in names):
@@ -520,4 +526,4 @@ def _pencil(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
         return RationalFunction.reduced(numerator, denominator)
 
     n = tensors[0].dim
-    return MatrixPoissonTensor([[total(one.rows[i][j] for one in tensors) for j in range(n)] for i in range(n)])
+    return MatrixPoissonTensor([[total(P.rows[i][j] for P in tensors) for j in range(n)] for i in range(n)])
