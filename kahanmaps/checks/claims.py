@@ -144,8 +144,13 @@ class Report(Printed):
     def rows(self) -> list[dict[str, str]]:
         """A row for each claim, for `pandas.DataFrame(report.rows())` and the like."""
         return [
-            {"claim": one.claim, "verdict": str(one.verdict), "formula": one.formula, "evidence": one.evidence.summary}
-            for one in self.findings
+            {
+                "claim": finding.claim,
+                "verdict": str(finding.verdict),
+                "formula": finding.formula,
+                "evidence": finding.evidence.summary,
+            }
+            for finding in self.findings
         ]
 
     def to_json(self) -> dict[str, Any]:
@@ -169,8 +174,8 @@ def combined(verdicts: Iterable[Certainty]) -> Certainty:
     >>> combined([Certainty.PROVED, Certainty.SUPPORTED])
     <Certainty.SUPPORTED: 'supported'>
     """
-    found = set(verdicts)
+    distinct = set(verdicts)
     for verdict in (Certainty.REFUTED, Certainty.UNDECIDED, Certainty.SUPPORTED, Certainty.PROVED):
-        if verdict in found:
+        if verdict in distinct:
             return verdict
     return Certainty.UNDECIDED

@@ -53,14 +53,14 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
         if in_iterates is not None:
             points = orbit_about(map_.at(eps_value, field), point, in_iterates.iterates + 1)
-            before, after = (in_iterates.on(field, eps_value, points[k:]) for k in (0, 1))
-            return None if after is None or before is None else ([after], [before])
+            value_before, after = (in_iterates.on(field, eps_value, points[k:]) for k in (0, 1))
+            return None if after is None or value_before is None else ([after], [value_before])
         image = map_.at(eps_value, field).step(point)
-        known = last and last[0] is field and last[1] == eps_value and last[2] == point
-        before = last[3] if known else integral.value(field, eps_value, point)
+        is_cached = last and last[0] is field and last[1] == eps_value and last[2] == point
+        value_before = last[3] if is_cached else integral.value(field, eps_value, point)
         after = integral.value(field, eps_value, image)
         last[:] = [field, eps_value, image, after]
-        return None if after is None or before is None else ([after], [before])
+        return None if after is None or value_before is None else ([after], [value_before])
 
     subject = (map_.subject, integral.subject)
     return Identity(map_.dim, sides, eps, *labels, has_eps=map_.has_eps, root=map_.root, subject=subject)
@@ -68,39 +68,39 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
     """The integrals that a theorem gives for the system: each with its proof and source."""
-    found: list[tuple[PhaseFunction, Evidence | None, str]] = []
+    integrals: list[tuple[PhaseFunction, Evidence | None, str]] = []
     member = file.member
     if member is None:
         if file.hamiltonian is not None:
             proof = theorems.cubic_hamiltonian(file.hamiltonian)
-            found.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
+            integrals.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
             if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
-                found.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
-        return found
+                integrals.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
+        return integrals
     # Modified H in both normalizations, K~_s for every rational associated system, and those of the commutant. Where
     # there are many factors the K~ of several minus signs are combinations of those listed.
     associates = theorems.listed_associates(member)
     base = associates[0]
     proof = theorems.shared_integral(member, base)
-    found += [
+    integrals += [
         (ModifiedHamiltonian(base.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
         (PaperIntegral(base.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
     ]
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
-        found.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
+        integrals.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
     # m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots.
     hamiltonian = member.chosen.hamiltonian
     letter = "H" if all(sign > 0 for sign in member.signs) else "K"
     for k in range(1, member.m):
         commutant = CommutantIntegral(hamiltonian, member.A, k, letter)
         name = "A^T" if k == 1 else f"(A^T)^{k}"
-        found.append((commutant, theorems.commutant_integral(hamiltonian, commutant, name), ""))
-    return found
+        integrals.append((commutant, theorems.commutant_integral(hamiltonian, commutant, name), ""))
+    return integrals
 
 
 def functions_along(
-    file: SystemFile, asked: Sequence[tuple[str, str]], in_floats: bool, taken: Sequence[str] = ()
+    file: SystemFile, requested: Sequence[tuple[str, str]], in_floats: bool, taken: Sequence[str] = ()
 ) -> dict[str, PhaseFunction]:
     """What is watched along orbits, in floats or not, by name, for pairs of a name, which may be empty, and a text.
 
@@ -109,20 +109,20 @@ def functions_along(
     that is `taken` by another column.
     """
     file = file.real_approximation if in_floats else file
-    found: list[PhaseFunction] = []
-    for k, (name, text) in enumerate(asked, start=1):
+    functions: list[PhaseFunction] = []
+    for k, (name, text) in enumerate(requested, start=1):
         if text == "known" and not name:
             claims = {**measured_integrals(file), **file.integrals_in_iterates}
-            known = [integral for integral, _, _ in known_integrals(file)]
-            if not known and not claims:
+            known_functions = [integral for integral, _, _ in known_integrals(file)]
+            if not known_functions and not claims:
                 raise InputError(f"--integral known: no integral of {file.name} is known or claimed")
-            if known and in_floats:
+            if known_functions and in_floats:
                 raise InputError(
                     "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
                 )
-            found += known
-        elif text in (every := {**file.integrals, **file.integrals_in_iterates}):
-            claims = {name or text: every[text]}
+            functions += known_functions
+        elif text in (declared := {**file.integrals, **file.integrals_in_iterates}):
+            claims = {name or text: declared[text]}
         else:
             short = " ".join(text.split()) if len(text) <= 30 else f"I{k}"
             claims = {name or short: claimed_function(file, text)}
@@ -130,13 +130,13 @@ def functions_along(
             raise InputError(
                 f"found {', '.join(moved)} with x~ in it, which needs exact, mod:P or ball:BITS arithmetic, not float"
             )
-        found += [ClaimedFunction(name, function, file.map.root, file.map) for name, function in claims.items()]
-    names = [*taken, *(function.name for function in found)]
+        functions += [ClaimedFunction(name, function, file.map.root, file.map) for name, function in claims.items()]
+    names = [*taken, *(function.name for function in functions)]
     for name in names:
         if names.count(name) > 1:
             kind = "columns" if taken else "integrals"
             raise InputError(f"found two {kind} of the name {name}: write --integral NAME=EXPR")
-    return {function.name: function for function in found}
+    return {function.name: function for function in functions}
 
 
 def check_integrals(
@@ -169,7 +169,9 @@ def check_integrals(
 
     def stated(functions: Mapping[str, RationalFunction]) -> list[tuple[PhaseFunction, Evidence | None, str]]:
         map_ = file.map
-        return [(ClaimedIntegral(k, one, settings.eps, map_.root, map_), None, "") for k, one in functions.items()]
+        return [
+            (ClaimedIntegral(k, function, settings.eps, map_.root, map_), None, "") for k, function in functions.items()
+        ]
 
     candidates = stated(claims)
     if known or extra is None:

@@ -268,8 +268,8 @@ def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, .
     points = []
     for k in range(count):
         height = 1 + k // 10
-        below = 1 if k < count // 2 else 1 + k % 7
-        points.append(tuple(fmpq(rng.randint(-height, height), rng.randint(1, below)) for _ in range(dim)))
+        denominator = 1 if k < count // 2 else 1 + k % 7
+        points.append(tuple(fmpq(rng.randint(-height, height), rng.randint(1, denominator)) for _ in range(dim)))
     return points
 
 
@@ -282,8 +282,8 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
     for k, candidate in enumerate(points):
         at_eps = ground.convert(identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5))
         point = tuple(ground.convert(entry) for entry in candidate)
-        found = identity.at(ground, point, at_eps)
-        witness = witness_of(identity, ground, point, at_eps, found) if found is not None else None
+        sides = identity.at(ground, point, at_eps)
+        witness = witness_of(identity, ground, point, at_eps, sides) if sides is not None else None
         if witness is not None:
             height = max(max(abs(int(entry.p)), int(entry.q)) for entry in candidate)
             where = f"fails at a rational point of height at most {height}, exactly"

@@ -46,13 +46,13 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
         kahan = map_.at(eps_value, field)
         image = _image(kahan, point)
-        after, before = density.value(field, eps_value, image), density.value(field, eps_value, point)
-        if after is None or before is None:
+        density_after, density_before = density.value(field, eps_value, image), density.value(field, eps_value, point)
+        if density_after is None or density_before is None:
             return None
-        above, below = jacobian_determinant_sides(kahan, point, image)
-        if field.is_zero(above) or field.is_zero(below):
+        numerator, denominator = jacobian_determinant_sides(kahan, point, image)
+        if field.is_zero(numerator) or field.is_zero(denominator):
             return None  # where the map has no inverse both sides may vanish, and say nothing of a measure
-        return [after * below], [before * above]
+        return [density_after * denominator], [density_before * numerator]
 
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
     if not isinstance(map_, KahanFamily):
@@ -149,8 +149,8 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
     def sides(field: Field, place: tuple[Any, ...], eps_value: Any) -> Sides | None:
         point, values = place[:n], place[n:]
         local = map_.at(eps_value, field, values)
-        found = transformation_sides(local, tensor, point, _image(local, point), values)
-        return None if found is None else (found[0].entries(), found[1].entries())
+        sides_at_point = transformation_sides(local, tensor, point, _image(local, point), values)
+        return None if sides_at_point is None else (sides_at_point[0].entries(), sides_at_point[1].entries())
 
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
     labels = ("N(x, x~) P(x) N(x, x~)^T", "M(x) P(x~) M(x)^T")

@@ -64,20 +64,22 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     ({'variables': ['x', 'y'], 'system': {'rhs': ['x*y', '-x']}}, [])
     """
     section = document.get("system")
-    given = section.get("rhs") if isinstance(section, dict) else None
-    texts = [given] if isinstance(given, str) else given
+    right_sides = section.get("rhs") if isinstance(section, dict) else None
+    texts = [right_sides] if isinstance(right_sides, str) else right_sides
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
         return dict(document), []
     marks = "=;,[{" if len(texts) == 1 else "=;"  # [x*y, -x] is a list of formulas in one text
-    if isinstance(given, list) and not any(mark in text for text in texts for mark in marks):
+    if isinstance(right_sides, list) and not any(mark in text for text in texts for mark in marks):
         return dict(document), []
     pieces = pieces_of("\n".join(texts))
     notes: list[str] = []
     if any(token in piece for piece in pieces for token in _EQUALS):
         names, parameters = document.get("variables"), document.get("parameters")
-        given = [str(name) for name in names] if isinstance(names, list) else []
-        sides, velocities, notes = read_equations(pieces, given, parameters if isinstance(parameters, dict) else ())
-        variables = list(sides) if names is None else [*given, *(v for v in velocities if v not in given)]
+        right_sides = [str(name) for name in names] if isinstance(names, list) else []
+        sides, velocities, notes = read_equations(
+            pieces, right_sides, parameters if isinstance(parameters, dict) else ()
+        )
+        variables = list(sides) if names is None else [*right_sides, *(v for v in velocities if v not in right_sides)]
         if set(variables) != set(sides):
             raise InputError(f"found equations for {', '.join(sides)}, expected one for each of the variables")
         document = {"variables": variables, **document}
@@ -118,24 +120,29 @@ def pieces_of(text: str) -> list[list[str]]:
 
 def _list_in(tokens: list[str]) -> list[str]:
     """The tokens of a list without the name that it is given, eqs := [x' = y, y' = -x], and what ends it."""
-    words = [k for k, token in enumerate(tokens) if not token.isspace()]
-    while words and tokens[words[-1]] in (";", ":", ","):
-        words.pop()
-    if len(words) > 2 and is_name(tokens[words[0]]) and tokens[words[1]] in ("=", ":=") and tokens[words[2]] in "[{":
-        words = words[2:]
-    return tokens[words[0] : words[-1] + 1] if words else []
+    positions = [k for k, token in enumerate(tokens) if not token.isspace()]
+    while positions and tokens[positions[-1]] in (";", ":", ","):
+        positions.pop()
+    if (
+        len(positions) > 2
+        and is_name(tokens[positions[0]])
+        and tokens[positions[1]] in ("=", ":=")
+        and tokens[positions[2]] in "[{"
+    ):
+        positions = positions[2:]
+    return tokens[positions[0] : positions[-1] + 1] if positions else []
 
 
 def _without_outer_brackets(tokens: list[str]) -> list[str]:
     """The tokens between the brackets of a list, {x' = y, y' = -x}, where there is one around all of them."""
-    places = [k for k, token in enumerate(tokens) if not token.isspace()]
-    if len(places) < 2 or tokens[places[0]] not in _OPEN or tokens[places[-1]] not in _CLOSE:
+    positions = [k for k, token in enumerate(tokens) if not token.isspace()]
+    if len(positions) < 2 or tokens[positions[0]] not in _OPEN or tokens[positions[-1]] not in _CLOSE:
         return tokens
     depth = 0
-    for k in places:
+    for k in positions:
         depth += (tokens[k] in _OPEN) - (tokens[k] in _CLOSE)
         if depth == 0:
-            return tokens[places[0] + 1 : places[-1]] if k == places[-1] else tokens
+            return tokens[positions[0] + 1 : positions[-1]] if k == positions[-1] else tokens
     return tokens
 
 
@@ -159,22 +166,22 @@ def read_equations(
     pieces, notes = _with_plain_names(pieces, parameters)
     orders, formulas = dict[str, int](), dict[str, list[str]]()
     for piece in pieces:
-        places = [k for k, token in enumerate(piece) if token in _EQUALS]
-        left = [token for token in piece[: places[0]] if not token.isspace()] if places else []
-        found = derivative_at(left, 0)
-        if len(places) != 1 or found is None or found.end < len(left):
+        equals_at = [k for k, token in enumerate(piece) if token in _EQUALS]
+        left_side = [token for token in piece[: equals_at[0]] if not token.isspace()] if equals_at else []
+        derivative = derivative_at(left_side, 0)
+        if len(equals_at) != 1 or derivative is None or derivative.end < len(left_side):
             raise InputError(
-                f"found {quoted(_text(piece))}, expected an equation such as {_EXAMPLES}{_hint(left, piece)}"
+                f"found {quoted(_text(piece))}, expected an equation such as {_EXAMPLES}{_hint(left_side, piece)}"
             )
-        if found.order > 2:
+        if derivative.order > 2:
             text = quoted(_text(piece))
             raise InputError(
-                f"found {text}, of order {found.order}, expected order 1 or 2: name the derivatives, "
-                f"{found.name}' = u; u' = v; v' = ..."
+                f"found {text}, of order {derivative.order}, expected order 1 or 2: name the derivatives, "
+                f"{derivative.name}' = u; u' = v; v' = ..."
             )
-        if found.name in orders:
-            raise InputError(f"found two equations for {found.name}, expected one")
-        orders[found.name], formulas[found.name] = found.order, piece[places[0] + 1 :]
+        if derivative.name in orders:
+            raise InputError(f"found two equations for {derivative.name}, expected one")
+        orders[derivative.name], formulas[derivative.name] = derivative.order, piece[equals_at[0] + 1 :]
     velocities = _velocities(orders, variables, {*parameters, *(t for piece in pieces for t in piece)})
     notes += [f"{name}'' is read with a velocity, the variable {v}: {name}' = {v}" for name, v in velocities.items()]
     sides = dict[str, str]()
@@ -197,10 +204,10 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
     if order:
         return _Derivative(first, order, _argument(tokens, end))
     text, last, ends = "", "", dict[int, int]()  # the length of the text up to a token -> the place of the next token
-    for place, token in enumerate(tokens[start : start + _MOST_TOKENS], start + 1):
+    for position, token in enumerate(tokens[start : start + _MOST_TOKENS], start + 1):
         is_apart = (last[-1:].isalnum() or last[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
         text, last = f"{text}{' ' * is_apart}{token}", token
-        ends[len(text)] = place
+        ends[len(text)] = position
     for pattern, order in _WRITTEN:
         match = pattern.match(text)
         if match is not None and match.end() in ends:
@@ -208,14 +215,14 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
     return None
 
 
-def _argument(tokens: Sequence[str], place: int) -> int:
+def _argument(tokens: Sequence[str], position: int) -> int:
     """The place behind (t) or [t], if it stands there, otherwise the same."""
-    return place + 3 if "".join(tokens[place : place + 3]) in ("(t)", "[t]") else place
+    return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 
 def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
     """A right-hand side as text: x(t) as x, and x' as the velocity where there is one."""
-    words = [token for token in tokens if not token.isspace()]
+    tokens_kept = [token for token in tokens if not token.isspace()]
     gaps, blank = list[str](), ""  # what stands before each word: "x y" must not become "xy"
     for token in tokens:
         if token.isspace():
@@ -223,23 +230,27 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
         else:
             gaps.append(blank)
             blank = ""
-    found: list[str] = []
+    formula: list[str] = []
     k = 0
-    while k < len(words):
-        derivative = derivative_at(words, k)
+    while k < len(tokens_kept):
+        derivative = derivative_at(tokens_kept, k)
         # x_dot is the derivative of x, but for a variable that is itself called x_dot.
-        if derivative and derivative.name in orders and (words[k] not in orders or words[k] == derivative.name):
+        if (
+            derivative
+            and derivative.name in orders
+            and (tokens_kept[k] not in orders or tokens_kept[k] == derivative.name)
+        ):
             if derivative.order != 1 or derivative.name not in velocities:
                 raise InputError(
                     f"found a derivative of {derivative.name} on the right side of the equation for {name}, expected a "
                     "formula in the variables: write out what it is equal to"
                 )
-            found.append(gaps[k] + velocities[derivative.name])
+            formula.append(gaps[k] + velocities[derivative.name])
             k = derivative.end
         else:
-            found.append(gaps[k] + words[k])
-            k = _argument(words, k + 1) if words[k] in orders else k + 1
-    return "".join(found).strip()
+            formula.append(gaps[k] + tokens_kept[k])
+            k = _argument(tokens_kept, k + 1) if tokens_kept[k] in orders else k + 1
+    return "".join(formula).strip()
 
 
 def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Collection[str]) -> dict[str, str]:
@@ -248,18 +259,18 @@ def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Coll
     named = [name for name in variables if name not in orders]
     if len(named) == len(second):
         return dict(zip(second, named, strict=True))
-    found = dict[str, str]()
+    velocities = dict[str, str]()
     for name in second:
         velocity = f"v{name}"
-        while velocity in taken or velocity in found.values():
+        while velocity in taken or velocity in velocities.values():
             velocity += "_"
-        found[name] = velocity
-    return found
+        velocities[name] = velocity
+    return velocities
 
 
 def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tuple[list[list[str]], list[str]]:
     """The pieces with x0 in the place of x[0], or x_0 where x0 is another name; and notes that say so."""
-    words = {*taken, *(token for piece in pieces for token in piece)}
+    used_names = {*taken, *(token for piece in pieces for token in piece)}
     names = dict[tuple[str, str], str]()
     made: list[list[str]] = []
     for piece in pieces:
@@ -271,7 +282,7 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
             is_indexed = is_indexed and word[2].isdigit() and len(word[2]) < 5
             if is_indexed:
                 name = f"{word[0]}{word[2]}"
-                while name in words:
+                while name in used_names:
                     name = f"{word[0]}_{word[2]}" if "_" not in name else f"{name}_"
                 made[-1].append(names.setdefault((word[0], word[2]), name))
             else:
@@ -280,22 +291,22 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
     return made, [f"{name}[{index}] is called {short}" for (name, index), short in names.items()]
 
 
-def _hint(left: Sequence[str], piece: Sequence[str]) -> str:
+def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
     """What to type in the place of something that people put between equations."""
-    if "\\" in left:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
-        name = next((token for token in left if is_name(token) and token not in _LATEX), "x")
-        name, primes = name.removeprefix("d" if "dt" in left else ""), "''" if "ddot" in left else "'"
+    if "\\" in left_side:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
+        name = next((token for token in left_side if is_name(token) and token not in _LATEX), "x")
+        name, primes = name.removeprefix("d" if "dt" in left_side else ""), "''" if "ddot" in left_side else "'"
         return f"; LaTeX is not read: write {name}{primes} = ..., and products with *"
-    if left and left[0].isalpha() and not left[0].isascii():
-        return f"; a name is made of ASCII letters, digits and _: rename {left[0]}"
-    if len(left) == 1 and left[0][0] == "d" and is_name(left[0][1:]):
-        return f"; did you mean {left[0]}/dt = ...?"
-    if len(left) == 1 and is_name(left[0]):
+    if left_side and left_side[0].isalpha() and not left_side[0].isascii():
+        return f"; a name is made of ASCII letters, digits and _: rename {left_side[0]}"
+    if len(left_side) == 1 and left_side[0][0] == "d" and is_name(left_side[0][1:]):
+        return f"; did you mean {left_side[0]}/dt = ...?"
+    if len(left_side) == 1 and is_name(left_side[0]):
         value = _text(piece).partition("=")[2].lstrip("= ")[:40]
-        return f"; a parameter is given by -p {left[0]}={value}"
-    if len(left) == 4 and left[1] in "([" and left[2] in ("0", "0.0"):
+        return f"; a parameter is given by -p {left_side[0]}={value}"
+    if len(left_side) == 4 and left_side[1] in "([" and left_side[2] in ("0", "0.0"):
         return "; an initial value is given by --start"
-    if "~" in left or "".join(left[1:]) in ("(t+1)", "[t+1]", "(n+1)", "[n+1]"):
+    if "~" in left_side or "".join(left_side[1:]) in ("(t+1)", "[t+1]", "(n+1)", "[n+1]"):
         return "; a map is given by --vars X,Y,... and one --image EXPR for each variable"
     return ""
 

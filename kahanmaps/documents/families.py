@@ -70,8 +70,8 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
     m = " + ".join(middle)
     integrals = {"I1": " + ".join(x)}
     for a in range(2, len(middle)):
-        below = f"({' + '.join(middle[:a])})*({' + '.join(middle[a - 1 :])})"
-        integrals[f"I{len(integrals) + 1}"] = f"{middle[a - 1]}*({m})/({below})"
+        denominator = f"({' + '.join(middle[:a])})*({' + '.join(middle[a - 1 :])})"
+        integrals[f"I{len(integrals) + 1}"] = f"{middle[a - 1]}*({m})/({denominator})"
     if k == 1:
         first, last = x[0], x[-1]
         minus = f"2*{first}*({m}) - 2*({m})*{last} - 2*{first}*{last}"
@@ -83,7 +83,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         terms = [f"{'+' if signs[j] > 0 else '-'} x{j + 1}" for j in sorted(signs, key=lambda j: -signs[j])]
         text = " ".join(terms)
         rows.append(text.removeprefix("+ ") if text.startswith("+ ") else f"-{text.removeprefix('- ')}")
-    cross, whole = n - 2 * k - 2, n == 2 * k + 1
+    cross, is_full = n - 2 * k - 2, n == 2 * k + 1
     # What is known of the flow and the map, each with its status.
     facts = [
         "Classical: the flow is integrable, by k + 1 integrals for n = 2k + 1 and in general by those of LV(2k + 1, k) "
@@ -97,7 +97,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
             f"Proved: I2, ..., I{cross + 1} are cross-ratios of x{k + 1}, x{k + 1} + x{k + 2}, ..., conserved."
         )
     if k:
-        where = "" if whole else f" of LV({2 * k + 1},{k}), to which the map projects,"
+        where = "" if is_full else f" of LV({2 * k + 1},{k}), to which the map projects,"
         facts.append(
             f"Proved: the product of the variables{where} divided by det(I - eps f'), and the modified Hamiltonian of "
             "a cubic H are conserved."

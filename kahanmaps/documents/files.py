@@ -72,8 +72,8 @@ class SystemFile(Displayed):
         if self.name != "inline" or not self.is_quadratic:
             return self.name
         rhs = zip(self.variables, self.system.rhs, strict=True)
-        shown = ", ".join(f"{name}' = {format_polynomial(f)}" for name, f in rhs)
-        return shown if len(shown) <= _LONGEST_LABEL else self.name
+        equations = ", ".join(f"{name}' = {format_polynomial(f)}" for name, f in rhs)
+        return equations if len(equations) <= _LONGEST_LABEL else self.name
 
     def labelled(self, letter: str) -> str:
         """The system with a letter for it: f = euler_top, or f: (x' = y, y' = -x)."""
@@ -161,8 +161,8 @@ class SystemFile(Displayed):
     @property
     def catalog(self) -> Mapping[str, Any]:
         """Title, sources, convention and facts, for files of the catalogue."""
-        found: Mapping[str, Any] = self.document.get("catalog", {})
-        return found
+        section: Mapping[str, Any] = self.document.get("catalog", {})
+        return section
 
     @classmethod
     def from_system(cls, system: QuadraticSystem, name: str = "system") -> SystemFile:
@@ -194,13 +194,13 @@ class SystemFile(Displayed):
         return cls(name, "family", {}, KahanFamily(chosen.system), chosen.hamiltonian, member, {}, None, document)
 
     @classmethod
-    def from_conjugate(cls, given: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
+    def from_conjugate(cls, associate: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
         """An associated system over a number field: a Hamiltonian system with the root as its parameter."""
         document = {
             "name": name,
-            "variables": list(names_of(given.chain[0])),
-            "parameters": {given.name: str(given.root)},
-            "hamiltonian": {"H": given.K_text, "J": "standard"},
+            "variables": list(names_of(associate.chain[0])),
+            "parameters": {associate.name: str(associate.root)},
+            "hamiltonian": {"H": associate.K_text, "J": "standard"},
         }
         return parse_system(to_toml(document, ("name", "variables"), _SECTIONS), name)
 
@@ -285,9 +285,9 @@ def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
         if made is not None:
             return made[1], made[0], None
         folder = resources.files("kahanmaps.documents").joinpath("catalog")
-        for found in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
-            if name.isidentifier() and found.is_file():
-                return _TOML.document(found.read_bytes(), name), name, None
+        for candidate in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
+            if name.isidentifier() and candidate.is_file():
+                return _TOML.document(candidate.read_bytes(), name), name, None
         raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     path = base / name
     return _document(_TOML.read(path), name)[0], os.path.abspath(path), partial(_named, path.parent)

@@ -70,12 +70,14 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
         equations = sides_of_equations(equations) or equations
     if isinstance(equations, Mapping):
         variables, equations = list(equations), list(equations.values())
-    elif not isinstance(equations, str) and variables is None and not any("=" in str(one) for one in equations):
+    elif (
+        not isinstance(equations, str) and variables is None and not any("=" in str(equation) for equation in equations)
+    ):
         raise InputError(f"found {len(equations)} right-hand sides without variables, expected these too: x, y, ...")
     if not isinstance(equations, str):
         equations, roots = roots_named(equations, [*map(str, variables or ()), *parameters])
         parameters |= roots
-    rhs = equations if isinstance(equations, str) else [formula_text(one) for one in equations]
+    rhs = equations if isinstance(equations, str) else [formula_text(equation) for equation in equations]
     if isinstance(variables, str):
         variables = variables.replace(",", " ").split()
     names = None if variables is None else ",".join(map(str, variables))
@@ -92,26 +94,26 @@ def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> Map
     return as_file(system).at(resolve_eps(eps, time_step))
 
 
-def as_file(given: Any) -> SystemFile:
+def as_file(value: Any) -> SystemFile:
     """The file that anything stands for: a file, a system, a name of the catalogue, a path, or equations as text.
 
     Raises InputError for anything else.
     """
-    if isinstance(given, SystemFile):
-        return given
-    if isinstance(given, QuadraticSystem):
-        return SystemFile.from_system(given)
-    if isinstance(given, FamilyMember):
-        return SystemFile.from_member(given)
-    if isinstance(given, AssociatedSystem):
-        given = given.hamiltonian
-    if isinstance(given, CubicHamiltonian):
-        return SystemFile.from_hamiltonian(given)
-    if isinstance(given, str) and "=" in given:
-        return System(given)
-    if isinstance(given, str | Path):
-        return load(given)
-    if isinstance(given, Map):
-        raise InputError(f"found {given!r}, a map at one eps, expected what it was made of, and eps=")
-    kind = type(given).__name__
+    if isinstance(value, SystemFile):
+        return value
+    if isinstance(value, QuadraticSystem):
+        return SystemFile.from_system(value)
+    if isinstance(value, FamilyMember):
+        return SystemFile.from_member(value)
+    if isinstance(value, AssociatedSystem):
+        value = value.hamiltonian
+    if isinstance(value, CubicHamiltonian):
+        return SystemFile.from_hamiltonian(value)
+    if isinstance(value, str) and "=" in value:
+        return System(value)
+    if isinstance(value, str | Path):
+        return load(value)
+    if isinstance(value, Map):
+        raise InputError(f"found {value!r}, a map at one eps, expected what it was made of, and eps=")
+    kind = type(value).__name__
     raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")

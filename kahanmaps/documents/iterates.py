@@ -68,9 +68,9 @@ def parse_with_iterates(
             pieces.append("")
         else:
             pieces[-1] += character
-    formula, *behind = pieces
+    formula, *definition_texts = pieces
     definitions = {}
-    for piece in behind:
+    for piece in definition_texts:
         name, equals, value = (part.strip() for part in piece.partition("="))
         if not equals or not is_name(name):
             expected = "expected what a letter stands for: F0 = x*y~"
@@ -83,11 +83,11 @@ def parse_with_iterates(
     names = with_iterates(variables, count, others)
     if not definitions:
         return parse_rational_function(formula, names, constants)
-    if len(definitions) < len(behind) or {*definitions} & {*variables, *others, *constants}:
-        found = ", ".join(definitions)
-        raise InputError(f"found the letters {found}, expected each once, and no names of something else")
+    if len(definitions) < len(definition_texts) or {*definitions} & {*variables, *others, *constants}:
+        names_given = ", ".join(definitions)
+        raise InputError(f"found the letters {names_given}, expected each once, and no names of something else")
     context, n = ring(names), len(variables)
-    functions = [parse_polynomial(one, names, constants) for one in definitions.values()]
+    functions = [parse_polynomial(definition, names, constants) for definition in definitions.values()]
     letters = with_iterates(tuple(definitions), outer)
     function = parse_rational_function(formula, (*letters, *names), constants)
     parts = (function.numerator, function.denominator)
@@ -103,5 +103,5 @@ def parse_with_iterates(
         return P.compose(*moved, *gens[coordinates:], ctx=context)
 
     values = [later(P, steps) for steps in range(outer + 1) for P in functions]
-    above, below = (part.compose(*values, *gens, ctx=context) for part in parts)
-    return RationalFunction(above, below)
+    numerator, denominator = (part.compose(*values, *gens, ctx=context) for part in parts)
+    return RationalFunction(numerator, denominator)

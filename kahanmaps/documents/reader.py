@@ -82,20 +82,20 @@ class PartReader:
         self._mistake(key, sentence)
         return None
 
-    def _made(self, path: str, make: Callable[..., T], *given: Any) -> T | None:
+    def _made(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
         """What is made of what is given; None, and a mistake, where it cannot be."""
         try:
-            return make(*given)
+            return make(*arguments)
         except InputError as error:
             return self._refused(path, str(error))
 
     def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
-        known = KEYS[section]
+        known_keys = KEYS[section]
         for key in table:
-            if key not in known:
+            if key not in known_keys:
                 path = f"{section}.{key}" if section else key
                 hint = " (a batch spec is for kahanmaps batch run)" if path == "experiments" else ""
-                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known))}{hint}")
+                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known_keys))}{hint}")
 
     def _table(self, key: str) -> dict[str, Any] | None:
         value = self.document.get(key, {})
@@ -109,7 +109,7 @@ class PartReader:
         return self._refused(path, f"found {show(value)}, expected an expression in quotes")
 
     def _polynomial(
-        self, path: str, value: Any, at_most: int, more: Sequence[str] = (), *, of_map: bool = True
+        self, path: str, value: Any, at_most: int, extra_names: Sequence[str] = (), *, of_map: bool = True
     ) -> fmpq_mpoly | None:
         """A polynomial in the variables, `more` names and, of a map, the symbols and eps; its degree in the variables
         is bounded.
@@ -119,20 +119,21 @@ class PartReader:
             return None
         try:
             tail = (*self.symbols, "eps") if of_map else ()
-            polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
+            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *tail), self.parameters)
         except UnknownName as error:
             where = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
             return self._refused(path, f"{error}\nif it is a parameter, give its value: {where}")
         except InputError as error:
             return self._refused(path, str(error))
-        found = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
-        if found > at_most and not self.unsure:
-            degree = "" if found == 3 else f" and degree = {found}"
-            polarised = (
-                f'\nfor a field of degree {found} write discretization = "polarised"{degree} into [system] of a file'
+        actual_degree = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
+        if actual_degree > at_most and not self.unsure:
+            degree = "" if actual_degree == 3 else f" and degree = {actual_degree}"
+            polarised = f'discretization = "polarised"{degree} into [system] of a file'
+            polarised = f"\nfor a field of degree {actual_degree} write {polarised}"
+            hint = polarised if path.startswith("system.rhs") and actual_degree <= MAX_DEGREE else ""
+            return self._refused(
+                path, f"found a polynomial of degree {actual_degree}, expected at most {at_most}{hint}"
             )
-            hint = polarised if path.startswith("system.rhs") and found <= MAX_DEGREE else ""
-            return self._refused(path, f"found a polynomial of degree {found}, expected at most {at_most}{hint}")
         return polynomial
 
     def _matrix(self, path: str, value: Any, size: int | None) -> fmpq_mat | None:
@@ -151,9 +152,9 @@ class PartReader:
                 self._mistake(f"{path}[{i + 1}]", f"found {len(row)} entries, expected {expected}")
                 bad = True
             for j, entry in enumerate(row):
-                place = f"{path}[{i + 1}][{j + 1}]"
-                text = self._text(place, entry)
-                number = None if text is None else self._made(place, parse_constant, text, self.parameters)
+                entry_path = f"{path}[{i + 1}][{j + 1}]"
+                text = self._text(entry_path, entry)
+                number = None if text is None else self._made(entry_path, parse_constant, text, self.parameters)
                 entries.append(fmpq(0) if number is None else number)
                 bad = bad or number is None
         return None if bad else fmpq_mat(expected, expected, entries)
@@ -177,12 +178,12 @@ class PartReader:
             return self._refused(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
         return value
 
-    def _each(self, path: str, given: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
+    def _each(self, path: str, value: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
         """What is read of every entry of a list, mistakes of all of them noted; None where one cannot be read."""
-        entries = given if isinstance(given, list) else []
-        found = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
-        known = [one for one in found if one is not None]
-        return known if len(known) == len(found) else None
+        entries = value if isinstance(value, list) else []
+        results = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
+        valid = [result for result in results if result is not None]
+        return valid if len(valid) == len(results) else None
 
     def _claim(self, path: str, value: Any) -> RationalFunction | None:
         text = self._text(path, value)

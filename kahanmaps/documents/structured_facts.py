@@ -68,7 +68,7 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
     )
 
 
-def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
+def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
     """The functions that "degree <= d" or a list of polynomials stands for, as exact polynomials in `variables`.
 
     Raises InputError for anything else, for more than 100000 monomials, and for functions that are 0 or stand twice.
@@ -77,20 +77,20 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
     >>> relation_functions(["x^2 + y^2", "1"], ["x", "y"])
     (x^2 + y^2, 1)
     """
-    match = _UP_TO.fullmatch(given) if isinstance(given, str) else None
-    if match is None and not (_are_texts(given) and given):
-        raise InputError(f'found {show(given)}, expected "degree <= d" or a list of polynomials')
+    match = _UP_TO.fullmatch(texts) if isinstance(texts, str) else None
+    if match is None and not (_are_texts(texts) and texts):
+        raise InputError(f'found {show(texts)}, expected "degree <= d" or a list of polynomials')
     if match is not None:
         top = int(match[1])
         count = comb(top + len(variables), top)
         if count > MAX_MONOMIALS:
-            raise InputError(f"found {show(given)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
+            raise InputError(f"found {show(texts)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
         context = ring(variables)
         exponents = chain.from_iterable(monomials(len(variables), d) for d in range(top + 1))
         return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)
-    if len(given) > MAX_MONOMIALS:
-        raise InputError(f"found {len(given)} functions, expected at most {MAX_MONOMIALS}")
-    functions = tuple(parse_polynomial(text, variables) for text in given)
+    if len(texts) > MAX_MONOMIALS:
+        raise InputError(f"found {len(texts)} functions, expected at most {MAX_MONOMIALS}")
+    functions = tuple(parse_polynomial(text, variables) for text in texts)
     seen = set()
     for k, function in enumerate(functions):
         if function.is_zero():

@@ -45,9 +45,9 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
     """
     _parameters(file, list(values))
     document = {key: value for key, value in file.document.items() if key not in ("catalog", "integrals", "density")}
-    given = {name: format_number(value) for name, value in {**file.parameters, **values}.items()}
-    title = f"{file.name} at {', '.join(f'{name} = {given[name]}' for name in values)}"
-    return SystemFile(**DocumentReader({**document, "name": title, "parameters": given}, file.name, {}).read())
+    numbers = {name: format_number(value) for name, value in {**file.parameters, **values}.items()}
+    title = f"{file.name} at {', '.join(f'{name} = {numbers[name]}' for name in values)}"
+    return SystemFile(**DocumentReader({**document, "name": title, "parameters": numbers}, file.name, {}).read())
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:
@@ -70,15 +70,17 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
     (x2*x3*a1, -2*x1*x3, x1*x2)
     """
     _ = file.system  # of another map there is none
-    found = map_with_symbols(file, symbols)
-    assert isinstance(found, KahanFamily)
-    return found.system
+    map_ = map_with_symbols(file, symbols)
+    assert isinstance(map_, KahanFamily)
+    return map_.system
 
 
 def _parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, ...]:
     """The names, each once. Raises InputError for one that is no parameter."""
     for name in symbols:
         if name not in file.parameters:
-            known = ", ".join(file.parameters) or "none"
-            raise InputError(f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known}")
+            known_names = ", ".join(file.parameters) or "none"
+            raise InputError(
+                f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known_names}"
+            )
     return tuple(dict.fromkeys(symbols))

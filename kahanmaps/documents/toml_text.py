@@ -120,5 +120,5 @@ def _toml_value(value: Any) -> str:
 
 def _toml_string(text: str) -> str:
     # A JSON string is a TOML basic string, but for DEL, which TOML wants escaped; a terminal obeys some others too.
-    shown = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
-    return "".join(shown)
+    characters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
+    return "".join(characters)

@@ -167,8 +167,8 @@ class FamilyMember(Displayed):
 
     def associated(self) -> Iterator[AssociatedSystem]:
         """All rational associated systems up to an overall sign, 2^(r-1) for r factors; the first is f_0 itself."""
-        for rest in itertools.product((1, -1), repeat=len(self.factors) - 1):
-            yield self.associate((1, *rest))
+        for other_signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
+            yield self.associate((1, *other_signs))
 
     @cached_property
     def roots(self) -> dict[int, Root]:
@@ -190,15 +190,17 @@ class FamilyMember(Displayed):
         [('root of t^2 - 2', '(-3*t)*x1^2*x2 + (-1/2*t)*x2^3 + (-3*t)*x3^2*x4 + (-2*t)*x4^3')]
         """
         for k, root in self.roots.items():
-            rest = [root.number_field.one]  # chi/(x - t), the highest coefficient first
+            quotient = [root.number_field.one]  # chi/(x - t), the highest coefficient first
             for c in chi(self.A).coeffs()[-2:0:-1]:
-                rest.append(rest[-1] * root.number_field.generator + c)
-            at_root = sum((c * root.number_field.generator**j for j, c in enumerate(reversed(rest))), 0 * rest[0])
-            flipped = [2 * c / at_root for c in reversed(rest)]
+                quotient.append(quotient[-1] * root.number_field.generator + c)
+            at_root = sum(
+                (c * root.number_field.generator**j for j, c in enumerate(reversed(quotient))), 0 * quotient[0]
+            )
+            flipped = [2 * c / at_root for c in reversed(quotient)]
             for signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
-                given = self.associate((*signs[:k], 1, *signs[k:]))
-                coefficients = tuple(a - b for a, b in zip(given.coefficients, flipped, strict=True))
-                yield ConjugateAssociate(root, given.signs, coefficients, self.chain)
+                associate = self.associate((*signs[:k], 1, *signs[k:]))
+                coefficients = tuple(a - b for a, b in zip(associate.coefficients, flipped, strict=True))
+                yield ConjugateAssociate(root, associate.signs, coefficients, self.chain)
 
     @cached_property
     def chosen(self) -> AssociatedSystem:
@@ -232,7 +234,7 @@ def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_pol
     total = fmpq_poly([0])
     for factor, sign in zip(factors, signs, strict=True):
         part = factor.polynomial**factor.multiplicity
-        rest = modulus // part
-        _, inverse, _ = rest.xgcd(part)
-        total += sign * rest * (inverse % part)
+        cofactor = modulus // part
+        _, inverse, _ = cofactor.xgcd(part)
+        total += sign * cofactor * (inverse % part)
     return total % modulus

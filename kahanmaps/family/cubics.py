@@ -53,8 +53,8 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
     names = variables or default_variables(n)
     context = ring(names)
     exponents = list(monomials(n, 3))
-    place = {_indices(exponent): k for k, exponent in enumerate(exponents)}
-    weight = {key: _symmetry(key) for key in place}
+    position = {_indices(exponent): k for k, exponent in enumerate(exponents)}
+    weight = {key: _symmetry(key) for key in position}
     entries = [(i, k, A[i, k]) for i in range(n) for k in range(n) if A[i, k] != 0]
     by_row: list[list[tuple[int, fmpq]]] = [[] for _ in range(n)]
     for i, k, value in entries:
@@ -69,10 +69,10 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
                 row = [zero] * len(exponents)
                 for k, value in by_row[i]:
                     key = tuple(sorted((k, j, l)))
-                    row[place[key]] += value * weight[key]
+                    row[position[key]] += value * weight[key]
                 for k, value in by_row[j]:
                     key = tuple(sorted((i, k, l)))
-                    row[place[key]] -= value * weight[key]
+                    row[position[key]] -= value * weight[key]
                 flat += row
                 equations += 1
     solutions = nullspace(QQ, fmpq_mat(equations, len(exponents), flat))

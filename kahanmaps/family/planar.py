@@ -167,8 +167,8 @@ class NormalForm(Displayed):
         """The Kahan map at (X, Y). Raises SingularStep where 1 + eps^2 D is not a unit of K."""
         X, Y = self._elements(X, Y)
         epsilon = rational(eps)
-        below = 1 + epsilon * epsilon * self.D(X, Y)
-        common, inverse, _ = below.xgcd(self.chi)
+        denominator = 1 + epsilon * epsilon * self.D(X, Y)
+        common, inverse, _ = denominator.xgcd(self.chi)
         if not common.is_one():
             raise SingularStep(
                 f"1 + eps^2 D and chi have the factor {format_univariate(common)} in common at this point for "
@@ -185,11 +185,11 @@ class NormalForm(Displayed):
         """The planar systems at the rational roots of chi, by increasing root; m of them where chi splits over Q."""
         u, v = ring(["u", "v"]).gens()
         slope = self.chi.derivative()
-        found = []
+        parts = []
         for root in sorted(-factor[0] / factor[1] for factor, _ in self.chi.factor()[1] if factor.degree() == 1):
             a, b, c, d = (coefficient(root) for coefficient in self.coefficients)
-            found.append(PlanarPart(root, 1 / slope(root), a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3))
-        return tuple(found)
+            parts.append(PlanarPart(root, 1 / slope(root), a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3))
+        return tuple(parts)
 
     @property
     def chi_text(self) -> str:
@@ -270,13 +270,13 @@ def normal_form(member: FamilyMember) -> NormalForm:
         )
     H = member.H if all(sign > 0 for sign in member.signs) else member.chosen.K
     modulus, tensors = chi_of(member.A), third_derivatives(H)
-    found: list[tuple[int, fmpq_mat, Quadruple]] = []
+    planes: list[tuple[int, fmpq_mat, Quadruple]] = []
     for e1 in _cyclic_vectors(member.A.transpose()):
         S = _symplectic_basis(member.A.transpose(), e1)
         coefficients = _coefficients(modulus, S, tensors)
         size = sum(map(bits_of, S.entries())) + sum(bits_of(entry) for c in coefficients for entry in c.coeffs())
-        found.append((size, S, coefficients))
-    _, S, coefficients = min(found, key=lambda choice: choice[0])
+        planes.append((size, S, coefficients))
+    _, S, coefficients = min(planes, key=lambda choice: choice[0])
     return NormalForm(member.A, H, S, coefficients)
 
 

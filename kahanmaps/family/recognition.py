@@ -80,14 +80,14 @@ class FamilyStructure:
         factors = self.member.factors
         chi = " ".join(f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors)
         if self.member.m == 1:
-            found = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
+            sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
         else:
             how = "H splits: A"
             if len(factors) == 1:
                 split = factors[0].degree > 1
                 how = "H splits over the splitting field of chi: A" if split else "H does not split: A, not scalar,"
-            found = f"{how} with A Hess(H) = Hess(H) A^T has chi = {chi}"
-        return found if self.is_standard else f"{found}, in coordinates y with x = T y and standard J"
+            sentence = f"{how} with A Hess(H) = Hess(H) A^T has chi = {chi}"
+        return sentence if self.is_standard else f"{sentence}, in coordinates y with x = T y and standard J"
 
 
 def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
@@ -122,11 +122,11 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     rng = random.Random(n)
     few = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
     for chosen in (few, conditions):
-        found = _skew_solutions(chosen, n)
-        products = (S * condition for S in found for condition in conditions)
+        solutions = _skew_solutions(chosen, n)
+        products = (S * condition for S in solutions for condition in conditions)
         if all(product == product.transpose() for product in products):
             break
-    return _reduced([inverse * fmpq_mat(S) for S in found])
+    return _reduced([inverse * fmpq_mat(S) for S in solutions])
 
 
 def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
@@ -282,12 +282,12 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
     is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(own, 2))
     flat, turned = (fmpq_mat([M.entries() for M in Ms]) for Ms in (own, [X.transpose() for X in own]))
     target = rank(QQ, flat * turned.transpose()) if is_commutative else 0
-    found: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
+    parts: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
     rng = random.Random(len(own))
     # The basis, then combinations with small coefficients, which grow slowly.
     bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
-    more = (combination_of([rng.randint(-bound, bound) for _ in own], own) for bound in bounds)
-    for tried, X in enumerate(itertools.chain(own, more)):
+    combinations = (combination_of([rng.randint(-bound, bound) for _ in own], own) for bound in bounds)
+    for tried, X in enumerate(itertools.chain(own, combinations)):
         if len(pieces := _projections(X, E)) > 1:
             for piece in pieces:
                 yield from _parts(space, piece)
@@ -298,10 +298,10 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
             power, length = power * value, length + polynomial.degree()
         for Y, minimal in _variants(X, E, polynomial):
             height = sum(map(bits_of, minimal.coeffs()))
-            found.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
-        if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in found) >= target:
+            parts.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
+        if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in parts) >= target:
             break
-    _, X, polynomial = max(found, key=lambda choice: choice[0])
+    _, X, polynomial = max(parts, key=lambda choice: choice[0])
     is_field = polynomial.degree() > 1
     yield _Part(E, X, polynomial) if is_field else _Part(E, _reduced([X + E * polynomial[0]])[0], _T)
 
@@ -311,11 +311,11 @@ def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
     factors = _factors_on(X, E)
     if len(factors) == 1:
         return [E]
-    found = []
+    projections = []
     for which in range(len(factors)):
         signs = [2 * (i == which) - 1 for i in range(len(factors))]
-        found.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
-    return found
+        projections.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
+    return projections
 
 
 def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
@@ -347,25 +347,25 @@ def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple
 
 def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
     """The skew S with S F symmetric for each F of `conditions`: a basis."""
-    place = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
+    position = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
     rows = []
     for condition in conditions:
         columns = condition.transpose().tolist()
-        for i, j in place:
-            row = [fmpz(0)] * len(place)
+        for i, j in position:
+            row = [fmpz(0)] * len(position)
             for k in range(n):  # S[i, k] F[k, j] - S[j, k] F[k, i]
                 if k != i:
-                    row[place[min(i, k), max(i, k)]] += columns[j][k] if i < k else -columns[j][k]
+                    row[position[min(i, k), max(i, k)]] += columns[j][k] if i < k else -columns[j][k]
                 if k != j:
-                    row[place[min(j, k), max(j, k)]] -= columns[i][k] if j < k else -columns[i][k]
+                    row[position[min(j, k), max(j, k)]] -= columns[i][k] if j < k else -columns[i][k]
             rows.append(row)
-    found = []
+    solutions = []
     for vector in nullspace(QQ, fmpq_mat(fmpz_mat(rows))):
         S = fmpz_mat(n, n)
-        for (i, j), value in zip(place, primitive_integers(vector), strict=True):
+        for (i, j), value in zip(position, primitive_integers(vector), strict=True):
             S[i, j], S[j, i] = value, -value
-        found.append(S)
-    return found
+        solutions.append(S)
+    return solutions
 
 
 def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:

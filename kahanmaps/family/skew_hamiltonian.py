@@ -50,7 +50,7 @@ def defects(A: fmpq_mat) -> list[str]:
     m, J = n // 2, standard_structure(n)
     expected = -(J * A.transpose() * J)  # equal to A exactly for A^T J = J A
     skew = "block must be skew"
-    found = []
+    messages = []
     for rule, top, left in (
         ("lower right block must be the transpose of the upper left one", m, m),
         (f"upper right {skew}", 0, m),
@@ -61,19 +61,19 @@ def defects(A: fmpq_mat) -> list[str]:
                 row, column = top + j, left + i
                 entry = fmpq(0) if top != left and i == j else expected[row, column]
                 if A[row, column] != entry:
-                    place = f"entry ({row + 1},{column + 1})"
-                    found.append(f"{place} is {_show(A[row, column])}, expected {_show(entry)}: the {rule}")
-    return found
+                    position = f"entry ({row + 1},{column + 1})"
+                    messages.append(f"{position} is {_show(A[row, column])}, expected {_show(entry)}: the {rule}")
+    return messages
 
 
 def require_skew_hamiltonian(A: fmpq_mat) -> None:
     """Raises HypothesisError, naming the offending entries, unless A^T J = J A."""
-    found = defects(A)
-    if found:
-        shown = found[:4]
-        if len(found) > len(shown):
-            shown.append(f"and {len(found) - len(shown)} more")
-        raise HypothesisError("A is not skew-Hamiltonian: " + "; ".join(shown))
+    messages = defects(A)
+    if messages:
+        first_messages = messages[:4]
+        if len(messages) > len(first_messages):
+            first_messages.append(f"and {len(messages) - len(first_messages)} more")
+        raise HypothesisError("A is not skew-Hamiltonian: " + "; ".join(first_messages))
 
 
 def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
@@ -83,9 +83,9 @@ def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
     the monic polynomial, constant term first.
     """
     require_skew_hamiltonian(A)
-    _, found = A.charpoly().factor()
+    _, pairs = A.charpoly().factor()
     factors = []
-    for polynomial, multiplicity in found:
+    for polynomial, multiplicity in pairs:
         monic = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
         factors.append(Factor(monic, multiplicity // 2))
 

@@ -68,12 +68,14 @@ def system_normal_form(
     declared, T = member is not None, None
     if member is None:
         hamiltonian = hamiltonian or find_cubic_hamiltonian(system)
-        found = None if hamiltonian is None else find_family_structure(hamiltonian)
-        if found is None:
+        structure = None if hamiltonian is None else find_family_structure(hamiltonian)
+        if structure is None:
             return NoNormalForm(why_not_member(hamiltonian))
-        member = found.member
-        T = None if found.is_standard else found.T
-    factors = "*".join(f"({one})" + f"^{one.multiplicity}" * (one.multiplicity > 1) for one in member.factors)
+        member = structure.member
+        T = None if structure.is_standard else structure.T
+    factors = "*".join(
+        f"({factor})" + f"^{factor.multiplicity}" * (factor.multiplicity > 1) for factor in member.factors
+    )
     text = f"{'a' if declared else 'a recognised'} member of the family, chi = {factors}"
     try:
         form = normal_form(member)

@@ -70,9 +70,9 @@ def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[Rat
     x_0^2 + 2*x_1^2
     2*x_0*x_1
     """
-    K, above, below = _quotient(function, chi)
-    found = below.solve(K.matrix(above.nrows(), 1, [above[i, 0] for i in range(above.nrows())]))
-    return tuple(_rational(entry) for entry in found.entries())
+    K, numerator, denominator = _quotient(function, chi)
+    solution = denominator.solve(K.matrix(numerator.nrows(), 1, [numerator[i, 0] for i in range(numerator.nrows())]))
+    return tuple(_rational(entry) for entry in solution.entries())
 
 
 def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFunction:
@@ -82,8 +82,8 @@ def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFun
     >>> print(inherited_density(RationalFunction(x, x**0), fmpq_poly([-2, 0, 1])).numerator)
     x_0^2 - 2*x_1^2
     """
-    _, above, below = _quotient(function, chi)
-    return _rational(above.det() / below.det())
+    _, numerator, denominator = _quotient(function, chi)
+    return _rational(numerator.det() / denominator.det())
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,14 +147,14 @@ def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
         return None
     rng = random.Random(len(space))
     draws = ([rng.randint(-2, 2) for _ in space] for _ in range(_DRAWS))
-    found = []
+    candidates = []
     for C in [*space, *(combination_of(weights, space) for weights in draws)]:
         chi = C.minpoly()
         if chi.degree() == len(space) and _is_free(C, chi):
-            found.append((sum(abs(c).p.bit_length() + c.q.bit_length() for c in chi.coeffs()), C, chi))
-    if not found:
+            candidates.append((sum(abs(c).p.bit_length() + c.q.bit_length() for c in chi.coeffs()), C, chi))
+    if not candidates:
         return None
-    _, C, chi = min(found, key=lambda choice: choice[0])
+    _, C, chi = min(candidates, key=lambda choice: choice[0])
     return TensorStructure(system, C, chi)
 
 
@@ -186,8 +186,8 @@ def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
     """Whether Q^n is free over Q[C]: each factor p of chi annihilates as much as in a free module, and no more."""
-    copies, rest = divmod(C.nrows(), int(chi.degree()))
-    return rest == 0 and all(
+    copies, remainder = divmod(C.nrows(), int(chi.degree()))
+    return remainder == 0 and all(
         C.nrows() - evaluate_at_matrix(p, C).rank() == copies * p.degree() for p, _ in chi.factor()[1]
     )
 

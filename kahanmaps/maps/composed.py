@@ -52,8 +52,8 @@ class MapFactor:
             if over.characteristic:
                 raise BadPrime(f"modulo {over.characteristic} a parameter has no value", over.characteristic)
             raise InputError("found a parameter of a part that has no value where the symbols have these")
-        found = self.map.at(eps, over, values)
-        return found.inverse if self.is_inverse else found
+        map_at_eps = self.map.at(eps, over, values)
+        return map_at_eps.inverse if self.is_inverse else map_at_eps
 
 
 class ComposedMap(MapFamily):
@@ -82,18 +82,18 @@ class ComposedMap(MapFamily):
     def time_steps(self) -> int:  # type: ignore[override]  # nobody writes it
         """The sum of those of the letters, where these are one map and its inverse; else there is no one flow."""
         letters = self._letters
-        return sum(steps for _, steps in letters) if all(one == letters[0][0] for one, _ in letters) else 0
+        return sum(steps for _, steps in letters) if all(letter == letters[0][0] for letter, _ in letters) else 0
 
     @property
     def _letters(self) -> list[tuple[Any, int]]:
         """What each part is, compositions taken apart, and its time steps, with a sign."""
-        found: list[tuple[Any, int]] = []
+        all_letters: list[tuple[Any, int]] = []
         for part in self.parts:
-            letters = [(part.map_and_values, part.map.time_steps)]
+            part_letters = [(part.map_and_values, part.map.time_steps)]
             if isinstance(part.map, ComposedMap) and not part.values:
-                letters = part.map._letters
-            found += [(letter, -steps if part.is_inverse else steps) for letter, steps in letters]
-        return found
+                part_letters = part.map._letters
+            all_letters += [(letter, -steps if part.is_inverse else steps) for letter, steps in part_letters]
+        return all_letters
 
     @property
     def digits(self) -> int:
@@ -200,20 +200,20 @@ def composed_map(
     >>> conjugate.step(["1/9"]), g.at("1/2").inverse.step(f.at("1/2").step(g.at("1/2").step(["1/9"])))
     ((1/6,), (1/6,))
     """
-    powers = [given if isinstance(given, tuple) else (given, 1) for given in maps]
+    powers = [entry if isinstance(entry, tuple) else (entry, 1) for entry in maps]
     if symbols is None:
-        symbols = tuple(dict.fromkeys(name for one, _ in powers for name in one.symbols))
+        symbols = tuple(dict.fromkeys(name for map_, _ in powers for name in map_.symbols))
     context = ring(symbols)
     own = {name: RationalFunction(x, context.constant(1)) for name, x in zip(symbols, context.gens(), strict=True)}
     given_parts: list[MapFactor] = []
-    for k, (one, power) in enumerate(powers):
-        known = own | dict(values[k]) if values else own
-        missing = next((name for name in one.symbols if name not in known), None)
+    for k, (map_, power) in enumerate(powers):
+        functions = own | dict(values[k]) if values else own
+        missing = next((name for name in map_.symbols if name not in functions), None)
         if missing is not None:
             raise InputError(
                 f"found a map with the symbol {missing}, expected its value, or a composition with that symbol"
             )
-        given_parts += [MapFactor(one, power < 0, tuple(known[name] for name in one.symbols))] * abs(power)
+        given_parts += [MapFactor(map_, power < 0, tuple(functions[name] for name in map_.symbols))] * abs(power)
     if not given_parts:
         raise InputError("found no map to compose, expected at least one")
     parts: list[MapFactor] = []  # without those that their neighbours undo

@@ -52,7 +52,7 @@ class Equation:
         if self.degree == 1:
             return list(X)
         powers: list[list[Any]] = [[None, entry] for entry in X]
-        found = []
+        monomials = []
         for exponent in self.exponents:
             total = None
             for table, e in zip(powers, exponent, strict=True):
@@ -60,8 +60,8 @@ class Equation:
                     table.append(times(table[-1], table[1]))
                 if e:
                     total = table[e] if total is None else times(total, table[e])
-            found.append(total)
-        return found
+            monomials.append(total)
+        return monomials
 
     def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
         """L at the point where the monomials have these values."""
@@ -100,8 +100,8 @@ class Equation:
         rows = self.polynomials()
         if any(row[i].is_zero() for i, row in enumerate(rows)):
             return None
-        below = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
-        forms = [-row[-1] * (below / row[i]) for i, row in enumerate(rows)] + [below]
+        denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
+        forms = [-row[-1] * (denominator / row[i]) for i, row in enumerate(rows)] + [denominator]
         common = reduce(lambda P, Q: P.gcd(Q), forms)
         forms = [form / common for form in forms]
         degree = forms[-1].total_degree()
@@ -111,8 +111,8 @@ class Equation:
             exponents = [tuple(int(i == k) for i in range(self.dim + 1)) for k in range(self.dim + 1)]
         if degree < 1 or sum(map(len, forms)) > _MOST_TERMS:
             return None
-        place = {exponent: k for k, exponent in enumerate(exponents)}
-        terms = (tuple((place[tuple(map(int, m))], self.over.convert(c)) for m, c in form.terms()) for form in forms)
+        position = {exponent: k for k, exponent in enumerate(exponents)}
+        terms = (tuple((position[tuple(map(int, m))], self.over.convert(c)) for m, c in form.terms()) for form in forms)
         return Equation(self.over, tuple(exponents), (tuple(terms),))
 
     def polynomials(self) -> list[list[Any]]:
@@ -155,14 +155,14 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequen
     context = ring(names_of(rows[0][-1])[n:])
     by_monomial: list[list[dict[Exponents, Any]]] = []
     for row in rows:
-        found: list[dict[Exponents, Any]] = []
+        tables: list[dict[Exponents, Any]] = []
         for entry in row:
             collected: dict[Exponents, dict[tuple[int, ...], fmpq]] = {}
             for monomial, coefficient in entry.terms():
                 collected.setdefault(tuple(monomial[:n]), {})[tuple(monomial[n:])] = coefficient
             with over.working():
-                found.append({m: evaluate(context.from_dict(c), over, point) for m, c in collected.items()})
-        by_monomial.append(found)
+                tables.append({m: evaluate(context.from_dict(c), over, point) for m, c in collected.items()})
+        by_monomial.append(tables)
     degree = max((sum(m) for row in by_monomial for entry in row for m in entry), default=0)
     if degree <= 1:
         exponents = [tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1)]
@@ -170,9 +170,9 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequen
         seen = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
         exponents = [(*m, degree - sum(m)) for m in seen]
     droppable = over is QQ or over.characteristic > 0  # elsewhere a zero may be uncertain
-    place = {exponent[:n]: k for k, exponent in enumerate(exponents)}
+    position = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
-        tuple(tuple((place[m], c) for m, c in entry.items() if not droppable or c != 0) for entry in row)
+        tuple(tuple((position[m], c) for m, c in entry.items() if not droppable or c != 0) for entry in row)
         for row in by_monomial
     )
     return Equation(over, tuple(exponents), terms)

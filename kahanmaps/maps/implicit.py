@@ -57,7 +57,7 @@ class Map:
     @cached_property
     def factors(self) -> tuple[ElementaryMap, ...]:
         """The maps with an equation of which this one takes a step of each, the first one first: evaluators do so."""
-        return tuple(one for part in self.parts for one in part.factors)
+        return tuple(factor for part in self.parts for factor in part.factors)
 
     @cached_property
     def inverse(self) -> Map:
@@ -68,11 +68,11 @@ class Map:
     def flow(self) -> tuple[Any, Any] | None:
         """The flow that it approximates, where that is one: of which field, and for which time."""
         flows = [part.flow for part in self.parts]
-        known = [flow for flow in flows if flow is not None]
-        if len(known) < len(flows) or any(field != known[0][0] for field, _ in known):
+        known_flows = [flow for flow in flows if flow is not None]
+        if len(known_flows) < len(flows) or any(field != known_flows[0][0] for field, _ in known_flows):
             return None
         with self.field.working():
-            return known[0][0], sum((time for _, time in known), self.field.zero)
+            return known_flows[0][0], sum((time for _, time in known_flows), self.field.zero)
 
     def __repr__(self) -> str:
         eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
@@ -87,7 +87,7 @@ class Map:
     @property
     def equations(self) -> tuple[Equation, ...]:
         """Those of the factors."""
-        return tuple(one.equation for one in self.factors)
+        return tuple(factor.equation for factor in self.factors)
 
     @property
     def is_bilinear(self) -> bool:
@@ -141,7 +141,7 @@ class Map:
             return NotImplemented
         if (self.field, self.dim, self.variables) != (other.field, other.dim, other.variables):
             return False
-        mine, theirs = ([(one.exponents, one.terms) for one in each.equations] for each in (self, other))
+        mine, theirs = ([(equation.exponents, equation.terms) for equation in map_.equations] for map_ in (self, other))
         return mine == theirs
 
     def __hash__(self) -> int:
@@ -162,8 +162,8 @@ class Map:
 
         What has more than `max_bits` after a factor goes no further: it is returned as it is.
         """
-        for one in self.factors:
-            image = one.integer_steps.step(point)
+        for factor in self.factors:
+            image = factor.integer_steps.step(point)
             if image is None or (max_bits is not None and image.exceeding(max_bits)):
                 return image
             point = image
@@ -172,10 +172,10 @@ class Map:
     def generic_step(self, x: tuple[Any, ...]) -> tuple[Any, ...]:
         """The image of a point, by one linear system over the field for each factor, whatever the field is."""
         image = x
-        for one in self.factors:
+        for factor in self.factors:
             with self.field.working():
                 try:
-                    image = tuple(solve(*one.linear_system(image)).entries())
+                    image = tuple(solve(*factor.linear_system(image)).entries())
                 except SingularMatrix as error:
                     raise self._singular(x) from error
         return image
@@ -187,29 +187,29 @@ class Map:
     def stages(self, point: Sequence[Any]) -> Iterator[tuple[ElementaryMap, tuple[Any, ...]]]:
         """Every factor with the point that it is applied to. Raises SingularStep."""
         x = self.point(point)
-        for k, one in enumerate(self.factors):
+        for k, factor in enumerate(self.factors):
             x = self.factors[k - 1].step(x) if k else x
-            yield one, x
+            yield factor, x
 
     def determinant(self, point: Sequence[Any]) -> Any:
         """det M(x), the denominator of the map; of several factors the product at the points on the way."""
-        first, *others = (one.determinant(x) for one, x in self.stages(point))
+        first, *others = (factor.determinant(x) for factor, x in self.stages(point))
         with self.field.working():
             return reduce(mul, others, first)
 
     def jacobian(self, point: Sequence[Any]) -> Any:
         """The Jacobi matrix dPhi(x), M(x)^{-1} N(x, x~) for one factor. Raises SingularStep."""
-        slopes = [one.jacobian(x) for one, x in self.stages(point)]
+        slopes = [factor.jacobian(x) for factor, x in self.stages(point)]
         with self.field.working():
             return reduce(lambda total, slope: slope * total, slopes)
 
     def _singular(self, point: tuple[Any, ...]) -> SingularStep:
-        shown = ",".join(self.field.format(entry) for entry in point)
-        if len(shown) > 200:
-            shown = f"{shown[:100]}...{shown[-80:]}"
+        coordinates = ",".join(self.field.format(entry) for entry in point)
+        if len(coordinates) > 200:
+            coordinates = f"{coordinates[:100]}...{coordinates[-80:]}"
         return SingularStep(
-            f"{det_of(self.denominator_name(False))} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
-            "the map has no value there",
+            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates} "
+            f"for eps = {self.field.format(self.eps)}: the map is not defined there",
             point,
             self.eps,
         )
@@ -498,16 +498,16 @@ class ImplicitMap(MapFamily):
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
-        for known, at, found in self._last:
-            if known is over and at is element:
-                return found
+        for cached_field, at, map_at_eps in self._last:
+            if cached_field is over and at is element:
+                return map_at_eps
         point = (*values, element)
         equation = equation_of(self.rows, over, point)
         is_needed = self.backward is not None or equation.degree > 1
         backward = (lambda: equation_of(self.inverse_rows, over, point)) if is_needed else None
-        found = ElementaryMap(equation, element, backward, self.variables)
-        self._last[:] = [] if values else [(over, element, found)]  # a map with symbols is not kept
-        return found
+        map_at_eps = ElementaryMap(equation, element, backward, self.variables)
+        self._last[:] = [] if values else [(over, element, map_at_eps)]  # a map with symbols is not kept
+        return map_at_eps
 
     def __repr__(self) -> str:
         return f"ImplicitMap({self.title} in {', '.join(self.variables)})"
@@ -540,16 +540,16 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
         x = tuple(over.random(rng) for _ in range(map_.dim))
         try:
             values = [over.random(rng) if root is None else root.over(over) for _ in map_.symbols]
-            found = map_.at(over.random(rng), over, values)
-            image = found.step(x)
-            if found.jacobian(x).det() == 0:
+            local = map_.at(over.random(rng), over, values)
+            image = local.step(x)
+            if local.jacobian(x).det() == 0:
                 return "found a map whose image is not the whole space: det dPhi is 0 everywhere"
-            back = x if map_.backward is None else found.inverse.step(image)
+            preimage = x if map_.backward is None else local.inverse.step(image)
         except BadPrime:
             continue
         except SingularStep:
             return "found a map that has no value at random points: the new point is not determined"
         tried += 1
-        if back != x:
+        if preimage != x:
             return "found a map that does not lead back from the images of random points, expected the inverse map"
     return "" if map_.backward is not None else why_not_birational(map_.rows)

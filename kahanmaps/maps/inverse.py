@@ -67,14 +67,14 @@ def inverse_rows(rows: Rows) -> Rows:
         for row in rows
     ]
     field, sample = _graph_point(rows)
-    found = _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
+    solution = _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
     home = ring(names)
-    back = [home.constant(0)] * n + list(home.gens())
+    exchange = [home.constant(0)] * n + list(home.gens())
     inverse = []
     for i in range(n):
-        above, below = (part.compose(*back, ctx=home) for part in found[i])
-        scale = below.leading_coefficient()
-        inverse.append((*(below / scale if i == j else home.constant(0) for j in range(n)), -above / scale))
+        numerator, denominator = (part.compose(*exchange, ctx=home) for part in solution[i])
+        scale = denominator.leading_coefficient()
+        inverse.append((*(denominator / scale if i == j else home.constant(0) for j in range(n)), -numerator / scale))
     return tuple(inverse)
 
 
@@ -139,7 +139,7 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
     """The unknowns as functions of all else, from polynomials that vanish on the graph."""
     if not unknowns:
         return {}
-    known: list[Any] = []
+    relations: list[Any] = []
     for polynomial in polynomials:
         if polynomial.is_zero():
             continue
@@ -148,15 +148,17 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
         factor = next((factor for factor, _ in polynomial.factor()[1] if on_graph(factor)), None)
         if factor is None:
             raise TooLarge("the inverse of this map was not found: give it as well")
-        if factor not in known:
-            known.append(factor)
-    if len(known) < len(unknowns) or any(not any(p.degrees()[u] for u in unknowns) for p in known):
+        if factor not in relations:
+            relations.append(factor)
+    if len(relations) < len(unknowns) or any(not any(p.degrees()[u] for u in unknowns) for p in relations):
         raise NotBirational("found a map whose image is not the whole space: det dPhi is 0 everywhere")
-    linear = [(len(p), p, u) for p in known for u in unknowns if p.degrees()[u] == 1]
+    linear = [(len(p), p, u) for p in relations for u in unknowns if p.degrees()[u] == 1]
     if linear:
-        _, chosen, u = min(linear, key=lambda one: (sum(bool(one[1].degrees()[v]) for v in unknowns), one[0]))
+        _, chosen, u = min(
+            linear, key=lambda candidate: (sum(bool(candidate[1].degrees()[v]) for v in unknowns), candidate[0])
+        )
         rest, slope = _coefficients(chosen, u)
-        others = [_substituted(p, u, -rest, slope) for p in known if p is not chosen]
+        others = [_substituted(p, u, -rest, slope) for p in relations if p is not chosen]
         solution = _solved(others, [v for v in unknowns if v != u], on_graph)
         (a, b), (c, d) = (_put_in(part, solution) for part in (-rest, slope))
         return solution | {u: _lowest(a * d, b * c)}
@@ -164,12 +166,12 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
     if len(unknowns) == 1:
         raise NotBirational(
             "found a map that is not birational: in general a point of its image has at least "
-            f"{known[0].degrees()[unknowns[0]]} preimages"
+            f"{relations[0].degrees()[unknowns[0]]} preimages"
         )
-    u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in known))
-    through = sorted((p for p in known if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
+    u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in relations))
+    through = sorted((p for p in relations if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
     first, name = through[0], str(through[0].context().names()[u])
-    rest = [p for p in known if not p.degrees()[u]]
+    rest = [p for p in relations if not p.degrees()[u]]
     for p in through[1:]:
         if len(first) * len(p) * (first.degrees()[u] + p.degrees()[u]) > _LARGEST_RESULTANT:
             raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
@@ -178,8 +180,8 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
     solution = _solved(rest, others, on_graph)
     common = None
     for p in through:
-        above, _ = _put_in(p, solution)
-        common = above if common is None else common.gcd(above)
+        numerator, _ = _put_in(p, solution)
+        common = numerator if common is None else common.gcd(numerator)
     return solution | _solved([common], [u], on_graph)
 
 
@@ -192,25 +194,25 @@ def _coefficients(polynomial: Any, u: int) -> list[Any]:
     return [context.from_dict(part) for part in parts]
 
 
-def _substituted(polynomial: Any, u: int, above: Any, below: Any) -> Any:
+def _substituted(polynomial: Any, u: int, numerator: Any, denominator: Any) -> Any:
     """The polynomial with above/below for a variable, times the power of `below` that makes it one again."""
     *lower, total = _coefficients(polynomial, u)
-    power = below**0
+    power = denominator**0
     for coefficient in reversed(lower):
-        power = power * below
-        total = total * above + coefficient * power
+        power = power * denominator
+        total = total * numerator + coefficient * power
     return total
 
 
 def _put_in(polynomial: Any, solution: Solution) -> Quotient:
     """The polynomial with the solution for its unknowns."""
     denominator = polynomial.context().constant(1)
-    for u, (above, below) in solution.items():
+    for u, (numerator, below) in solution.items():
         denominator = denominator * below ** int(polynomial.degrees()[u])
-        polynomial = _substituted(polynomial, u, above, below)
+        polynomial = _substituted(polynomial, u, numerator, below)
     return _lowest(polynomial, denominator)
 
 
-def _lowest(above: Any, below: Any) -> Quotient:
-    common = above.gcd(below)
-    return above / common, below / common
+def _lowest(numerator: Any, denominator: Any) -> Quotient:
+    common = numerator.gcd(denominator)
+    return numerator / common, denominator / common

@@ -133,7 +133,7 @@ class KahanMap(DisplayedAsFormula, ElementaryMap):
             one, zero = field.one, field.zero
             terms = []
             for i in range(n):
-                left = [
+                matrix = [
                     [
                         *enumerate(tensor[(i * n + j) * n : (i * n + j + 1) * n]),
                         (n, -B[i * n + j] + (one if i == j else zero)),
@@ -141,7 +141,7 @@ class KahanMap(DisplayedAsFormula, ElementaryMap):
                     for j in range(n)
                 ]
                 right = [*((j, -B[i * n + j] - (one if i == j else zero)) for j in range(n)), (n, c[i])]
-                terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*left, right)))
+                terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*matrix, right)))
         return Equation(field, exponents, tuple(terms))
 
     @property
@@ -199,12 +199,12 @@ class KahanFamily(MapFamily):
         """Those of (I - eps f'(x) | -r), r = (I - eps f'(x)) x + 2 eps f(x), polynomials in the `names`."""
         context = ring(self.names)
         *x, eps = context.gens()
-        places = [context.gen(self.names.index(name)) for name in names_of(self.system.rhs[0])]
+        variables = [context.gen(self.names.index(name)) for name in names_of(self.system.rhs[0])]
         rows = []
         for i, (slopes, f) in enumerate(zip(self.system.jacobian(self.names), self.system.rhs, strict=True)):
             row = [int(i == j) - eps * slope for j, slope in enumerate(slopes)]
             product = sum((entry * y for entry, y in zip(row, x, strict=False)), context.constant(0))
-            rows.append((*row, -product - 2 * eps * f.compose(*places, ctx=context)))
+            rows.append((*row, -product - 2 * eps * f.compose(*variables, ctx=context)))
         return tuple(rows)
 
     def written(self) -> dict[str, list[str]]:
@@ -228,5 +228,5 @@ def as_map(value: SystemLike) -> MapFamily:
     if isinstance(value, MapFamily):
         return value
     # Names and paths are read on a floor above, which is loaded only where one of them is given.
-    found: MapFamily = import_module("kahanmaps.documents.inline").as_file(value).map
-    return found
+    map_: MapFamily = import_module("kahanmaps.documents.inline").as_file(value).map
+    return map_

@@ -27,14 +27,14 @@ def has_llvm() -> bool:
         return False
 
 
-def choose_kernel(wish: str | None, long: bool) -> str:
+def choose_kernel(requested: str | None, is_long: bool) -> str:
     """The wish, or numba where it is installed and `long` says that loading it pays. Raises InputError for another.
 
-    >>> choose_kernel("numpy", long=True), choose_kernel(None, long=False)
+    >>> choose_kernel("numpy", is_long=True), choose_kernel(None, is_long=False)
     ('numpy', 'numpy')
     """
-    if wish not in (None, *KERNELS):
-        raise InputError(f"found the kernel {wish!r}, expected {' or '.join(KERNELS)}")
-    if wish == "numba" and not has_numba():
+    if requested not in (None, *KERNELS):
+        raise InputError(f"found the kernel {requested!r}, expected {' or '.join(KERNELS)}")
+    if requested == "numba" and not has_numba():
         raise InputError("the kernel numba needs numba: pip install 'kahanmaps[fast]', or take the kernel numpy")
-    return wish or ("numba" if long and has_numba() else "numpy")
+    return requested or ("numba" if is_long and has_numba() else "numpy")

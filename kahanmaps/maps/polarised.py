@@ -47,13 +47,13 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     if not 2 <= degree <= MAX_DEGREE:
         raise InputError(f"found the degree {degree}, expected 2 to {MAX_DEGREE}")
     n = len(rhs)
-    names, rest = names_of(rhs[0])[:n], names_of(rhs[0])[n:]
-    found = max((sum(m[:n]) for f in rhs for m in f.monoms()), default=0)
-    if found > degree:
-        raise InputError(f"found right-hand sides of degree {found}, expected at most {degree}")
+    names, parameters = names_of(rhs[0])[:n], names_of(rhs[0])[n:]
+    degree_of_field = max((sum(m[:n]) for f in rhs for m in f.monoms()), default=0)
+    if degree_of_field > degree:
+        raise InputError(f"found right-hand sides of degree {degree_of_field}, expected at most {degree}")
     copies = degree - 1
     variables = (*names, *(f"{name}_{k}" for k in range(1, copies) for name in names))
-    context = ring((*variables, *rest))
+    context = ring((*variables, *parameters))
     known = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
     step = 2 * copies * context.gens()[-1]
     last = [_linear_in_one_point(f, known, step, degree) for f in rhs]
@@ -72,7 +72,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
         behind = [one + entry for one, entry in zip(unknown, matrix, strict=True)]
         forward.append((*zero, *ahead, -known[0][i] - right))
         backward.append((*behind, *zero, -known[-1][i] + right))
-    field = PolynomialField(tuple(substitute(f, {rest[-1]: fmpq(0)}) for f in rhs), rest[:-1])
+    field = PolynomialField(tuple(substitute(f, {parameters[-1]: fmpq(0)}) for f in rhs), parameters[:-1])
     return ImplicitMap(variables, tuple(forward), TITLE, time_steps=1, backward=tuple(backward), of_field=field)
 
 
@@ -87,11 +87,11 @@ def _linear_in_one_point(
         factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
         factors += [None] * (degree - len(factors))
         share = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
-        for places in permutations(factors):
+        for arrangement in permutations(factors):
             product = share
-            for point, j in zip(known, places[:copies], strict=True):
+            for point, j in zip(known, arrangement[:copies], strict=True):
                 product = product * (one if j is None else point[j])
-            j = places[-1]
+            j = arrangement[-1]
             if j is None:
                 free = free + product
             else:

@@ -103,9 +103,9 @@ class PaperObjects:
 
     # ---- numbers, vectors and matrices --------------------------------------------------------------------------
 
-    def number(self, above: int, below: int = 1) -> Any:
+    def number(self, numerator: int, denominator: int = 1) -> Any:
         """The rational number above/below as an element of K."""
-        return self.K.convert(fmpq(above, below))
+        return self.K.convert(fmpq(numerator, denominator))
 
     @cached_property
     def I(self) -> Any:  # noqa: E743 (the paper's letter)
@@ -365,12 +365,12 @@ class PaperObjects:
 
         From the roots by Lagrange's formula 1 + (B_i(lambda_i) - 1) prod (lambda - lambda_j)/(lambda_i - lambda_j).
         """
-        product, below = [self.K.one], self.K.one
+        product, denominator = [self.K.one], self.K.one
         for j in self.each:
             if j != i:
                 product = _times_linear(self.K, product, self.lam[j])
-                below = below * (self.lam[i] - self.lam[j])
-        factor = (self.minus - self.K.one) / below
+                denominator = denominator * (self.lam[i] - self.lam[j])
+        factor = (self.minus - self.K.one) / denominator
         coefficients = [coefficient * factor for coefficient in product]
         coefficients[0] = coefficients[0] + self.K.one
         return coefficients
@@ -409,7 +409,7 @@ class PaperObjects:
             return self.sign_vectors
         if count == 1:
             return ((-1,),)
-        return tuple((1, *rest) for rest in itertools.product((1, -1), repeat=count - 1))[1:]
+        return tuple((1, *other_signs) for other_signs in itertools.product((1, -1), repeat=count - 1))[1:]
 
     @remembered
     def g(self, B: Any) -> SystemOver:
@@ -544,8 +544,8 @@ class PaperObjects:
     @remembered
     def Q(self, i: int, x: Any) -> Any:
         """Q_i = (2 - m + sum 1/s_j - 2/s_i)/(4 eps^2)."""
-        above = self.number(2 - self.m) + self.reciprocals(x) - self.number(2) / self.s(i, x)
-        return above / (self.number(4) * self.eps * self.eps)
+        numerator = self.number(2 - self.m) + self.reciprocals(x) - self.number(2) / self.s(i, x)
+        return numerator / (self.number(4) * self.eps * self.eps)
 
     # ---- variations ---------------------------------------------------------------------------------------------
 
@@ -599,8 +599,8 @@ class PaperObjects:
                 base=base and SystemOver(self.K, base.tensor, self.J * X, self.J * linear),
                 draw=self.vector,
             )
-        found: PaperObjects = self._memory["inhomogeneous"]
-        return found
+        objects: PaperObjects = self._memory["inhomogeneous"]
+        return objects
 
     def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
         """A quadratic system without any structure: f'', B and c are drawn."""
@@ -707,8 +707,8 @@ class PaperObjects:
                 factor = self.number({1: 6, 2: 2, 3: 1}[len({a, b, c})])  # the third derivative of x_a x_b x_c
                 for i in range(n):  # entry (i, k) of A nabla^2 H gains A_ij, entry (k, i) of nabla^2 H A^T as well
                     if i != k:
-                        place = l * len(pairs) + pairs[min(i, k), max(i, k)]
-                        row[place] = row[place] + self.A[i, j] * (factor if i < k else -factor)
+                        column = l * len(pairs) + pairs[min(i, k), max(i, k)]
+                        row[column] = row[column] + self.A[i, j] * (factor if i < k else -factor)
             rows.append(row)
         return rank(K, K.matrix(len(rows), len(rows[0]), [entry for row in rows for entry in row]))
 

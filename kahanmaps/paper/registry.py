@@ -133,7 +133,7 @@ def claims() -> tuple[Claim, ...]:
     """All claims, in the order of the paper."""
     for _, name in SECTIONS.values():
         import_module(f"kahanmaps.paper.claims.{name}")
-    return tuple(sorted(_claims.values(), key=lambda found: found.section))
+    return tuple(sorted(_claims.values(), key=lambda claim: claim.section))
 
 
 # ---- evaluating a claim ----------------------------------------------------------------------------------------

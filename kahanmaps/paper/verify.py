@@ -200,29 +200,29 @@ class Verifier:
         sections = self.options.sections
         made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected = [c for c in made if sections is None or c.section in sections]
-        found: list[Finding] = []
+        findings: list[Finding] = []
         without: list[str] = []
         for k, claim in enumerate(selected):
             self.settings.progress(f"{claim.place} ({k + 1} of {len(selected)})")
             if self.options.controls:
                 controls = self.controls(claim)
-                found += controls
+                findings += controls
                 if self.outside(claim) is None and not any(finding.is_as_expected for finding in controls):
                     without.append(claim.key)
             else:
-                found.append(self.verify_claim(claim))
+                findings.append(self.verify_claim(claim))
             for objects in self._points.values():  # or they would remember the values of all claims
                 if objects is not None:
                     objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
         if self.options.controls:
-            tried = {"claims": len({finding.place["key"] for finding in found})}
-            text = f"{len(found)} controls of {tried['claims']} claims, all refuted at exact points"
-            if without or not found:
+            tried = {"claims": len({finding.place["key"] for finding in findings})}
+            text = f"{len(findings)} controls of {tried['claims']} claims, all refuted at exact points"
+            if without or not findings:
                 text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
-            verdict = Certainty.UNDECIDED if without or not found else Certainty.PROVED
+            verdict = Certainty.UNDECIDED if without or not findings else Certainty.PROVED
             claimed = "every claim fails on some input that breaks one of its hypotheses"
-            found.append(Finding(claimed, verdict, Evidence("controls", text, tried)))
-        return found
+            findings.append(Finding(claimed, verdict, Evidence("controls", text, tried)))
+        return findings
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
         """The number-th random point over GF(p); with the roots of chi, if need be, or None where they are not had."""
@@ -245,10 +245,10 @@ class Verifier:
                     if needs_split:
                         self.settings.progress("looking for a prime at which chi splits")
                         # One prime in m! splits at worst, so that this fails with probability e^-40.
-                        found = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
-                        if found is None:
+                        split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
+                        if split_field is None:
                             return None
-                        K, in_K = found
+                        K, in_K = split_field
                     else:
                         K = random_prime_field(rng)
                         in_K = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
@@ -322,12 +322,14 @@ class Verifier:
             return self._verify_existence(claim)
         statement = ClaimAtPoints(self, claim)
         decision = decide(statement, self.settings.seed, self.settings.error_bits)
-        found = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
+        finding = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
         if claim.misprint and decision.verdict is Certainty.SUPPORTED:
             silent = Evidence("special member", f"the misprint does not show for this member: {self.what_is_special()}")
-            return replace(found, verdict=Certainty.UNDECIDED, evidence=silent, also=(found.evidence,), applies=False)
+            return replace(
+                finding, verdict=Certainty.UNDECIDED, evidence=silent, also=(finding.evidence,), applies=False
+            )
         if claim.misprint or decision.verdict is Certainty.REFUTED:
-            return found
+            return finding
         try:
             proof = self.proof(claim, statement.needs, *statement.bound)
             if proof is None and claim.theorem:
@@ -341,7 +343,7 @@ class Verifier:
                 return self._finding(claim, Certainty.PROVED, proof, (decision.evidence, *also))
             if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
                 return self._finding(claim, Certainty.PROVED, proof, also)
-        return replace(found, also=(*found.also, *also))
+        return replace(finding, also=(*finding.also, *also))
 
     def _verify_existence(self, claim: Claim) -> Finding:
         """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
@@ -457,21 +459,21 @@ class Verifier:
         """What holds for the whole table."""
         if self.member is None:
             return [NOTE_ON_RANDOM_MEMBERS]
-        found = [diagnosis(self.member.A)]
+        notes = [diagnosis(self.member.A)]
         if self.member.is_generic and not self.options.controls:
-            found.append(NOTE_ON_PROOFS)
+            notes.append(NOTE_ON_PROOFS)
         if self.options.ball_bits is not None and self.member.is_generic:
             with CC(self.options.ball_bits).working():
                 roots = specialize.complex_roots(self.member, self.options.ball_bits)
                 enclosures = [str(root.str(20)) for root in roots]
-            found.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
-        return found
+            notes.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
+        return notes
 
     def controls(self, claim: Claim) -> list[Finding]:
         """The claim on broken input, one finding for every control that it names: each is expected to be refuted."""
         if claim.misprint:
             return [self.verify_claim(claim)]
-        found = []
+        controls = []
         for name in claim.breaks:
             if self.m < CONTROLS[name].least_m or self.outside(claim) is not None:
                 continue
@@ -485,9 +487,9 @@ class Verifier:
             evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
             place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
-            found.append(replace(finding, control=True, place=place))
+            controls.append(replace(finding, control=True, place=place))
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
-        return [finding for finding in found if finding.is_as_expected] or found
+        return [finding for finding in controls if finding.is_as_expected] or controls
 
     def _broken(self, claim: Claim, name: str) -> ClaimOutcome | None:
         """The claim on input broken by a control, at a point at which it fails; else the last outcome.
@@ -591,7 +593,7 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
 
     Raises Contradiction where the two sides are different rational functions.
     """
-    claim = next(found for found in claims() if found.key == key)
+    claim = next(claim_ for claim_ in claims() if claim_.key == key)
     bounds = specialize.universal_bound_objects(blocks, order)
     for _ in claim.function(bounds):  # which notes the letters that are used
         pass

@@ -58,15 +58,15 @@ class QuadraticSystem(PolynomialField, DisplayedAsFormula):
                 f"found {len(self.rhs)} right-hand sides for the {n} variables {', '.join(names)}, expected {n}"
             )
         for name, polynomial in zip(names, self.rhs, strict=True):
-            found = max((sum(m[:n]) for m in polynomial.monoms()), default=0)
-            if found > 2 and self.symbols:
+            degree = max((sum(m[:n]) for m in polynomial.monoms()), default=0)
+            if degree > 2 and self.symbols:
                 raise InputError(
-                    f"found right-hand sides of degree {found} in the variables with {', '.join(self.symbols)} as "
+                    f"found right-hand sides of degree {degree} in the variables with {', '.join(self.symbols)} as "
                     "symbols, expected at most 2: leave the parameter that makes them cubic a number"
                 )
-            if found > 2:
+            if degree > 2:
                 raise InputError(
-                    f"the right-hand side of {name}' has degree {found}, expected at most 2: "
+                    f"the right-hand side of {name}' has degree {degree}, expected at most 2: "
                     "Kahan's discretization is defined for quadratic systems"
                 )
 
@@ -164,12 +164,12 @@ class QuadraticSystem(PolynomialField, DisplayedAsFormula):
         """
         if self.symbols:
             return SystemOver.of(field_of_numbers, self, values)
-        found = self._over.get(field_of_numbers)
-        if found is None:
+        system = self._over.get(field_of_numbers)
+        if system is None:
             if len(self._over) >= 8:  # random primes come and go
                 self._over.clear()
-            found = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
-        return found
+            system = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
+        return system
 
     @cached_property
     def digits(self) -> int:
@@ -283,8 +283,8 @@ def as_system(value: Any) -> QuadraticSystem:
     """Return the quadratic system that a value stands for: all that `maps.kahan.as_map` takes, but for other maps."""
     if isinstance(value, QuadraticSystem):
         return value
-    found: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
-    return found
+    system: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
+    return system
 
 
 def _indices(monomial: Sequence[int]) -> list[int]:

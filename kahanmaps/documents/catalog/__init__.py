@@ -61,8 +61,8 @@ def map_names() -> tuple[str, ...]:
 
 
 def _names_in(folder: Traversable) -> tuple[str, ...]:
-    found = (entry.name for entry in folder.iterdir())
-    return tuple(sorted(name.removesuffix(_ENDING) for name in found if name.endswith(_ENDING)))
+    entries = (entry.name for entry in folder.iterdir())
+    return tuple(sorted(name.removesuffix(_ENDING) for name in entries if name.endswith(_ENDING)))
 
 
 def text_of(name: str) -> bytes:
@@ -86,7 +86,7 @@ def titles() -> dict[str, tuple[int, str]]:
     >>> titles()["lorenz"]
     (3, 'Lorenz system')
     """
-    found = {}
+    titles_by_name = {}
     for name in (*names(), *map_names()):
         document = tomllib.loads(text_of(name).decode())
         if "composition" in document:
@@ -94,8 +94,8 @@ def titles() -> dict[str, tuple[int, str]]:
         else:
             variables = document.get("variables") or document["family"]["A"]
         copies = 2 if document.get("system", {}).get("discretization") == "polarised" else 1
-        found[name] = copies * len(variables), document["catalog"]["title"]
-    return found
+        titles_by_name[name] = copies * len(variables), document["catalog"]["title"]
+    return titles_by_name
 
 
 def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **values: Any) -> SystemFile:
@@ -145,11 +145,11 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
 def _unknown(name: str) -> InputError:
     if not name or len(name) > 60 or not name.isprintable():  # no name that anybody meant
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
-    wanted = name.lower().replace("-", "_").replace(" ", "_")
-    known = (*names(), *map_names())
-    close = difflib.get_close_matches(wanted, known, 3)
+    normalized = name.lower().replace("-", "_").replace(" ", "_")
+    known_names = (*names(), *map_names())
+    close = difflib.get_close_matches(normalized, known_names, 3)
     # Or names that contain what was written, e.g. "volterra".
-    close += [other for other in known if len(wanted) > 2 and wanted in other and other not in close]
+    close += [other for other in known_names if len(normalized) > 2 and normalized in other and other not in close]
     close = close[:3]
     meant = f", did you mean {' or '.join(close)}?" if close else ":"
     return InputError(

@@ -82,15 +82,15 @@ class PlanarBlocks:
     @property
     def labels(self) -> tuple[str, ...]:
         """The roots as short text; a complex one stands for itself and its conjugate."""
-        found = []
+        labels = []
         for root in self.roots:
             real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # a ball around 0, rounded
-            found.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
-        return tuple(found)
+            labels.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
+        return tuple(labels)
 
     def integrals(self, z: FloatArray) -> NDArray[np.complex128]:
         """The integrals h/(1 + eps^2 D) at the states z (rows, ...): an array (blocks, ...)."""
-        found = np.empty((len(self.kappa), *z.shape[1:]), dtype=np.complex128)
+        integrals = np.empty((len(self.kappa), *z.shape[1:]), dtype=np.complex128)
         with np.errstate(all="ignore"):
             for r, (coefficients, kappa) in enumerate(zip(self.coefficients, self.kappa, strict=True)):
                 if r < self.reals:
@@ -101,8 +101,8 @@ class PlanarBlocks:
                     U, V = z[at] + 1j * z[at + 1], z[at + 2] + 1j * z[at + 3]
                     a, b, c, d = coefficients
                 A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
-                found[r] = kappa * (((A * U + 2.0 * B * V) * U + C * V * V) / ((1.0 + B) * (1.0 - B) + A * C))
-        return found
+                integrals[r] = kappa * (((A * U + 2.0 * B * V) * U + C * V * V) / ((1.0 + B) * (1.0 - B) + A * C))
+        return integrals
 
     def distances(self, z: FloatArray, base: NDArray[np.complex128]) -> FloatArray:
         """How far the block integrals at the states z (rows, ...) are from `base`: an array (blocks, ...)."""
@@ -215,8 +215,11 @@ class _Blocks:
             [sum((arb(s) * l for s, l in zip(row[half], lagrange, strict=True)), acb(0)) for row in S]
             for half in (slice(0, m), slice(m, None))
         )
-        back = _inverse(frame)
-        out = [[(x * back[0][k] + y * back[1][k]) / step for x, y in zip(x_u, x_v, strict=True)] for k in (0, 1)]
+        inverse_frame = _inverse(frame)
+        out = [
+            [(x * inverse_frame[0][k] + y * inverse_frame[1][k]) / step for x, y in zip(x_u, x_v, strict=True)]
+            for k in (0, 1)
+        ]
         return numbers, kappa, into, out
 
     def _frame(self, root: acb, cubic: list[acb], rows: list[list[acb]]) -> tuple[str, Frame]:
@@ -231,7 +234,7 @@ class _Blocks:
         if root.imag.is_zero():  # then the factors are real
             lines = [[acb(entry.real) for entry in line] for line in lines]
         pairs = [(lines[i], lines[j]) for i in range(len(lines)) for j in range(i)]
-        sine, frame = max(((_sine(pair, rows), pair) for pair in pairs), key=lambda found: found[0])
+        sine, frame = max(((_sine(pair, rows), pair) for pair in pairs), key=lambda candidate: candidate[0])
         return (kind, frame) if sine > _OBLIQUE else (GENERAL, self._upright(rows))
 
     def _upright(self, rows: list[list[acb]]) -> Frame:
@@ -239,8 +242,8 @@ class _Blocks:
         one, zero = acb(1), acb(0)
         length = acb(_inner(rows[0], rows[0]).real.sqrt())
         slant = _inner(rows[1], rows[0]) / _inner(rows[0], rows[0]).real
-        rest = [y - slant * x for x, y in zip(*rows, strict=True)]
-        height = acb(_inner(rest, rest).real.sqrt())
+        remainder = [y - slant * x for x, y in zip(*rows, strict=True)]
+        height = acb(_inner(remainder, remainder).real.sqrt())
         return [one / length, zero], [-slant / height, one / height]
 
     def _vanishes(self, element: fmpq_poly, root: acb) -> bool:
@@ -286,10 +289,10 @@ def _inverse(frame: Frame) -> Frame:
 
 def _sine(frame: Frame, rows: list[list[acb]]) -> float:
     """The sine of the angle between two forms in u and v, as forms in x."""
-    one, two = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
-    size = abs(_inner(one, two))
+    first, second = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
+    size = abs(_inner(first, second))
     # Not size**2: in python-flint 0.9.0 every power but the 0th of an arb with the midpoint 0 and a radius is nan.
-    cosine = size * size / (_inner(one, one).real * _inner(two, two).real)
+    cosine = size * size / (_inner(first, first).real * _inner(second, second).real)
     if not cosine.is_finite():
         raise _Unclear
     return float((1 - cosine).mid()) ** 0.5 if cosine < 1 else 0.0
@@ -311,12 +314,12 @@ def _value(polynomial: fmpq_poly, at: acb) -> acb:
 def _doubles(row: Sequence[arb]) -> list[float]:
     """The entries as doubles; what is beyond doubt negligible beside the largest is 0."""
     largest = max((abs(entry) for entry in row), key=lambda entry: entry.mid())
-    found = []
+    doubles = []
     for entry in row:
         if entry.is_zero() or abs(entry) * arb(2) ** _NEGLIGIBLE < largest:
-            found.append(0.0)
+            doubles.append(0.0)
         elif entry.rel_accuracy_bits() >= _GOOD_BITS:
-            found.append(float(entry.mid()))
+            doubles.append(float(entry.mid()))
         else:
             raise _Unclear
-    return found
+    return doubles

@@ -88,11 +88,11 @@ class ClassicalOrbit:
 
     def _midpoint(self, x: FloatArray) -> FloatArray | None:
         f, h = self._field, self._h
-        one = np.eye(self._dim)
+        identity = np.eye(self._dim)
         y, last = x, np.inf
         for _ in range(_MOST_CORRECTIONS):
             try:
-                change = np.linalg.solve(one - 0.5 * h * f.jacobian(y), x - y + 0.5 * h * f(y))
+                change = np.linalg.solve(identity - 0.5 * h * f.jacobian(y), x - y + 0.5 * h * f(y))
             except np.linalg.LinAlgError:
                 return None
             y = y + change

@@ -95,9 +95,9 @@ def float_function(function: RationalFunction) -> Callable[[Sequence[float]], fl
 
     def value(point: Sequence[float]) -> float | None:
         try:
-            found: float | None = function.value(_Floats, point)
+            result: float | None = function.value(_Floats, point)
         except (OverflowError, ZeroDivisionError):
             return None
-        return found if found is not None and isfinite(found) else None
+        return result if result is not None and isfinite(result) else None
 
     return value

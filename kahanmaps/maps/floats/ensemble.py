@@ -125,7 +125,7 @@ class FloatEnsemble:
             raise InputError("found a start that is no finite number")
         if to_float(epsilon) == 0.0:
             raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
-        compiled = choose_kernel(kernel, long=True) == "numba" and has_llvm()
+        compiled = choose_kernel(kernel, is_long=True) == "numba" and has_llvm()
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = self.system.real_approximation
@@ -183,8 +183,8 @@ class FloatEnsemble:
     @property
     def status(self) -> NDArray[Any]:
         """One word an orbit: "completed" (all its steps so far), "overflow" or "singular"."""
-        words: NDArray[Any] = np.array(STATUS)[self._lanes.status]
-        return words
+        names: NDArray[Any] = np.array(STATUS)[self._lanes.status]
+        return names
 
     @property
     def failed_at(self) -> NDArray[np.int64]:
@@ -282,16 +282,16 @@ class FloatEnsemble:
             for interval in intervals:
                 length = (first + count) // interval - first // interval if interval else 0
                 tables.append(RecordTable(interval, np.empty((length, rows, self.n))))
-            wanted = [table for table in tables if len(table.states)]
+            filled = [table for table in tables if len(table.states)]
             if self._compiled:
 
-                def advance(low: int, first: int = first, count: int = count, wanted: Any = wanted) -> None:
-                    self._machine_code.advance(lanes, low, min(self.n, low + share), first, count, wanted)
+                def advance(low: int, first: int = first, count: int = count, filled: Any = filled) -> None:
+                    self._machine_code.advance(lanes, low, min(self.n, low + share), first, count, filled)
 
                 with ThreadPoolExecutor(self._threads) if len(lows) > 1 else nullcontext() as pool:
                     list(map(advance, lows) if pool is None else pool.map(advance, lows))
             else:
-                advance_by_numpy(self._step, lanes, first, count, wanted)
+                advance_by_numpy(self._step, lanes, first, count, filled)
             self.step = first + count
             for interval, states in tables:  # states after the end of an orbit become NaN
                 if len(states) and (lanes.status != RUNNING).any():
@@ -334,12 +334,12 @@ class Watched:
     def look(self, x: FloatArray) -> None:
         """Take notice of points (count, n, dim); those with NaN are passed over."""
         for points in x:
-            there = ~np.isnan(points).any(axis=1)
-            self._last[~there] = np.nan
-            distance = np.abs(self._values(points[there]) - self._initial[there])
+            is_finite = ~np.isnan(points).any(axis=1)
+            self._last[~is_finite] = np.nan
+            distance = np.abs(self._values(points[is_finite]) - self._initial[is_finite])
             distance[np.isnan(distance)] = np.inf
-            self._last[there] = distance
-            self._largest[there] = np.maximum(self._largest[there], distance)
+            self._last[is_finite] = distance
+            self._largest[is_finite] = np.maximum(self._largest[is_finite], distance)
 
     @property
     def drift(self) -> Drift:
@@ -347,8 +347,8 @@ class Watched:
         return Drift(self.name, self._initial.copy(), self._largest.copy(), self._last.copy())
 
     def _values(self, points: FloatArray) -> FloatArray:
-        found = (self._function(point) for point in points.tolist())
-        return np.array([np.nan if value is None else value for value in found], dtype=np.float64)
+        values = (self._function(point) for point in points.tolist())
+        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
 def ensemble(
@@ -369,10 +369,10 @@ def ensemble(
     [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
     require_steps(steps)
-    found = FloatEnsemble(as_map(system), resolve_eps(eps, time_step), starts, **options)
+    result = FloatEnsemble(as_map(system), resolve_eps(eps, time_step), starts, **options)
     if steps:
-        found.advance(steps)
-    return found
+        result.advance(steps)
+    return result
 
 
 def require_every(every: int) -> None:

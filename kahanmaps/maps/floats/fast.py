@@ -93,7 +93,7 @@ class FloatOrbit:
             self.start[None],
             backward=backward,
             form=form,
-            kernel=choose_kernel(kernel, long=steps is None or steps > _LONG),
+            kernel=choose_kernel(kernel, is_long=steps is None or steps > _LONG),
             threads=1,
             integrals=integrals,
             sampled=sampled,

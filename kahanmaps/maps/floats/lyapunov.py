@@ -101,8 +101,8 @@ class Lyapunov:
 
 
 def _over_orbits(function: Any, values: FloatArray) -> FloatArray:
-    found: FloatArray = function(values, axis=0) if len(values) else np.full(values.shape[1], np.nan)
-    return found
+    statistics: FloatArray = function(values, axis=0) if len(values) else np.full(values.shape[1], np.nan)
+    return statistics
 
 
 def lyapunov_exponents(
@@ -153,16 +153,16 @@ def lyapunov_exponents(
     frames = np.broadcast_to(np.eye(n), (len(x), n, n))
     sums, half, volumes, alive = np.zeros((len(x), n)), np.zeros((len(x), n)), np.zeros(len(x)), np.ones(len(x), bool)
     marks = [transient, transient + steps // 2, transient + steps]
-    known = 0, sums, half, volumes, alive  # after the last complete portion
+    checkpoint = 0, sums, half, volumes, alive  # after the last complete portion
     with suppress(TimeLimit):
         while orbits.step < marks[-1] and alive.any():
             progress(f"step {orbits.step} of {marks[-1]}")
             mark = next(mark for mark in marks if mark > orbits.step)
             count = min(mark - orbits.step, _STEPS, max(1, _PORTION // (len(x) * n * n)))
-            before = orbits.x[None]
+            previous = orbits.x[None]
             after = np.concatenate(list(orbits.records(count, 1)))[-count:]
             alive &= ~np.isnan(after).any(axis=(0, 2))
-            points = np.concatenate([before, after])[:, alive]
+            points = np.concatenate([previous, after])[:, alive]
             with np.errstate(all="ignore"):
                 maps, logs = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
                 maps, logs = maps.reshape(count, -1, n, n), logs.reshape(count, -1)
@@ -188,8 +188,8 @@ def lyapunov_exponents(
                 sums[:], volumes[:] = 0.0, 0.0
             elif orbits.step == marks[1]:
                 half = sums.copy()
-            known = orbits.step, sums.copy(), half, volumes.copy(), alive.copy()
-    done, sums, half, volumes, alive = known
+            checkpoint = orbits.step, sums.copy(), half, volumes.copy(), alive.copy()
+    done, sums, half, volumes, alive = checkpoint
     counted = max(0, done - transient)
     ended = len(x) - int(alive.sum())
     alive &= counted > 0

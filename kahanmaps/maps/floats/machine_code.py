@@ -173,18 +173,18 @@ class MachineCode:
 
         def of_rows(*lines: str) -> str:
             """Lines for each row, with its number, and the names of its image by the fast and the careful step."""
-            return "\n".join(line.format(i=i, fast=image[i], careful=again[i]) for i in rows for line in lines)
+            return "\n".join(line.format(i=i, fast=image[i], careful=recomputed[i]) for i in rows for line in lines)
 
-        def stored(name: str, table: str, place: str, value: str) -> str:
+        def stored(name: str, table: str, index: str, value: str) -> str:
             return of_rows(
                 f"%{name}{{i}}.r = mul i64 %n, {{i}}",
-                f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {place}",
+                f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {index}",
                 f"%{name}{{i}}.p = getelementptr double, ptr {table}, i64 %{name}{{i}}.o",
                 f"call void @llvm.masked.store.$s.p0($v {value}, ptr %{name}{{i}}.p, i32 8, $m %there)",
             )
 
         fast, (*image, good) = body(step.fast_code, "f")
-        careful, (*again, near, singular, overflow) = body(step.careful_code, "c")
+        careful, (*recomputed, near, singular, overflow) = body(step.careful_code, "c")
         parts = {
             "load": f"%record = mul i64 %n, {step.rows}\n"
             + of_rows(
@@ -207,12 +207,12 @@ class MachineCode:
             + "\n"
             + stored("u", "%z", "%at", "%r{i}"),
         }
-        words = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
-        words |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
-        words |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
-        words |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
-        words |= {"singular": singular, "overflow": overflow}
-        text = Template(_LOOPS.safe_substitute(parts)).substitute(words)
+        llvm_types = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
+        llvm_types |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
+        llvm_types |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
+        llvm_types |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
+        llvm_types |= {"singular": singular, "overflow": overflow}
+        text = Template(_LOOPS.safe_substitute(parts)).substitute(llvm_types)
         self._engine, self._call = _compiled(text)
 
     def advance(
@@ -220,8 +220,8 @@ class MachineCode:
     ) -> None:
         """Take the orbits low, ..., high - 1 `steps` steps from the index `first`; there are at most two tables."""
         records: list[Any] = []
-        for every, states in tables:
-            records += [states.ctypes.data, every, every - first % every]
+        for interval, states in tables:
+            records += [states.ctypes.data, interval, interval - first % interval]
         records += [None, _NEVER, _NEVER] * (2 - len(tables))
         arrays = (array.ctypes.data for array in lanes)
         self._call(*arrays, lanes.z.shape[1], low, high, first, steps, *records)

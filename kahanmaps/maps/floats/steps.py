@@ -72,10 +72,10 @@ class FloatStep:
     @cached_property
     def careful(self) -> Callable[..., tuple[Any, ...]]:
         """The image, and what happened."""
-        found = self._in_arrays if self.careful_code is None else self.careful_code.function(np.ndarray)
-        if found is None:
+        function = self._in_arrays if self.careful_code is None else self.careful_code.function(np.ndarray)
+        if function is None:
             raise AssertionError("a step has no careful version")
-        return found
+        return function
 
     @cached_property
     def careful_on_floats(self) -> Callable[..., tuple[Any, ...]]:
@@ -84,12 +84,12 @@ class FloatStep:
 
     def _code(self, careful: bool) -> Code | None:
         limit = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
-        code, asked = Code(self.rows, limit), StepFindings(careful)
+        code, findings = Code(self.rows, limit), StepFindings(careful)
         try:
-            image = self._write(code.arguments, asked)
+            image = self._write(code.arguments, findings)
             for x in image:
-                asked.number(x)
-            code.outputs = [*image, *asked.outputs()]
+                findings.number(x)
+            code.outputs = [*image, *findings.outputs()]
         except TooManyOperations:
             return None
         return code
@@ -98,7 +98,7 @@ class FloatStep:
 def planar_step(blocks: PlanarBlocks) -> FloatStep:
     """A step of a normal form."""
 
-    def write(z: Sequence[Any], asked: StepFindings) -> list[Any]:
+    def write(z: Sequence[Any], findings: StepFindings) -> list[Any]:
         image: list[Any] = []
         for r, coefficients in enumerate(blocks.coefficients):
             at, real = len(image), r < blocks.reals
@@ -109,7 +109,7 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
                 U, V = ComplexPair(z[at], z[at + 1]), ComplexPair(z[at + 2], z[at + 3])
                 a, b, c, d = (ComplexPair(x.real, x.imag) for x in coefficients.tolist())
             A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
-            for x in solve_two([[1.0 - B, -C, U], [A, 1.0 + B, V]], asked):
+            for x in solve_two([[1.0 - B, -C, U], [A, 1.0 + B, V]], findings):
                 image += [x] if real else [x.x, x.y]
         return image
 
@@ -120,9 +120,9 @@ def map_step(factors: Sequence[ElementaryMap]) -> FloatStep:
     """A step of each of the maps, one after the other. Raises InputError where a number is out of range."""
     equations = [float_equation(one) for one in factors]
 
-    def write(x: Sequence[Any], asked: StepFindings) -> Sequence[Any]:
+    def write(x: Sequence[Any], findings: StepFindings) -> Sequence[Any]:
         for equation in equations:
-            x = equation.image(x, asked)
+            x = equation.image(x, findings)
         return x
 
     return FloatStep(factors[0].dim, write, partial(_step_in_arrays, equations))
@@ -146,7 +146,7 @@ class FloatEquation(NamedTuple):
             y.append(y[a] * y[b])
         return y
 
-    def image(self, x: Sequence[Any], asked: StepFindings) -> list[Any]:
+    def image(self, x: Sequence[Any], findings: StepFindings) -> list[Any]:
         """The image of x."""
         y, n = self.monomials(x), len(self.constants)
         rows = []
@@ -159,10 +159,10 @@ class FloatEquation(NamedTuple):
             size: Any = 0.0
             for k in sorted({k for entries in self.terms for terms in entries[:n] for k, _ in terms}):
                 size = extreme("max", size, abs(y[k]))
-            most = max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[:n])
-            return size * most + max(1.0, max(abs(x) for constants in self.constants for x in constants[:n]))
+            largest_sum = max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[:n])
+            return size * largest_sum + max(1.0, max(abs(x) for constants in self.constants for x in constants[:n]))
 
-        return solve(rows, bound, asked)
+        return solve(rows, bound, findings)
 
 
 def float_equation(map_over: ElementaryMap) -> FloatEquation:
@@ -191,7 +191,7 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
         scale = fmpq(1) if isinstance(map_over, KahanMap) else 1 / largest
         constants, terms = [0.0] * (n + 1), []
         for j, entry in enumerate(row):
-            found = []
+            entries = []
             for k, coefficient in entry:
                 number = coefficient * scale if j < n else -coefficient * scale
                 try:
@@ -202,10 +202,10 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
                     ) from error
                 exponent = equation.exponents[k][:n]
                 if any(exponent):
-                    found.append((place(exponent), value))
+                    entries.append((place(exponent), value))
                 else:
                     constants[j] = value
-            terms.append(sorted(found))
+            terms.append(sorted(entries))
         all_constants.append(constants)
         all_terms.append(terms)
     return FloatEquation(all_constants, all_terms, products)
@@ -322,27 +322,27 @@ def advance_by_numpy(step: FloatStep, lanes: BatchState, first: int, steps: int,
                 except ZeroDivisionError:  # where arrays get an infinity
                     image, good = x, False
                 if good is not True and not np.all(good | dead):
-                    again = np.flatnonzero(~(good | dead))
-                    before, after = (
+                    repeat = np.flatnonzero(~(good | dead))
+                    points_before, points_after = (
                         np.array([np.broadcast_to(row, dead.shape) for row in state]) for state in (x, image)
                     )
-                    *careful, near, singular, overflow = step.careful(*before[:, again])
-                    ended = lanes.note(low + again, index, near, singular, overflow)
-                    for row, values in zip(after, careful, strict=True):
-                        row[again] = np.where(ended, 0.0, values)
-                    dead[again] |= ended
-                    image = after[:, 0].tolist() if single else list(after)
+                    *careful, near, singular, overflow = step.careful(*points_before[:, repeat])
+                    ended = lanes.note(low + repeat, index, near, singular, overflow)
+                    for row, values in zip(points_after, careful, strict=True):
+                        row[repeat] = np.where(ended, 0.0, values)
+                    dead[repeat] |= ended
+                    image = points_after[:, 0].tolist() if single else list(points_after)
                 x = image
-                for kept, (every, states) in zip(path, tables, strict=True):
-                    if (index + 1) % every == 0 and single:
-                        kept.append(x)
-                    elif (index + 1) % every == 0:
-                        for row, values in zip(states[(index + 1) // every - first // every - 1], x, strict=True):
+                for buffer, (interval, states) in zip(path, tables, strict=True):
+                    if (index + 1) % interval == 0 and single:
+                        buffer.append(x)
+                    elif (index + 1) % interval == 0:
+                        for row, values in zip(states[(index + 1) // interval - first // interval - 1], x, strict=True):
                             row[part] = values
                 if single and dead[0]:
                     break
-            for kept, (_, states) in zip(path, tables, strict=True):
-                if kept:
-                    states[: len(kept), :, low] = kept
+            for buffer, (_, states) in zip(path, tables, strict=True):
+                if buffer:
+                    states[: len(buffer), :, low] = buffer
             for row, values in zip(lanes.z, x, strict=True):
                 row[part] = np.where(dead, 0.0, values)

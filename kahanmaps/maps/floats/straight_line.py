@@ -95,17 +95,17 @@ class Code:
             dying = {
                 v.number for v in operands if isinstance(v, Value) and last[v.number] == k and v.number >= self.inputs
             }
-            places = [names[number] for number in sorted(dying)]
+            free_names = [names[number] for number in sorted(dying)]
             if kind is not float and name in ("add", "sub", "mul", "div") and isinstance(operands[0], Value):
                 if name in ("add", "mul") and operands[0].number not in dying:
                     x.reverse()
-                if x[0] in places:  # in place
-                    places.remove(x[0])
+                if x[0] in free_names:  # in place
+                    free_names.remove(x[0])
                     names[self.inputs + k] = x[0]
                     lines.append(f"    {x[0]} {_SYMBOLS[name]}= {x[1]}")
-                    unused += places
+                    unused += free_names
                     continue
-            unused += places
+            unused += free_names
             names[self.inputs + k] = unused.pop() if unused else f"v{self.inputs + k}"
             lines.append(f"    {names[self.inputs + k]} = {right}")
         lines.append(f"    return ({''.join(f'{text(x)}, ' for x in self.outputs)})")
@@ -113,8 +113,8 @@ class Code:
         if kind is float:
             functions = {"max": max, "min": min}
         exec("\n".join(lines), functions)
-        found: Callable[..., tuple[Any, ...]] = functions["step"]
-        return found
+        function: Callable[..., tuple[Any, ...]] = functions["step"]
+        return function
 
 
 class Value:
@@ -227,12 +227,12 @@ def is_zero(x: Any) -> bool:
     return isinstance(x, float | int) and x == 0.0
 
 
-def select(condition: Any, one: Any, other: Any) -> Any:
+def select(condition: Any, if_true: Any, if_false: Any) -> Any:
     """One number where the condition holds and the other elsewhere."""
     if isinstance(condition, bool):
-        return one if condition else other
-    same = one is other or (isinstance(one, float) and isinstance(other, float) and one == other)
-    return one if same else condition.code.emit("select", condition, one, other)
+        return if_true if condition else if_false
+    same = if_true is if_false or (isinstance(if_true, float) and isinstance(if_false, float) and if_true == if_false)
+    return if_true if same else condition.code.emit("select", condition, if_true, if_false)
 
 
 def extreme(name: str, x: Any, y: Any) -> Any:
@@ -258,12 +258,12 @@ class StepFindings:
         self.finite: Any = True
         self._sum: Any = 0.0
 
-    def pivot(self, pivot: Any, least: Any) -> None:
+    def pivot(self, pivot: Any, threshold: Any) -> None:
         """A number that is divided by, which is small up to `least` in absolute value."""
         if isinstance(pivot, float):  # a coefficient: 0 if the matrix is singular everywhere
             self.zero, self.good = self.zero | (pivot == 0.0), self.good & (pivot != 0.0)
             return
-        usual = abs(pivot) > least
+        usual = abs(pivot) > threshold
         if self.careful:
             self.near, self.zero = self.near | ~usual, self.zero | pivot.code.emit("eq", pivot, 0.0)
         else:
@@ -291,84 +291,84 @@ def _negation(x: Any) -> Any:
     return not x if isinstance(x, bool) else ~x
 
 
-def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: StepFindings) -> list[Any]:
+def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], findings: StepFindings) -> list[Any]:
     """The solution y of M y = r, the rows being those of (M | r); any numbers where M is singular.
 
     `bound` gives a number that no entry of M exceeds, which is needed for fast eliminations only.
     """
     n = len(rows)
     matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
-    right, left, found = [row[n] for row in rows], set(range(n)), [0.0] * n
+    rhs, remaining, solution = [row[n] for row in rows], set(range(n)), [0.0] * n
     # A row with one entry comes first. A column with one entry comes last: the other rows do not need its unknown.
     after: list[tuple[int, int]] = []
-    while left:
-        single = next((i for i in sorted(left) if len(matrix[i]) == 1), None)
+    while remaining:
+        single = next((i for i in sorted(remaining) if len(matrix[i]) == 1), None)
         if single is not None:
-            left.remove(single)
+            remaining.remove(single)
             ((j, pivot),) = matrix[single].items()
-            asked.pivot(pivot, NEAR)
-            found[j] = right[single] / pivot
-            for k in left:
+            findings.pivot(pivot, NEAR)
+            solution[j] = rhs[single] / pivot
+            for k in remaining:
                 if j in matrix[k]:
-                    right[k] = right[k] - matrix[k].pop(j) * found[j]
+                    rhs[k] = rhs[k] - matrix[k].pop(j) * solution[j]
             continue
         columns: dict[int, list[int]] = {}
-        for i in sorted(left):
+        for i in sorted(remaining):
             for j in matrix[i]:
                 columns.setdefault(j, []).append(i)
         alone = next((j for j in sorted(columns) if len(columns[j]) == 1), None)
         if alone is None:
             break
         after.append((columns[alone][0], alone))
-        left.remove(columns[alone][0])
-    while left:  # blocks of rows that have unknowns in common
+        remaining.remove(columns[alone][0])
+    while remaining:  # blocks of rows that have unknowns in common
         block: set[int] = set()
-        more = {min(left)}
-        while more != block:
-            block, unknowns = more, {j for i in more for j in matrix[i]}
-            more = {i for i in left if unknowns & matrix[i].keys()} | block
-        left -= block
+        component = {min(remaining)}
+        while component != block:
+            block, unknowns = component, {j for i in component for j in matrix[i]}
+            component = {i for i in remaining if unknowns & matrix[i].keys()} | block
+        remaining -= block
         order = sorted(unknowns)
         if len(order) != len(block):  # singular everywhere
-            asked.pivot(0.0, NEAR)
+            findings.pivot(0.0, NEAR)
             continue
-        square = [[*(matrix[i].get(j, 0.0) for j in order), right[i]] for i in sorted(block)]
-        values = solve_two(square, asked) if len(square) == 2 else _eliminate(square, bound, asked)
+        square = [[*(matrix[i].get(j, 0.0) for j in order), rhs[i]] for i in sorted(block)]
+        values = solve_two(square, findings) if len(square) == 2 else _eliminate(square, bound, findings)
         for j, value in zip(order, values, strict=True):
-            found[j] = value
+            solution[j] = value
     for i, j in reversed(after):
-        asked.pivot(matrix[i][j], NEAR)
-        total = right[i]
+        findings.pivot(matrix[i][j], NEAR)
+        total = rhs[i]
         for k, entry in matrix[i].items():
-            total = total if k == j else total - entry * found[k]
-        found[j] = total / matrix[i][j]
-    return found
+            total = total if k == j else total - entry * solution[k]
+        solution[j] = total / matrix[i][j]
+    return solution
 
 
-def solve_two(rows: Sequence[Sequence[Any]], asked: StepFindings) -> list[Any]:
+def solve_two(rows: Sequence[Sequence[Any]], findings: StepFindings) -> list[Any]:
     """Cramer's rule for two equations, whose entries may be complex (`Pair`)."""
     (a, b, r), (c, d, s) = rows
     product = b * c
     det = a * d - product
     if isinstance(det, ComplexPair):
         norm = det.norm()
-        asked.pivot(norm, NEAR**2 + NEAR**2 * product.norm())
+        findings.pivot(norm, NEAR**2 + NEAR**2 * product.norm())
         share = _inverse(norm)
         inverse: Any = ComplexPair(det.x * share, -(det.y * share))
     else:
-        asked.pivot(det, NEAR + NEAR * abs(product))
+        findings.pivot(det, NEAR + NEAR * abs(product))
         inverse = _inverse(det)
     return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
 
 
-def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: StepFindings) -> list[Any]:
+def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], findings: StepFindings) -> list[Any]:
     """Gaussian elimination; the careful one exchanges rows where a pivot is small."""
     n, M = len(rows), [[*row, 1.0] for row in rows]  # with the sizes of the rows behind the right-hand side
     order = _pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
     if len(order) < n:  # singular everywhere
-        asked.pivot(0.0, NEAR)
+        findings.pivot(0.0, NEAR)
         return [0.0] * n
-    for row in M if asked.careful else ():
+    for row in M if findings.careful else ():
         for x in row[:n]:
             row[-1] = extreme("max", row[-1], abs(x))
     inverses: list[Any] = []
@@ -376,16 +376,16 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: StepFindi
     for step, (i, j) in enumerate(order):
         columns = [*(c for _, c in order[step + 1 :]), n]
         later = [k for k, _ in order[step + 1 :]]
-        for k in later if asked.careful else ():
+        for k in later if findings.careful else ():
             swap = abs(M[k][j]) > MUCH * abs(M[i][j])
             for c in (j, *columns, n + 1):
-                one, other = M[i][c], M[k][c]
-                M[i][c], M[k][c] = select(swap, other, one), select(swap, one, other)
+                entry, other = M[i][c], M[k][c]
+                M[i][c], M[k][c] = select(swap, other, entry), select(swap, entry, other)
         inverses.append(_inverse(M[i][j]))
-        if asked.careful:
-            asked.pivot(M[i][j], NEAR * M[i][n + 1])
+        if findings.careful:
+            findings.pivot(M[i][j], NEAR * M[i][n + 1])
         else:
-            asked.number(M[i][j])
+            findings.number(M[i][j])
             smallest = extreme("min", smallest, abs(M[i][j]))
         for k in later:
             if not is_zero(M[k][j]):
@@ -393,16 +393,16 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: StepFindi
                 factors = extreme("max", factors, abs(factor))
                 for c in columns:
                     M[k][c] = M[k][c] - factor * M[i][c]
-    if not asked.careful:
-        asked.good = asked.good & (smallest > NEAR * bound()) & (factors <= MUCH)
-    found: list[Any] = [0.0] * n
+    if not findings.careful:
+        findings.good = findings.good & (smallest > NEAR * bound()) & (factors <= MUCH)
+    solution: list[Any] = [0.0] * n
     for (i, j), inverse in zip(reversed(order), reversed(inverses), strict=True):
-        found[j] = M[i][n] * inverse
+        solution[j] = M[i][n] * inverse
         for k, _ in order:
             if k == i:
                 break
-            M[k][n] = M[k][n] - M[k][j] * found[j]
-    return found
+            M[k][n] = M[k][n] - M[k][j] * solution[j]
+    return solution
 
 
 def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
@@ -416,11 +416,11 @@ def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
         for row in rows.values():
             for j in row:
                 counts[j] = counts.get(j, 0) + 1
-        places = [(i, j) for i, row in rows.items() for j in row]
-        places = [(i, j) for i, j in places if i == j] or places
-        if not places:
+        candidates = [(i, j) for i, row in rows.items() for j in row]
+        candidates = [(i, j) for i, j in candidates if i == j] or candidates
+        if not candidates:
             break
-        i, j = min(places, key=lambda place: ((len(rows[place[0]]) - 1) * (counts[place[1]] - 1), place))
+        i, j = min(candidates, key=lambda entry: ((len(rows[entry[0]]) - 1) * (counts[entry[1]] - 1), entry))
         pivot = rows.pop(i)
         order.append((i, j))
         for row in rows.values():

@@ -58,9 +58,9 @@ class NpyFile:
             raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file has room for")
         with named(self.path):
             self._stream.seek(0, io.SEEK_END)
-            left = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
-            while left:  # a single write may take less than everything
-                left = left[self._stream.write(left) :]
+            remaining = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
+            while remaining:  # a single write may take less than everything
+                remaining = remaining[self._stream.write(remaining) :]
             self._stream.seek(0)
             self._stream.write(header)
         self.rows += len(rows)

@@ -41,12 +41,12 @@ class PeriodicLevels:
     @cached_property
     def primitive(self) -> fmpz_poly:
         """psi_N without the factors that it shares with psi_d for a proper divisor d of N, its content taken out."""
-        found, table = self.psi, division_polynomials(self.period)
+        polynomial, table = self.psi, division_polynomials(self.period)
         for d in range(1, self.period):
             if self.period % d == 0:
-                while (common := found.gcd(table[d])).degree() > 0:
-                    found = found / common
-        return found / found.content()
+                while (common := polynomial.gcd(table[d])).degree() > 0:
+                    polynomial = polynomial / common
+        return polynomial / polynomial.content()
 
     @cached_property
     def gammas(self) -> tuple[fmpq, ...]:

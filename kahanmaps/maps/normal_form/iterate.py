@@ -63,12 +63,12 @@ class NthIterate:
             return self._rational[1].value(n)
         with self.field.working():
             x = [self.field.convert(entry) for entry in start]
-            found = []
+            triples = []
             for plane, triple in zip(self.splitting.planes, self.splitting.triples(x), strict=True):
-                found.append(self._in_plane(plane.block, triple, n))
-                if self.field.is_zero(found[-1][2]):
+                triples.append(self._in_plane(plane.block, triple, n))
+                if self.field.is_zero(triples[-1][2]):
                     raise SingularStep(f"the map has a pole: its iterate {n} has no value at the start")
-            return self.splitting.point(found)
+            return self.splitting.point(triples)
 
     def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
         """P_n over a field other than Q."""
@@ -106,11 +106,11 @@ def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any])
 
     splitting = Splitting(normal_form.form, QQ, eps, normal_form.T)
     for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
-        above, below = plane.block.level((U, V, W))
+        numerator, denominator = plane.block.level((U, V, W))
         if plane.block.is_zero or (U == 0 and V == 0):
             return f"the start is at rest in the plane {plane.name}"
-        if below == 0 or above == 0 or plane.block.discriminant == 0:
+        if denominator == 0 or numerator == 0 or plane.block.discriminant == 0:
             return f"the start is on a singular level in the plane {plane.name}"
-        if plane.block.discriminant * above * above == below * below:
+        if plane.block.discriminant * numerator * numerator == denominator * denominator:
             return f"the start is on three lines in the plane {plane.name}"
     return ""

@@ -55,8 +55,8 @@ class Jacobian:
 
     def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
         """n P for n >= 0."""
-        found: AffinePoint | None = by_doublings(self.add, None, n, P)
-        return found
+        multiple: AffinePoint | None = by_doublings(self.add, None, n, P)
+        return multiple
 
 
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
@@ -101,16 +101,16 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
         index.setdefault(point[0], (unit * j, point[1]))
         point = curve.add(point, step)
     stride = (2 * babies + 1) * unit
-    leap, up = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
-    back, down = curve.negative(leap), up
+    leap, upward = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
+    backward, downward = curve.negative(leap), upward
     for i in range(radius * unit // stride + 3):
-        for k, point in ((middle + i * stride, up), (middle - i * stride, down)):
+        for k, point in ((middle + i * stride, upward), (middle - i * stride, downward)):
             if point is None:
                 return abs(k)
             if point[0] in index:
                 j, y = index[point[0]]  # k T = +-j T
                 return abs(k - j if point[1] == y else k + j)
-        up, down = curve.add(up, leap), curve.add(down, back)
+        upward, downward = curve.add(upward, leap), curve.add(downward, backward)
     raise AssertionError("no multiple of T in the Hasse interval is zero: it would be a mistake of ours")
 
 
@@ -120,8 +120,8 @@ class LevelCubic:
     The sum of points comes from chords and tangents, with no normal form. Its points are triples, not normalised.
     """
 
-    def __init__(self, block: PlanarBlock, above: Any, below: Any, zero: Triple) -> None:
-        self.block, self.above, self.below, self.zero = block, above, below, zero
+    def __init__(self, block: PlanarBlock, numerator: Any, denominator: Any, zero: Triple) -> None:
+        self.block, self.above, self.below, self.zero = block, numerator, denominator, zero
         self._opposite = self.third(zero, zero)
 
     def gradient(self, P: Triple) -> Triple:
@@ -157,8 +157,8 @@ class LevelCubic:
 
     def multiple(self, n: int, P: Triple) -> Triple:
         """n P for n >= 0."""
-        found: Triple = by_doublings(self.add, self.zero, n, P)
-        return found
+        multiple: Triple = by_doublings(self.add, self.zero, n, P)
+        return multiple
 
     def is_zero(self, P: Triple) -> bool:
         """Whether P is the zero of the group."""
@@ -190,8 +190,8 @@ class LevelCubic:
             top, unit = self.multiple(power // prime, base), 1
             while unit < power:
                 # The part is unit (...) and what has been taken off, so far.
-                rest, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
-                while not same_point(rest, step):
+                cofactor, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
+                while not same_point(cofactor, step):
                     digit, step = digit + 1, self.add(step, top)
                     if digit == prime:
                         return False

@@ -92,7 +92,7 @@ class OrbitPeriod(Printed):
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each plane, for `pandas.DataFrame(found.rows())` and the like."""
-        return [{"plane": one.name, "status": one.status, "period": one.period} for one in self.planes]
+        return [{"plane": plane.name, "status": plane.status, "period": plane.period} for plane in self.planes]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -191,8 +191,8 @@ def plane_period(
         met = _walk_meets_pole(block, point, 3 * order) if at_infinity else False
         return PlanePeriod(name, q, kind, "periodic", 3 * order, met)
     if q > largest:
-        size, most = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
-        reason = f"its field has {size} elements, more than {most}"
+        size, bound = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
+        reason = f"its field has {size} elements, more than {bound}"
         return PlanePeriod(name, q, kind, "undecided", None, None if at_infinity else False, reason)
     order = translation_order(gamma, q, context)
     # With a pole as zero of the group, T is its image, and the question is whether the point is a multiple.
@@ -208,13 +208,13 @@ def plane_period(
 
 def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
     """The kind of a point (U : V : 1) outside characteristics 2 and 3, and gamma if the level is smooth."""
-    above, below = block.level(point)
+    numerator, denominator = block.level(point)
     if block.is_zero or (point[0] == 0 and point[1] == 0):
         return PeriodKind.FIXED, None
     disc = block.discriminant
-    if below == 0:
-        return (PeriodKind.NO_VALUE if above == 0 or disc == 0 else PeriodKind.AT_POLE), None
-    delta = disc * above * above / (below * below)
+    if denominator == 0:
+        return (PeriodKind.NO_VALUE if numerator == 0 or disc == 0 else PeriodKind.AT_POLE), None
+    delta = disc * numerator * numerator / (denominator * denominator)
     if delta == 0:
         return (PeriodKind.FIXED if same_point(block.image(point), point) else PeriodKind.ADDITIVE), None
     gamma = 1 - delta
@@ -238,9 +238,9 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
     >>> sorted(poles(PlanarBlock(*(nmod(c, 7) for c in (1, 0, 0, 6))), 7), key=str)
     [(1, 1, 0), (2, 1, 0), (4, 1, 0)]
     """
-    nought = 0 * block.a
-    one = nought + 1
-    found: list[Triple] = [(one, nought, nought)] if block.a == 0 else []
+    zero = 0 * block.a
+    one = zero + 1
+    poles: list[Triple] = [(one, zero, zero)] if block.a == 0 else []
     coefficients: list[Any] = [block.d, block.c, block.b, block.a]
     if context is None:
         ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(prime))
@@ -248,7 +248,7 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
     else:
         factors = fq_default_poly_ctx(context)(coefficients).factor()[1]  # type: ignore[arg-type]
     roots = [-factor[0] for factor, _ in factors if factor.degree() == 1]
-    return found + [(nought + (int(root) if context is None else root), one, nought) for root in roots]
+    return poles + [(zero + (int(root) if context is None else root), one, zero) for root in roots]
 
 
 def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
@@ -366,11 +366,13 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
     for prime, residue, context in _reductions(gamma):
         if residue == 0 or residue == 1:
             continue
-        place = f"{prime}" if context is None else f"a prime over {prime}"
-        seen.append((translation_order(residue, prime if context is None else int(context.order()), context), place))
-        (first, there), (last, here) = seen[0], seen[-1]
+        prime_name = f"{prime}" if context is None else f"a prime over {prime}"
+        seen.append(
+            (translation_order(residue, prime if context is None else int(context.order()), context), prime_name)
+        )
+        (first, first_order), (last, last_order) = seen[0], seen[-1]
         if first != last:
-            return None, f"T has the orders {first} and {last} modulo {there} and {here}"
+            return None, f"T has the orders {first} and {last} modulo {first_order} and {last_order}"
         if len(seen) == _AGREEMENTS:
             curve = Jacobian(gamma)
             if curve.multiple(first, curve.T) is None:
@@ -397,9 +399,9 @@ def _reductions(gamma: Any) -> Iterator[tuple[int, Any, fq_default_ctx | None]]:
         if any(exponent > 1 for _, exponent in factors):
             continue
         factor = min((f for f, _ in factors), key=lambda f: int(f.degree()))
-        rest = ring([fmpz(int(field.convert(c))) for c in element.coeffs()]) % factor
+        remainder = ring([fmpz(int(field.convert(c))) for c in element.coeffs()]) % factor
         if factor.degree() == 1:
-            yield prime, field.convert(int(rest[0])), None
+            yield prime, field.convert(int(remainder[0])), None
         else:
             context = fq_default_ctx(modulus=factor)
-            yield prime, context(rest), context
+            yield prime, context(remainder), context

@@ -66,8 +66,8 @@ class PlanarBlock:
     def preimage(self, point: Sequence[Any]) -> Triple:
         """The inverse of Psi at (U : V : W), content not removed."""
         U, V, W = point
-        above, right, below = self.image((U, V, -W))
-        return -above, -right, below
+        first, second, third = self.image((U, V, -W))
+        return -first, -second, third
 
     def h(self, U: Any, V: Any) -> Any:
         """The cubic form."""

@@ -40,8 +40,8 @@ class LevelBlock(ABC):
     @cached_property
     def level(self) -> Any:
         """h / (W (W^2 + D)), conserved; None where the first step has no value."""
-        above, below = self.block.level(self.start)
-        return None if below == 0 else (fmpq(1) * above) / below
+        numerator, denominator = self.block.level(self.start)
+        return None if denominator == 0 else (fmpq(1) * numerator) / denominator
 
     @cached_property
     def delta(self) -> Any:
@@ -82,12 +82,12 @@ class IntegerBlock(LevelBlock):
     """
 
     def __init__(self, cubic: Sequence[fmpq], eps: fmpq, u: fmpq, v: fmpq) -> None:
-        integers, below = over_one(cubic)
+        integers, denominator = over_one(cubic)
         common = content(integers)
         if common == 0:
             common = fmpz(1)
         self.block = PlanarBlock(*(entry // common for entry in integers))
-        self.scale: fmpq = 2 * eps * fmpq(common, below)
+        self.scale: fmpq = 2 * eps * fmpq(common, denominator)
         (U, V), W = over_one((u * self.scale, v * self.scale))
         self.start = U, V, W
 

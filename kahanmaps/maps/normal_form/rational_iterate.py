@@ -91,9 +91,9 @@ class OrbitInPlanes:
         step, value, bits = self._sighted(n)
         pole = self._first_pole(step, value)
         if pole is not None:
-            before = self._point(pole - 1)
-            if more := before.exceeding(self._limit):
-                raise OverBudget(pole - 1, more)
+            preimage = self._point(pole - 1)
+            if excess_bits := preimage.exceeding(self._limit):
+                raise OverBudget(pole - 1, excess_bits)
             raise _no_value(pole - 1)
         if bits != 0:
             raise OverBudget(step, bits)
@@ -109,7 +109,7 @@ class OrbitInPlanes:
         """
         step = max(1, min(self._far, n - 1))
         target = n if self._is_lazy else _halved(n, step)
-        before: tuple[int, int] | None = None
+        previous: tuple[int, int] | None = None
         while True:
             try:
                 value = self._point(target)
@@ -118,15 +118,15 @@ class OrbitInPlanes:
             bits = value.exceeding(self._limit)
             if target == n or bits:
                 return target, value, bits
-            here = target, value.bits
-            if before is not None and here[0] - before[0] >= _RISE and here[1] > before[1]:
+            current = target, value.bits
+            if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
                 # At four times the budget, by a line, it certainly is over.
-                beyond = 1 + 4 * self._limit * (here[0] - before[0]) // (here[1] - before[1])
+                beyond = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
                 if beyond <= min(n - target, _LOOKED):
                     return target + beyond, None, None
-            before = here
+            previous = current
             # Four times the size is borne, but not more: heights may grow like n^2.
-            target = _halved(n, target) if 4 * here[1] <= self._limit else min(n, target + target // 2)
+            target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
 
     def _point(self, n: int) -> PlanesPoint:
         """Phi^n(start), poles on the way passed over. Raises SingularStep at a pole."""
@@ -137,7 +137,7 @@ class OrbitInPlanes:
 
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
         """The first step up to n without a value; `value` is the n-th, to be compared modulo a prime."""
-        known = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
+        known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
         busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
         generator = random.Random()
         for _ in range(_PRIMES):
@@ -159,7 +159,7 @@ class OrbitInPlanes:
                     break
                 poles.append(pole)
             else:
-                return min([*known, *poles], default=None)
+                return min([*known_poles, *poles], default=None)
         raise ArithmeticError("the orbit modulo many primes met a pole that it has not: please report this")
 
 
@@ -182,20 +182,20 @@ class _Plane:
     """
 
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
-        found = plane_period_over_rationals(block, start)
-        self.period = found.period
-        self.lazy = found.period is not None or found.kind in (PeriodKind.ADDITIVE, PeriodKind.NO_VALUE)
+        period = plane_period_over_rationals(block, start)
+        self.period = period.period
+        self.lazy = period.period is not None or period.kind in (PeriodKind.ADDITIVE, PeriodKind.NO_VALUE)
         self.pole: int | None = None
-        if found.kind is PeriodKind.NO_VALUE:
+        if period.kind is PeriodKind.NO_VALUE:
             self.pole = 1
-        elif found.kind is PeriodKind.ADDITIVE:
+        elif period.kind is PeriodKind.ADDITIVE:
             r = translation.parabolic_ratio(block, start)
             if not (r is None or isinstance(r, fmpq)):  # an element of a number field: is it rational?
                 r = r.coefficients[0] if not any(entry != 0 for entry in r.coefficients[1:]) else None
             self.pole = int(r.p) if r is not None and r.q == 1 and r > 0 else None
-        elif found.period is not None and found.meets_pole is not False:
+        elif period.period is not None and period.meets_pole is not False:
             try:
-                stepped_over(block, start, found.period)
+                stepped_over(block, start, period.period)
             except _Pole as pole:
                 self.pole = pole.step
 
@@ -230,9 +230,9 @@ def _reached(block: Block, n: int) -> Triple:
         if len(points) <= n:
             raise _no_value(len(points) - 1)
         return points[n]
-    found = tau.iterate(block, n)
-    if found is not None:
-        return found
+    point = tau.iterate(block, n)
+    if point is not None:
+        return point
     over_field, (U, V, W), _ = block.lifts
     start = (U / W, V / W, W / W)
     try:

@@ -89,9 +89,9 @@ def table_near(block: Any) -> TauTable | None:
     return None
 
 
-def _over(triple: Triple, below: Any) -> Triple:
+def _over(triple: Triple, denominator: Any) -> Triple:
     U, V, W = triple
-    return U / below, V / below, W / below
+    return U / denominator, V / denominator, W / denominator
 
 
 def first_chi(P: Mapping[int, Triple], indices: Iterable[int]) -> dict[int, Any]:
@@ -139,5 +139,5 @@ class TauTable:
         # Scales, over that of the first term.
         ratio = chi.ratio(n)
         scales = [self._one, chi.part(n) / ratio, ratio / psi.part(n)]
-        found: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)
-        return found
+        point: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)
+        return point

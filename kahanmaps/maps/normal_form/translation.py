@@ -55,10 +55,10 @@ def iterate(
     points = _first_points(block, [start], min(n, _STEPPED if n <= _STEPPED else 4), is_zero)
     if len(points) > n:
         return points[n]
-    above, below = block.level(start)
-    if above == 0 or block.discriminant == 0:
+    numerator, denominator = block.level(start)
+    if numerator == 0 or block.discriminant == 0:
         return _parabolic(block, start, n)
-    level = above / below
+    level = numerator / denominator
     gamma = 1 - block.discriminant * level * level
     if is_zero(gamma):
         points = _first_points(block, points, n % 3 + 10, is_zero)
@@ -66,11 +66,11 @@ def iterate(
     for base in range(3, _BASES + 3):
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:
-            found = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
+            point = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
         else:
-            found = _doubled(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
-        if found is not None:
-            return found
+            point = _doubled(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
+        if point is not None:
+            return point
     raise NoTranslation
 
 
@@ -84,11 +84,11 @@ def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
     def square(point: Triple) -> Any:
         U, V, W = point
         p, q, r = block.D
-        below = p * (U * U) + q * (U * V) + r * (V * V)
-        return None if below == 0 else -(W * W) / below
+        denominator = p * (U * U) + q * (U * V) + r * (V * V)
+        return None if denominator == 0 else -(W * W) / denominator
 
-    here = square(start)
-    return None if here is None else (here - square(block.image(start)) + 1) / 2
+    square_at_start = square(start)
+    return None if square_at_start is None else (square_at_start - square(block.image(start)) + 1) / 2
 
 
 def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
@@ -98,16 +98,16 @@ def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
     root, which is multiplied by ((r - n)^2 - 1)/(r^2 - 1).
     """
     U, V, W = block.image(start)
-    here, after = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
+    point, image = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
     r = parabolic_ratio(block, start)
     if r is None:
-        u, v = (z + n * (w - z) for z, w in zip(here, after, strict=True))
+        u, v = (z + n * (w - z) for z, w in zip(point, image, strict=True))
         return u, v, W / W
-    rest, below = r - n, r * r - 1
-    factor = rest * (rest * rest - 1)
-    parts = [(z, (z * r * (r + 1) - w * below) / (3 * r)) for z, w in zip(here, after, strict=True)]
-    u, v = ((z - double) * r * below + double * factor for z, double in parts)
-    return u, v, rest * below
+    complement, denominator = r - n, r * r - 1
+    factor = complement * (complement * complement - 1)
+    parts = [(z, (z * r * (r + 1) - w * denominator) / (3 * r)) for z, w in zip(point, image, strict=True)]
+    u, v = ((z - double) * r * denominator + double * factor for z, double in parts)
+    return u, v, complement * denominator
 
 
 def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
@@ -131,8 +131,10 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
         return P
     # Coordinates (x, y) stand for x P + y Q, found from two entries of the triples that tell P and Q apart.
     i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
-    whole = P[i] * Q[j] - P[j] * Q[i]
-    (a, b), (c, d) = (((R[i] * Q[j] - R[j] * Q[i]) / whole, (P[i] * R[j] - P[j] * R[i]) / whole) for R in points[2:4])
+    determinant = P[i] * Q[j] - P[j] * Q[i]
+    (a, b), (c, d) = (
+        ((R[i] * Q[j] - R[j] * Q[i]) / determinant, (P[i] * R[j] - P[j] * R[i]) / determinant) for R in points[2:4]
+    )
     # The matrix takes (1, 0) to r (0, 1) and (0, 1) to (a, b), and (a, b) to a multiple of (c, d):
     # r a (0, 1) + b (a, b) ~ (c, d).
     if is_zero(a):
@@ -222,14 +224,14 @@ def _digits(n: int) -> list[tuple[int, int]]:
     >>> _digits(100)
     [(3, 3), (1, 2)]
     """
-    found, places = [], 0
+    digits, length = [], 0
     while n:
         zeros = (n & -n).bit_length() - 1
-        n, places = n >> zeros, zeros
+        n, length = n >> zeros, zeros
         digit = (n + 4) % 8 - 4
-        found.append((digit, places))
+        digits.append((digit, length))
         n -= digit
-    return found[::-1]
+    return digits[::-1]
 
 
 def _doubled(
@@ -239,9 +241,9 @@ def _doubled(
     # Lifts that are natural around this base point: the first two of them decide the rest.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):
-        below = P[k - 1][2]
+        denominator = P[k - 1][2]
         U, V, W = block.image(P[k])
-        P[k + 1] = (U / below, V / below, W / below)
+        P[k + 1] = (U / denominator, V / denominator, W / denominator)
     chi = first_chi(P, range(-2, 3))
     if any(is_zero(chi[k]) for k in (-2, -1, 0, 1)):
         return None
