@@ -21,7 +21,7 @@ from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
+from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.kahan import KahanFamily, KahanMap
 from kahanmaps.maps.orbits.orbit import orbit
 from kahanmaps.maps.polarised import polarised_map

@@ -182,7 +182,7 @@ class OrbitRequest(NamedTuple):
     def by(self, method: str, normal_form: SystemNormalForm | None, numbers: Arithmetic) -> Any:
         """Return the iterator over the points by a method, in an arithmetic."""
         if numbers.kind == "float":
-            from kahanmaps.maps.floats.fast import FloatOrbit
+            from kahanmaps.maps.floats.float_orbit import FloatOrbit
 
             every = self.every if self.at is None else max(1, math.gcd(*self.at))
             form = None if normal_form is None else normal_form.form
@@ -316,7 +316,7 @@ class Trajectory:
         if form not in FORMATS:
             raise InputError(f"found the format {form!r}, expected {', '.join(FORMATS)}")
         if form == "npy":
-            from kahanmaps.maps.floats.fast import stream_orbit
+            from kahanmaps.maps.floats.float_orbit import stream_orbit
 
             if not isinstance(to, str | Path):
                 raise InputError("the format npy needs a path, got a stream")
@@ -419,7 +419,7 @@ class Trajectory:
             raise InputError(f"found the dtype {kind}, expected one of floats or integers, or object")
         if prime > 2 ** (np.finfo(kind).nmant + 1):
             raise InputError(f"found {kind}, which rounds residues modulo {prime}, expected dtype=int or dtype=object")
-        from kahanmaps.maps.floats.doubles import to_float
+        from kahanmaps.maps.floats.float_conversion import to_float
 
         return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=kind)
 
@@ -435,7 +435,7 @@ class Trajectory:
         if self.arithmetic.kind != "float":
             yield from self.orbit
             return
-        from kahanmaps.maps.floats.fast import FLOATS
+        from kahanmaps.maps.floats.float_orbit import FLOATS
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.plots.curves.level_sets import Levels
 from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, legend_above, new_figure, points
 from kahanmaps.plots.point_functions import PointFunction
