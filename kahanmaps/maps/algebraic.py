@@ -53,7 +53,7 @@ class AlgebraicMap(MapFamily):
         return self._at_number(self.root.real_approximation())
 
     @property
-    def rows(self) -> Any:  # type: ignore[override]  # nobody writes it
+    def rows(self) -> Any:  # type: ignore[override]  # read only
         raise InputError(self.unsupported_reason)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:

@@ -79,7 +79,7 @@ class ComposedMap(MapFamily):
         return (self.variables, self.symbols, [part.subject for part in self.parts])
 
     @cached_property
-    def time_steps(self) -> int:  # type: ignore[override]  # nobody writes it
+    def time_steps(self) -> int:  # type: ignore[override]  # read only
         """The sum of those of the letters, where these are one map and its inverse; else there is no one flow."""
         letters = self._letters
         return sum(steps for _, steps in letters) if all(letter == letters[0][0] for letter, _ in letters) else 0
@@ -130,7 +130,7 @@ class ComposedMap(MapFamily):
         return self.multiplied_out.image
 
     @property
-    def rows(self) -> Rows:  # type: ignore[override]  # nobody writes it
+    def rows(self) -> Rows:  # type: ignore[override]  # read only
         """Those of the map multiplied out. Raises InputError where they are long."""
         return self.multiplied_out.rows
 
