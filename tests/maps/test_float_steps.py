@@ -17,9 +17,9 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.floats import steps
-from kahanmaps.maps.floats.planar_blocks import planar_blocks
 from kahanmaps.maps.floats.float_conversion import exact
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, to_floats
+from kahanmaps.maps.floats.planar_blocks import planar_blocks
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd

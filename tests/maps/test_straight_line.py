@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
 
-from kahanmaps.maps.floats.straight_line_program import StraightLineProgram, StepChecks, solve
+from kahanmaps.maps.floats.straight_line_program import StepChecks, StraightLineProgram, solve
 
 PATTERNS = {
     "one equation": ["*"],

@@ -21,8 +21,8 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.floats.planar_blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.planar_blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.floats.steps import (
     RUNNING,
     SINGULAR,

@@ -16,7 +16,6 @@ import numpy as np
 
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.floats.float_conversion import FLOATS, FloatArray, float_function, to_float, to_floats
 from kahanmaps.maps.floats.ensemble import (
     SAMPLED,
     Drift,
@@ -24,6 +23,7 @@ from kahanmaps.maps.floats.ensemble import (
     Function,
     require_every,
 )
+from kahanmaps.maps.floats.float_conversion import FLOATS, FloatArray, float_function, to_float, to_floats
 from kahanmaps.maps.floats.npy_file import NpyFile
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel

@@ -26,8 +26,8 @@ from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps import convention
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.floats.float_conversion import FloatArray, start_rows, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.floats.float_conversion import FloatArray, start_rows, to_float
 from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.kahan import SystemLike, as_map
 

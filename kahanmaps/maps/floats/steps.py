@@ -21,15 +21,15 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.planar_blocks import PlanarBlocks
 from kahanmaps.maps.floats.float_conversion import FloatArray
+from kahanmaps.maps.floats.planar_blocks import PlanarBlocks
 from kahanmaps.maps.floats.straight_line_program import (
     LARGEST,
     MAX_OPERATIONS,
     NEAR,
-    StraightLineProgram,
     ComplexPair,
     StepChecks,
+    StraightLineProgram,
     TooManyOperations,
     extreme,
     solve,
