@@ -1,6 +1,6 @@
-"""The contents of a system file: a document of plain data becomes systems, members and claims, or a list of mistakes.
+"""Reading a system file: a document of plain data becomes systems, members and claims, or a list of mistakes.
 
-Every part is read as far as it can be, so that all mistakes of a file are told at once, each with its key.
+Every part is read as far as possible, so that all mistakes of a file are reported together, each with its key.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where a rational one sh
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
-    """The Kahan map of right-hand sides in the variables, symbols, then eps, which may not occur."""
+    """Return the Kahan map of right-hand sides in the variables, symbols and eps (which must not occur)."""
     symbols = names_of(rhs[0])[len(rhs) :]
     if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
         return KahanFamily(QuadraticSystem(tuple(rhs), symbols))
@@ -70,10 +70,10 @@ class _Part(NamedTuple):
 
 
 class DocumentReader(PartReader):
-    """One pass over a document: every part is read as far as it can be, mistakes are collected."""
+    """Reads a document in one pass: every part as far as possible, collecting mistakes."""
 
     def read(self) -> dict[str, Any]:
-        """The fields of a `SystemFile`. Raises SystemFileError with every mistake of the document."""
+        """Return the fields of a `SystemFile`. Raises SystemFileError with all mistakes of the document."""
         try:
             self.document, notes = without_left_sides(self.document)
         except InputError as error:
@@ -141,7 +141,7 @@ class DocumentReader(PartReader):
     def _read_section(
         self, kind: str, section: Mapping[str, Any] | None
     ) -> tuple[MapFamily | None, CubicHamiltonian | None, FamilyMember | None]:
-        """What the section says that the document is of; of a mistake nothing."""
+        """Read the section that determines the kind of the document; return an empty result for a mistake."""
         if section is None:
             return None, None, None
         map_, hamiltonian, member = None, None, None
@@ -181,7 +181,7 @@ class DocumentReader(PartReader):
         return map_, hamiltonian, member
 
     def read_map(self, kind: str, symbols: Sequence[str]) -> MapFamily:
-        """The map of a section with these parameters as symbols. Raises InputError for a [family]."""
+        """Return the map of the document with these parameters as symbols. Raises InputError for a [family]."""
         if kind == "family":
             raise InputError(
                 f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
@@ -330,7 +330,7 @@ class DocumentReader(PartReader):
         return self._sound(explicit_map, "map", self.variables, image, inverse)
 
     def _sound(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
-        """The map made of what is given, if it has values, and an inverse where one is given."""
+        """Return the map if it is defined and dominant, and a given inverse is right; otherwise note a mistake."""
         map_ = self._made(path, make, *arguments)
         if map_ is None:
             return None
@@ -359,7 +359,7 @@ class DocumentReader(PartReader):
         return None if H is None else hamiltonian
 
     def _read_field(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """The Kahan map of J grad H, where both may contain symbols."""
+        """Return the Kahan map of J grad H, where both may contain symbols."""
         H, n = self._polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
         matrix = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
         J = [
@@ -397,7 +397,7 @@ class DocumentReader(PartReader):
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
 
     def _read_composition(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """The composition; what its parts name is put in their places, so that the document says all by itself."""
+        """Read a composition; parts given by name are replaced by their contents, so the document is self-contained."""
         entries = self._required("composition", section, "of")
         if not isinstance(entries, list) or not entries:
             if entries is not None:
@@ -457,7 +457,7 @@ class DocumentReader(PartReader):
         return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **plain})
 
     def _part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
-        """The values of parameters of a part: numbers, and functions of the symbols."""
+        """Return the values of the parameters of a part: numbers, or functions of the symbols."""
         numbers: dict[str, fmpq] = {}
         values: Values = {}
         parameters = entry.get("parameters", {})
@@ -488,7 +488,7 @@ class DocumentReader(PartReader):
         return numbers, values
 
     def _part_reader(self, key: str, value: Any, numbers: Mapping[str, fmpq], values: Values) -> Self:
-        """What reads a part of a composition."""
+        """Return the reader for a part of a composition."""
         self.parts[0] += 1
         if self.parts[0] > _MOST_FACTORS:
             raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected at most so many")

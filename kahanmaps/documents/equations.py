@@ -1,7 +1,7 @@
-"""Differential equations as people write and paste them, as the right-hand sides of a system file.
+"""Conversion of differential equations in common notations to the right-hand sides of a system file.
 
-A text is a list of equations with ; or , or ends of lines between them, perhaps in one pair of brackets. On the left
-stands a derivative, and on the right a formula, in which x(t) is x:
+A text is a list of equations separated by ; or , or line breaks, perhaps in one pair of brackets. The left side is a
+derivative, the right side a formula, in which x(t) means x:
 
     x'    dx/dt    x_dot    xdot    dxdt    x'[t]    dx(t)/dt    d^2x/dt^2    diff(x(t), t)    D[x[t], t]    x[0]'
 
@@ -54,7 +54,7 @@ class _Derivative(NamedTuple):
 
 
 def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """The document with a list of right-hand sides, and variables, where its [system] has equations or one text.
+    """Replace equations in [system] by a list of right-hand sides and the variables.
 
     The order of the equations is that of the variables, where these are not given; velocities of equations of second
     order come last. Other documents come back equal. The notes say which names were made.
@@ -91,7 +91,7 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
 
 
 def tokens_of(text: str) -> list[str]:
-    """The tokens of a text, blanks among them. Raises InputError where it is too long."""
+    """Split a text into tokens, including blanks. Raises InputError if it is too long."""
     if len(text) > MAX_CHARACTERS:
         raise InputError(f"found equations of {len(text)} characters, expected at most {MAX_CHARACTERS}")
     decomposed = text if text.isascii() else unicodedata.normalize("NFD", text)
@@ -99,7 +99,7 @@ def tokens_of(text: str) -> list[str]:
 
 
 def pieces_of(text: str) -> list[list[str]]:
-    """The tokens of each equation, or formula, of a list. Raises InputError for brackets that do not balance."""
+    """Return the tokens of each equation or formula of a list. Raises InputError for unbalanced brackets."""
     tokens = _without_outer_brackets(_list_in(tokens_of(text)))
     pieces: list[list[str]] = [[]]
     depth = 0
@@ -119,7 +119,7 @@ def pieces_of(text: str) -> list[list[str]]:
 
 
 def _list_in(tokens: list[str]) -> list[str]:
-    """The tokens of a list without the name that it is given, eqs := [x' = y, y' = -x], and what ends it."""
+    """Return the tokens of a list without its name and terminator, as in eqs := [x' = y, y' = -x]."""
     positions = [k for k, token in enumerate(tokens) if not token.isspace()]
     while positions and tokens[positions[-1]] in (";", ":", ","):
         positions.pop()
@@ -134,7 +134,7 @@ def _list_in(tokens: list[str]) -> list[str]:
 
 
 def _without_outer_brackets(tokens: list[str]) -> list[str]:
-    """The tokens between the brackets of a list, {x' = y, y' = -x}, where there is one around all of them."""
+    """Return the tokens without outer brackets, as in {x' = y, y' = -x}."""
     positions = [k for k, token in enumerate(tokens) if not token.isspace()]
     if len(positions) < 2 or tokens[positions[0]] not in _OPEN or tokens[positions[-1]] not in _CLOSE:
         return tokens
@@ -149,7 +149,7 @@ def _without_outer_brackets(tokens: list[str]) -> list[str]:
 def read_equations(
     pieces: Sequence[list[str]], variables: Sequence[str] = (), parameters: Collection[str] = ()
 ) -> tuple[dict[str, str], list[str], list[str]]:
-    """The right-hand sides of equations of first and second order, one for each variable.
+    """Read equations of first and second order, one for each variable.
 
     Args:
         pieces: the tokens of each equation.
@@ -193,7 +193,7 @@ def read_equations(
 
 
 def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
-    """The derivative that begins at a token, blanks left out: x', dx/dt, x_dot, diff(x(t), t); None if none does."""
+    """Return the derivative that begins at a token (x', dx/dt, x_dot, diff(x(t), t)), or None."""
     first = tokens[start] if start < len(tokens) else ""
     if not is_name(first):
         return None
@@ -216,12 +216,12 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
 
 
 def _argument(tokens: Sequence[str], position: int) -> int:
-    """The place behind (t) or [t], if it stands there, otherwise the same."""
+    """Return the position after (t) or [t], if it is there, otherwise the same position."""
     return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 
 def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
-    """A right-hand side as text: x(t) as x, and x' as the velocity where there is one."""
+    """Return a right-hand side as text, with x(t) replaced by x, and x' by the velocity if there is one."""
     tokens_kept = [token for token in tokens if not token.isspace()]
     gaps, blank = list[str](), ""  # what stands before each word: "x y" must not become "xy"
     for token in tokens:
@@ -254,7 +254,7 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
 
 
 def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Collection[str]) -> dict[str, str]:
-    """The name of the velocity of each variable with an equation of second order: one of those given, or vx for x."""
+    """Return the velocity of each variable with an equation of second order: a given name, or vx for x."""
     second = [name for name, order in orders.items() if order == 2]
     named = [name for name in variables if name not in orders]
     if len(named) == len(second):
@@ -269,7 +269,7 @@ def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Coll
 
 
 def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tuple[list[list[str]], list[str]]:
-    """The pieces with x0 in the place of x[0], or x_0 where x0 is another name; and notes that say so."""
+    """Replace x[0] by x0 (or x_0 if x0 is taken); return the pieces and notes."""
     used_names = {*taken, *(token for piece in pieces for token in piece)}
     names = dict[tuple[str, str], str]()
     made: list[list[str]] = []
@@ -292,7 +292,7 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
 
 
 def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
-    """What to type in the place of something that people put between equations."""
+    """Return a hint what to type instead of an unsupported statement."""
     if "\\" in left_side:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
         name = next((token for token in left_side if is_name(token) and token not in _LATEX), "x")
         name, primes = name.removeprefix("d" if "dt" in left_side else ""), "''" if "ddot" in left_side else "'"
@@ -312,7 +312,7 @@ def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
 
 
 def is_name(token: str) -> bool:
-    """Whether a token is a name."""
+    """Return whether a token is a name."""
     return (token[:1].isalpha() and token.isascii()) or token[:1] == "_"
 
 

@@ -1,4 +1,4 @@
-"""Formulas and numbers of other Python libraries as the text of a system file; nothing of theirs is imported first."""
+"""Conversion of formulas and numbers of SymPy and other libraries to text, without importing these libraries."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NUMBERS = (int, float, complex)
 
 
 def formula_text(value: Any) -> str:
-    """A right-hand side or a claim as text, exactly.
+    """Convert a right-hand side or a claim to text, exactly.
 
     Raises InexactNumber for machine floats, also inside expressions of SymPy, where 1/3*x has become one unnoticed;
     InputError for irrational numbers there.
@@ -36,7 +36,7 @@ def formula_text(value: Any) -> str:
 
 
 def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
-    """Expressions of SymPy with a name for the one irrational number in them, if it is one, and its value."""
+    """Replace the irrational number in SymPy expressions by a name, if there is exactly one; return its value too."""
     from_sympy = [side for side in sides if _is_sympy(side)]
     irrational_numbers = {part for side in from_sympy for part in _irrational(side)}
     if len(irrational_numbers) != 1 or any(part.is_Float for part in irrational_numbers):
@@ -51,7 +51,7 @@ def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any]
 
 
 def number(value: Any) -> Any:
-    """An algebraic number of SymPy as the text of a root of its polynomial; all else is as it was.
+    """Convert an algebraic number of SymPy to text, "root of ..."; return other values unchanged.
 
     Raises InputError for other irrational numbers of SymPy.
     """
@@ -66,7 +66,7 @@ def number(value: Any) -> Any:
 
 
 def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
-    """The right-hand sides by variable of equations of SymPy, Eq(x(t).diff(t), y(t)); None for anything else.
+    """Return the right-hand sides of SymPy equations Eq(x(t).diff(t), y(t)) by variable; None for anything else.
 
     Raises InputError for other equations of SymPy.
     """
@@ -82,7 +82,7 @@ def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
 
 
 def _irrational(value: Any) -> Iterator[Any]:
-    """The numbers in an expression of SymPy that are not rational, as far as sums and products do not hide them."""
+    """Return the irrational numbers that occur in an expression of SymPy."""
     from sympy import preorder_traversal
 
     parts = preorder_traversal(value)

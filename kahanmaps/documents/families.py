@@ -1,6 +1,6 @@
-"""Names of the catalogue that take arguments: `lv(7,3)` is a member of the family `lv`, made when it is asked for.
+"""Families of the catalogue, whose members are named with arguments, such as `lv(7,3)`, and generated on demand.
 
-The Bogoyavlenskij-Itoh systems LV(n, k) as documents: Lotka-Volterra systems that the catalogue makes on demand.
+The Bogoyavlenskij-Itoh systems LV(n, k) are Lotka-Volterra systems:
 
     x_i' = x_i sum_j a_ij x_j,    a_ij = -a_ji,    a_ij = 1 for 0 < j - i < n - k and -1 for j - i >= n - k,
 
@@ -26,7 +26,7 @@ _SHOWN_DEGREES = 4
 
 
 class NamedFamily(NamedTuple):
-    """How its members are written, what they are, and the document that belongs to integer arguments."""
+    """A family of systems: the notation of its members, a title, and the document for integer arguments."""
 
     form: str
     example: str
@@ -35,7 +35,7 @@ class NamedFamily(NamedTuple):
 
 
 def degree(n: int, k: int, m: int) -> int:
-    """The degree of the m-th iterate of the Kahan map of LV(n, k): measured, a formula without a proof for all n.
+    """Return the degree of the m-th iterate of the Kahan map of LV(n, k): measured, not proved for all n.
 
     >>> [degree(5, 2, m) for m in range(5)]
     [1, 5, 21, 45, 81]
@@ -46,7 +46,7 @@ def degree(n: int, k: int, m: int) -> int:
 
 
 def lotka_volterra(n: int, k: int) -> dict[str, Any]:
-    """The document of LV(n, k).
+    """Return the document of LV(n, k).
 
     Args:
         n: the number of species, at least 2.
@@ -128,7 +128,7 @@ FAMILIES = {"lv": NamedFamily("lv(n,k)", "lv(7,3)", "Bogoyavlenskij-Itoh systems
 
 
 def family_member(reference: str) -> tuple[str, dict[str, Any]] | None:
-    """The name, without spaces, and the document of a member of a family; None for what does not name a family.
+    """Return the name, without spaces, and the document of a member of a family; None for other names.
 
     Raises InputError for arguments that are missing or that the family does not have.
 

@@ -1,4 +1,4 @@
-"""The system file that equations on a command line, or in Python, abbreviate, so that the same rules hold for them."""
+"""Systems given by equations on the command line or in Python, converted to system files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def inline_file(
     variables: str | None, parameters: Mapping[str, str], kind: str, section: Mapping[str, str | Sequence[str]]
 ) -> str:
-    """The text of the file with one section of this kind; `variables` are names between commas.
+    """Return the file with one section of this kind; `variables` are names separated by commas.
 
     >>> print(inline_file("x,y", {"a": "1/2"}, "system", {"rhs": ["a*y", "-x"]}))
     variables = ["x", "y"]
@@ -44,7 +44,7 @@ def inline_file(
 
 
 def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = None, **parameters: Any) -> SystemFile:
-    """A system x' = f(x) of degree at most 2, from its equations.
+    """Create a system x' = f(x) of degree at most 2 from its equations.
 
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
@@ -86,7 +86,7 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
 
 
 def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> Map:
-    """The map of a system at an exact eps: callable, and composed by @ and powers. Raises InputError where eps lacks.
+    """Return the map of a system at an exact eps: callable, composed by @ and **. Raises InputError without eps.
 
     >>> map_at("euler_top", "1/10")([1, 2, 3])
     (65/37, 10/37, 125/37)
@@ -95,7 +95,7 @@ def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> Map
 
 
 def as_file(value: Any) -> SystemFile:
-    """The file that anything stands for: a file, a system, a name of the catalogue, a path, or equations as text.
+    """Convert a value to a file: a file, a system, a name of the catalogue, a path, or equations as text.
 
     Raises InputError for anything else.
     """

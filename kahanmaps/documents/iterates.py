@@ -1,7 +1,7 @@
-"""Functions of a point and its iterates in text: x~ is the image of x, x~~ that of x~, as integrals are printed.
+"""Parsing of functions of a point and its iterates: x~ is the image of x, x~~ the image of x~.
 
-Minors have letters for the functions that they are made of, which are told behind them: F0*F1~ - F1*F0~, F0 = x*y~,
-F1 = y. Then F0~ is F0 with one ~ more at every variable.
+A formula may contain letters for functions, which are defined after it: F0*F1~ - F1*F0~, F0 = x*y~, F1 = y. Then F0~ is
+F0 with one more ~ at every variable.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MAX_PRODUCTS = 1_000_000  # of terms, where letters are replaced
 
 
 def iterates_in(*texts: str) -> int:
-    """How many ~ follow a name at most.
+    """Return the largest number of ~ after a name.
 
     >>> iterates_in("x*y~ - x~~", "x")
     2
@@ -30,7 +30,7 @@ def iterates_in(*texts: str) -> int:
 
 
 def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = ()) -> tuple[str, ...]:
-    """The variables, those with ~, ~~, ... up to `count`, then the others.
+    """Return the variables, those with ~, ~~, ... up to `count`, then the others.
 
     >>> with_iterates(["x", "y"], 1, ["eps"])
     ('x', 'y', 'x~', 'y~', 'eps')
@@ -41,7 +41,7 @@ def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = 
 def parse_with_iterates(
     text: str, variables: Sequence[str], others: Sequence[str], constants: Mapping[str, fmpq]
 ) -> RationalFunction:
-    """The function of the variables, as many of their iterates as the text has, and the other names.
+    """Parse a function of the variables, their iterates and the other names.
 
     Args:
         text: a formula, perhaps with letters, which are defined behind it.

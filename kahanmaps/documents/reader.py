@@ -1,6 +1,6 @@
-"""How the parts of a system file are read: tables, texts, polynomials, matrices, and the mistakes that are found.
+"""Reading the parts of a system file: tables, texts, polynomials and matrices, with a list of mistakes.
 
-What is read goes by the names that hold there: the variables, the parameters with their values, and the symbols.
+The names that may occur are the variables, the parameters with their values, and the symbols.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ Other = Callable[[str, str], tuple[dict[str, Any], str, Any]]
 
 
 class PartReader:
-    """A document with the names that hold in it and the mistakes found so far; what its parts are read with."""
+    """Reads the parts of a document: holds its names and the mistakes found so far."""
 
     def __init__(
         self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], other: Other | None = None
     ) -> None:
-        """`other` looks up what parts of compositions name."""
+        """`other` looks up the parts of compositions that are given by name."""
         self.document = document
         self.where = where
         self.overrides = overrides
@@ -78,12 +78,12 @@ class PartReader:
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
     def _refused(self, key: str, sentence: str) -> T | None:
-        """None, which stands for what cannot be read, and a mistake."""
+        """Note a mistake and return None."""
         self._mistake(key, sentence)
         return None
 
     def _made(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
-        """What is made of what is given; None, and a mistake, where it cannot be."""
+        """Return make(*arguments); on InputError note a mistake and return None."""
         try:
             return make(*arguments)
         except InputError as error:
@@ -165,7 +165,7 @@ class PartReader:
         return table.get(key)
 
     def _list(self, section: str, key: str, value: Any, what: str) -> list[Any] | None:
-        """A list with one entry for each variable; None, and a mistake, where it is another or missing."""
+        """Read a list with one entry for each variable; otherwise note a mistake and return None."""
         path = f"{section}.{key}"
         if value is None:
             return None
@@ -179,7 +179,7 @@ class PartReader:
         return value
 
     def _each(self, path: str, value: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
-        """What is read of every entry of a list, mistakes of all of them noted; None where one cannot be read."""
+        """Read every entry of a list, noting all mistakes; return None if an entry cannot be read."""
         entries = value if isinstance(value, list) else []
         results = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
         valid = [result for result in results if result is not None]
@@ -196,7 +196,7 @@ class PartReader:
 
 
 def json_like(value: Any) -> Any:
-    """Plain data with long integers as text."""
+    """Return plain data with long integers as text."""
     if isinstance(value, dict):
         return {key: json_like(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,9 +1,10 @@
-"""Files of XPP (XPPAUT, .ode) as documents: equations, parameters and definitions; what else they have is named.
+"""Reading of XPPAUT files (.ode): equations, parameters and definitions.
 
-Read are x' = ..., dx/dt = ..., par, number, init, x(0) = ..., name = formula and !name = formula, which are put in the
-places of the names. Options (@), aux, set and boundary conditions are about the integration and left out. What would
-change the equations (functions, arrays, Markov variables, tables, maps x(t+1)) is refused with its line. XPP does not
-tell upper from lower case. Source: Ermentrout's documentation of XPPAUT 8, "Structure of ODE files".
+The reader accepts x' = ..., dx/dt = ..., par, number, init, x(0) = ..., and definitions name = formula and
+!name = formula, which are substituted. Options (@), aux, set and boundary conditions concern the integration and are
+skipped, with a note. Statements that would change the equations (functions, arrays, Markov variables, tables, maps
+x(t+1)) raise an error with the line. XPP is not case-sensitive. Source: Ermentrout's documentation of XPPAUT 8,
+"Structure of ODE files".
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ _READ = "x' = ..., dx/dt = ..., par a=1, init x=0 and name = formula"
 
 
 def is_ode(text: str) -> bool:
-    """Whether a text that is not TOML has equations in lines: on the left of one stands a derivative.
+    """Return whether a text that is not TOML contains a line with a derivative on its left side.
 
     >>> is_ode("x' = -x\\ny' = x"), is_ode('[system]\\nrhs = "x')
     (True, False)
@@ -38,7 +39,7 @@ def is_ode(text: str) -> bool:
 
 
 def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
-    """The document that the lines of a file of XPP describe, and notes on what was left out; `where` names it.
+    """Read an XPP file; return the document and notes on skipped lines. `where` names the file in messages.
 
     Raises SystemFileError with every line that cannot be read.
 
@@ -76,7 +77,7 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
 
 
 class _Lines:
-    """What the lines so far say."""
+    """The content of the lines read so far."""
 
     def __init__(self) -> None:
         self.equations: list[tuple[str, list[str]]] = []  # the left side, and the tokens of the right one
@@ -88,7 +89,7 @@ class _Lines:
         self.has_capitals = False  # in what is read
 
     def read(self, line: str) -> None:
-        """Read a line. Raises InputError for what cannot be read."""
+        """Read a line. Raises InputError if it cannot be read."""
         if not line or line[0] in '#"':
             return
         if line[0] == "@":
@@ -119,7 +120,7 @@ class _Lines:
                 self.definitions[tokens_kept[0]] = f"({self.expanded(tokens[split:])})"
 
     def _values(self, tokens: list[str], values: dict[str, str]) -> None:
-        """a=1,b=-2.5 c=8/3: pairs with commas or blanks between them; an initial value alone is 0, as in XPP."""
+        """Read pairs a=1,b=-2.5 c=8/3, separated by commas or blanks; an initial value alone is 0, as in XPP."""
         k = 0
         while k < len(tokens):
             name = tokens[k]
@@ -140,7 +141,7 @@ class _Lines:
             k += tokens[k : k + 1] == [","]
 
     def expanded(self, tokens: list[str]) -> str:
-        """A formula with definitions in the places of their names. Raises InputError where it becomes too long."""
+        """Substitute the definitions in a formula. Raises InputError if it becomes too long."""
         parts = [self.definitions.get(token, token) for token in tokens]
         if sum(map(len, parts)) > LIMITS.characters:
             raise InputError(f"found a formula of more than {LIMITS.characters} characters with its definitions put in")

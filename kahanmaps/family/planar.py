@@ -78,9 +78,9 @@ class PlanarPart:
 
 @dataclass(frozen=True, eq=False)
 class NormalForm(Displayed):
-    """x' = J grad H(x) as one planar system over K = Q[t]/chi: x = S z, and H(x) = l(h(X, Y)); see the module.
+    """The normal form of x' = J grad H(x): a planar system over K = Q[t]/chi with x = S z and H(x) = l(h(X, Y)).
 
-    Made by `normal_form`. That it is the system, exactly, is verified at construction.
+    It is constructed by `normal_form`, and verified exactly at construction.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [0, 1, 0, 0,  2, 0, 0, 0,  0, 0, 0, 2,  0, 0, 1, 0])
@@ -164,7 +164,7 @@ class NormalForm(Displayed):
         return first, second
 
     def step(self, X: Any, Y: Any, eps: Any) -> tuple[fmpq_poly, fmpq_poly]:
-        """The Kahan map at (X, Y). Raises SingularStep where 1 + eps^2 D is not a unit of K."""
+        """Return the image of (X, Y) under the Kahan map. Raises SingularStep if 1 + eps^2 D is not a unit of K."""
         X, Y = self._elements(X, Y)
         epsilon = rational(eps)
         denominator = 1 + epsilon * epsilon * self.D(X, Y)
@@ -182,7 +182,7 @@ class NormalForm(Displayed):
 
     @cached_property
     def parts(self) -> tuple[PlanarPart, ...]:
-        """The planar systems at the rational roots of chi, by increasing root; m of them where chi splits over Q."""
+        """The planar systems at the rational roots of chi, by increasing root; m of them if chi splits over Q."""
         u, v = ring(["u", "v"]).gens()
         slope = self.chi.derivative()
         parts = []
@@ -207,10 +207,10 @@ class NormalForm(Displayed):
         return _format_form(self.D_coefficients, _QUADRATIC)
 
     def verify(self) -> None:
-        """Checks exactly that this is the system. Raises AssertionError otherwise: it would be a mistake of ours.
+        """Verify the normal form exactly. Raises AssertionError if it is wrong, which would be an error in kahanmaps.
 
-        Checked are A^T S = S diag(C, C) with the companion matrix C of chi; that S^T J S is the Gram matrix of l(W),
-        which is invertible; and H(S z) = l(h), as symmetric trilinear forms.
+        The conditions are A^T S = S diag(C, C) with the companion matrix C of chi; that S^T J S is the Gram matrix of
+        l(W), which is invertible; and H(S z) = l(h), as symmetric trilinear forms.
         """
         n, m = self.dim, self.m
         if (self.S.nrows(), self.S.ncols(), len(names_of(self.H))) != (n, n, n):
@@ -254,11 +254,11 @@ class NormalForm(Displayed):
 
 
 def normal_form(member: FamilyMember) -> NormalForm:
-    """The normal form of the system that the signs of the member pick; `H` of the result is K for signs with a minus.
+    """Return the normal form of the associated system given by the signs of the member.
 
-    e1 is a unit vector, or a small combination of some, e2 the shortest of those with W(e1, e2) = 1 that LLL finds; of
-    the 2m choices so made the one with the shortest numbers is taken. Raises HypothesisError where chi has repeated
-    roots.
+    (If a sign is negative, `H` of the result is K.) e1 is a unit vector or a small combination of unit vectors, e2 a
+    short vector with W(e1, e2) = 1 found by LLL; among 2m such choices the one with the shortest numbers is used.
+    Raises HypothesisError if chi has repeated roots.
     """
     if not isinstance(member, FamilyMember):
         raise wrong_kind(member, "a member of the family", "km.load(...).member is one, of a file of kind [family]")
@@ -359,7 +359,7 @@ def _unit(n: int, i: int) -> fmpq_mat:
 
 
 def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) -> str:
-    """A form over K as people write it."""
+    """Format a form over K as text."""
     text = ""
     for coefficient, monomial in zip(coefficients, monomials, strict=True):
         if coefficient.is_zero():

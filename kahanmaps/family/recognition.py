@@ -1,4 +1,4 @@
-"""Members of the family that do not say so: a matrix A is looked for, given H and J alone.
+"""Recognition of members of the family: the search for a matrix A, given only H and J.
 
 x' = J grad H(x) with a homogeneous cubic H and a constant invertible skew J belongs to the family through every A with
 
@@ -39,7 +39,7 @@ _T = fmpq_poly([0, 1])
 
 @dataclass(frozen=True, eq=False)
 class FamilyStructure:
-    """A Hamiltonian system that was found to be a member: `member` is the system in the coordinates y with x = T y.
+    """The structure of a Hamiltonian system as a member: `member` is the system in the coordinates y with x = T y.
 
     T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of
     all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `find_family_structure`; that `member` is the system is
@@ -76,7 +76,7 @@ class FamilyStructure:
 
     @property
     def text(self) -> str:
-        """In a sentence: what was found."""
+        """A sentence that describes the structure."""
         factors = self.member.factors
         chi = " ".join(f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors)
         if self.member.m == 1:
@@ -91,13 +91,13 @@ class FamilyStructure:
 
 
 def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
-    """A basis of all rational A with A^T J = J A and A Hess(H) = Hess(H) A^T, for an invertible J (default: standard).
+    """Return a basis of all A with A^T J = J A and A Hess(H) = Hess(H) A^T, for an invertible J (default: standard).
 
-    H is a homogeneous cubic. The matrices have integer entries, generate all the integer solutions, and are short: a
-    reduced lattice basis. The identity is among their combinations. Exact.
+    H is a homogeneous cubic. The result is a reduced lattice basis of all integer solutions; the identity lies in its
+    span. Exact.
 
-    Raises InputError where H is not a homogeneous cubic, J not an invertible skew matrix of its size, or the dimension
-    larger than 32.
+    Raises InputError if H is not a homogeneous cubic, J not an invertible skew matrix of the same size, or the
+    dimension larger than 32.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> names = ["x1", "x2", "x3", "x4"]
@@ -130,12 +130,12 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
 
 
 def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
-    """The system as a member of the family, if it is one: with an A that splits H the furthest, of small entries.
+    """Search for a matrix A that makes the system a member of the family, with as many distinct roots as possible.
 
-    H must be a homogeneous cubic and J invertible, in dimension 2m; otherwise, and where only the multiples of I
-    satisfy A Hess(H) = Hess(H) A^T, None. (In dimension 2 the answer is A = I, for every H.) Where chi of A splits
-    over Q its roots are 1, 2, ..., r. The member is exact: FamilyMember verifies it. That no other A has more
-    distinct roots is certain where H depends on all variables, and otherwise what many small combinations showed.
+    Returns None if H is not a homogeneous cubic or J not invertible, and if only the multiples of I satisfy
+    A Hess(H) = Hess(H) A^T. (In dimension 2 the result is A = I, for every H.) If chi of A splits over Q, its roots are
+    1, 2, ..., r. The member is verified exactly. That no other A has more distinct roots is certain if H depends on all
+    variables; otherwise it is only the result of trying many small combinations.
 
     Raises InputError beyond dimension 32.
 
@@ -167,9 +167,9 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
 
 
 def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
-    """H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none. Exact.
+    """Return H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none.
 
-    Other structures J are not searched for.
+    The result is exact. Other structures J are not tried.
 
     >>> print(find_cubic_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "-q^2"])).H)
     1/3*q^3 + 1/2*p^2
@@ -191,7 +191,7 @@ def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
 
 
 def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure | None:
-    """`find_family_structure` of the system, where x' = J grad H with the standard J; None otherwise.
+    """Apply `find_family_structure` to a system x' = J grad H with the standard J; return None for others.
 
     >>> rhs = ["3*x3^2", "x2^2", "-3*x1^2", "-2*x2*x4"]
     >>> print(find_family_structure_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
@@ -202,14 +202,14 @@ def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure |
 
 
 def why_not_member(hamiltonian: CubicHamiltonian | None) -> str:
-    """In a sentence why the system is no member; None stands for one that `find_cubic_hamiltonian` has no H for."""
+    """Return a sentence that says why the system is not a member; None stands for a system without a Hamiltonian."""
     if hamiltonian is None:
         return "x' is not J grad H with J = [[0, I], [-I, 0]]"
     return _reason_against(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
 
 
 def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
-    """An invertible T with J = T [[0, I], [-I, 0]] T^T, so that x' = J grad H is y' = [[0, I], [-I, 0]] grad H(T y).
+    """Return T with J = T [[0, I], [-I, 0]] T^T, so that x' = J grad H becomes y' = [[0, I], [-I, 0]] grad H(T y).
 
     T = I for the standard J. Raises InputError unless J is skew and invertible.
 
@@ -247,7 +247,7 @@ class _Part:
 
 
 def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
-    """An element with as many distinct eigenvalues as can be, made of small numbers."""
+    """Return an element with as many distinct eigenvalues as possible and small entries."""
     parts = list(_parts(space, QQ.identity(space[0].nrows())))
     A = fmpq_mat(space[0].nrows(), space[0].nrows())
     # The largest idempotent gets the eigenvalue 1: then A = I + ..., in which it does not occur.
@@ -390,7 +390,7 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
 
 
 def _reason_against(hamiltonian: CubicHamiltonian) -> str:
-    """Why a system is not of the kind in which A is looked for; empty where it is."""
+    """Return why the search for A does not apply to a system; empty if it does."""
     if hamiltonian.dim % 2:
         return f"the dimension is {hamiltonian.dim}, expected an even one"
     if not hamiltonian.is_homogeneous:

@@ -211,7 +211,9 @@ def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path):
     ]
     assert (outcome.status, outcome.out) == (0, "")
     assert np.load(tmp_path / "x.npy").tolist() == points
-    assert outcome.err.startswith(f"{tmp_path / 'x.npy'}: completed: 30 steps; largest observed drift of the block integrals: ")
+    assert outcome.err.startswith(
+        f"{tmp_path / 'x.npy'}: completed: 30 steps; largest observed drift of the block integrals: "
+    )
 
 
 def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singular_steps(kahanmaps):

@@ -136,7 +136,11 @@ def _show(file: Any) -> None:
     if facts["codimension"] is not None:
         lines.append(f"a generic orbit lies in a variety of codimension {facts['codimension']}")
     for relation in lib.relations(file.catalog, file.variables):
-        count = "no relation" if not relation.dimension else f"{relation.dimension} relation{'s' * (relation.dimension > 1)}"
+        count = (
+            "no relation"
+            if not relation.dimension
+            else f"{relation.dimension} relation{'s' * (relation.dimension > 1)}"
+        )
         what = f"polynomials of {relation.text}" if relation.text.startswith("degree") else relation.text
         lines.append(f"{count} along an orbit among: {what}")
     if lines:
