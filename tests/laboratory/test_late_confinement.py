@@ -32,12 +32,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     Written,
     outcome_of,
 )
-from kahanmaps.laboratory.singular.singularities import (
-    Patterns,
-    _patterns,
-    patterns_of,
-    singularities,
-)
+from kahanmaps.laboratory.singular.singularities import Patterns, _patterns, patterns_of, singularities
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -213,7 +208,7 @@ def beside(kind, growth, lengths=None, heights=(21, 5)):
     return doubt_of_heights(SimpleNamespace(heights=SimpleNamespace(kind=kind, orbits=orbits), degrees=degrees))
 
 
-def test_heights_and_degrees_that_do_not_go_together_are_told():
+def test_heights_and_degrees_that_disagree_are_reported():
     exponential, quadratic = Growth.EXPONENTIAL, Growth.QUADRATIC
     assert beside(exponential, Growth.LINEAR) == "the degrees grow linearly"
     assert beside(exponential, Growth.QUADRATIC) == "the degrees grow polynomially"
