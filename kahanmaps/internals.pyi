@@ -142,10 +142,10 @@ from .maps.convention import eps_record as eps_record
 from .maps.convention import eps_share as eps_share
 from .maps.convention import eps_told as eps_told
 from .maps.convention import time_step as time_step
+from .maps.floats.ensemble import starts_in_box as starts_in_box
 from .maps.floats.float_conversion import FloatArray as FloatArray
 from .maps.floats.float_conversion import to_float as to_float
 from .maps.floats.float_conversion import to_floats as to_floats
-from .maps.floats.ensemble import starts_in_box as starts_in_box
 from .maps.floats.float_orbit import FloatEnsemble as FloatEnsemble
 from .maps.floats.float_orbit import float_function as float_function
 from .maps.floats.lyapunov import Lyapunov as Lyapunov

@@ -33,7 +33,7 @@ from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_NO_TENSOR = "the map seems to have no value, or the tensor or a denominator to vanish identically"
+_NO_TENSOR = "the map seems to be defined nowhere, or the tensor or a denominator to vanish identically"
 
 
 def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction, eps: fmpq | None) -> Identity:
@@ -58,7 +58,7 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
     if not isinstance(map_, KahanFamily):
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
     subject = (map_.subject, density.subject)
-    no_value = "the map seems to have no inverse, or no value, or a denominator to vanish identically"
+    no_value = "the map seems to have no inverse, to be defined nowhere, or a denominator to vanish identically"
     return Identity(
         map_.dim, sides, eps, *labels, no_value=no_value, has_eps=map_.has_eps, root=map_.root, subject=subject
     )

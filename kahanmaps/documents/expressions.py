@@ -15,7 +15,7 @@ _NUMBERS = (int, float, complex)
 def formula_text(value: Any) -> str:
     """Convert a right-hand side or a claim to text, exactly.
 
-    Raises InexactNumber for machine floats, also inside expressions of SymPy, where 1/3*x has become one unnoticed;
+    Raises InexactNumber for floats, also inside expressions of SymPy, where 1/3*x silently becomes one;
     InputError for irrational numbers there.
 
     >>> formula_text("x*y"), formula_text(2)

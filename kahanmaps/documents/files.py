@@ -109,9 +109,7 @@ class SystemFile(Displayed):
         what = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, KahanFamily):
             what = f"stands for a {self.map.title}"
-        raise InputError(
-            f"{self.name} {what}, expected a quadratic vector field without eps: what is asked for is about fields"
-        )
+        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps")
 
     @property
     def rhs(self) -> tuple[fmpq_mpoly, ...]:

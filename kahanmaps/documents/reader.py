@@ -68,7 +68,7 @@ class PartReader:
         self.parts = [0]  # how many were read in all
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
-        self.unsure = False  # some parameter has no value: what depends on values is not judged
+        self.unsure = False  # a parameter could not be read: parts that depend on it are not checked
         self.variables: tuple[str, ...] | None = None
         self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
         self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number, which is such a symbol

@@ -172,7 +172,7 @@ class NormalForm(Displayed):
         if not common.is_one():
             raise SingularStep(
                 f"1 + eps^2 D and chi have the factor {format_univariate(common)} in common at this point for "
-                f"eps = {format_number(epsilon)}: the Kahan map has no value there",
+                f"eps = {format_number(epsilon)}: the Kahan map is not defined there",
                 (X, Y),
                 epsilon,
             )

@@ -65,7 +65,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def _name(self) -> str:
-        """What stands for the root: of a map that does not contain it the t of Q[t]/g."""
+        """The name of the root: the symbol of the map, or t if the map does not contain the root."""
         return self.given.symbols[0] if self.given.symbols else "t"
 
     def written(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
-"""Compositions of maps and of their inverses, which are stepped factor by factor.
+"""Compositions of maps and of their inverses, evaluated factor by factor.
 
-A composition has no value where one of its steps has none, even if its formulas, multiplied out, have one there. They
-are multiplied out only to be written down.
+A composition is not defined where one of its steps is not defined, even if its expanded formulas are. The formulas are
+expanded only for output.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TRIES = 20
 
 @dataclass(frozen=True, eq=False)
 class MapFactor:
-    """A map of a composition, or its inverse; `values` are those of its symbols, functions of the composition's."""
+    """A factor of a composition: a map or its inverse; `values` are the values of its symbols."""
 
     map: MapFamily
     is_inverse: bool
@@ -37,12 +37,12 @@ class MapFactor:
 
     @property
     def subject(self) -> tuple[Any, ...]:
-        """All that determines it."""
+        """The data that determine the factor."""
         return (int(self.is_inverse), *self.map_and_values)
 
     @property
     def map_and_values(self) -> tuple[Any, ...]:
-        """The same without its direction."""
+        """The data that determine the factor, without its direction."""
         return (self.map.subject, self.values)
 
     def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
@@ -50,14 +50,14 @@ class MapFactor:
         values = [function.value(over, symbols) for function in self.values]
         if any(value is None for value in values):
             if over.characteristic:
-                raise BadPrime(f"modulo {over.characteristic} a parameter has no value", over.characteristic)
-            raise InputError("found a parameter of a part that has no value where the symbols have these")
+                raise BadPrime(f"modulo {over.characteristic} a parameter has a pole", over.characteristic)
+            raise InputError("a parameter of a part has a pole at these values of the symbols")
         map_at_eps = self.map.at(eps, over, values)
         return map_at_eps.inverse if self.is_inverse else map_at_eps
 
 
 class ComposedMap(MapFamily):
-    """The map that takes one step of each part after the other; `composed_map` makes it."""
+    """The composition of several maps; constructed by `composed_map`."""
 
     title = "composition"
 
@@ -86,7 +86,7 @@ class ComposedMap(MapFamily):
 
     @property
     def _letters(self) -> list[tuple[Any, int]]:
-        """What each part is, compositions taken apart, and its time steps, with a sign."""
+        """The elementary factors, with compositions expanded, and the signed number of time steps of each."""
         all_letters: list[tuple[Any, int]] = []
         for part in self.parts:
             part_letters = [(part.map_and_values, part.map.time_steps)]
@@ -211,12 +211,12 @@ def composed_map(
         missing = next((name for name in map_.symbols if name not in functions), None)
         if missing is not None:
             raise InputError(
-                f"found a map with the symbol {missing}, expected its value, or a composition with that symbol"
+                f"found a map with the symbol {missing}: give its value, or make it a symbol of the composition"
             )
         given_parts += [MapFactor(map_, power < 0, tuple(functions[name] for name in map_.symbols))] * abs(power)
     if not given_parts:
         raise InputError("found no map to compose, expected at least one")
-    parts: list[MapFactor] = []  # without those that their neighbours undo
+    parts: list[MapFactor] = []  # after cancellation of neighbours that are inverse to each other
     for part in given_parts:
         if parts and parts[-1].is_inverse != part.is_inverse and parts[-1].map_and_values == part.map_and_values:
             parts.pop()
@@ -226,11 +226,11 @@ def composed_map(
     parts = parts or [*given_parts[:1], *_reversed(given_parts[:1])]
     if any(part.map.dim != first.dim for part in parts):
         dimensions = ", ".join(str(part.map.dim) for part in parts)
-        raise InputError(f"found maps of the dimensions {dimensions}, expected one")
+        raise InputError(f"the maps must have the same dimension: got {dimensions}")
     for part in parts:
         if set(part.map.variables) == set(first.variables) and part.map.variables != first.variables:
             orders = f"{', '.join(first.variables)} and {', '.join(part.map.variables)}"
-            raise InputError(f"found the variables in two orders, {orders}, expected one order")
+            raise InputError(f"the maps must have their variables in the same order: got {orders}")
         if part.is_inverse:
             _ = part.map.at(1, QQ, [QQ.one for _ in part.values]).inverse  # raises InputError where there is none
     variables = first.variables if variables is None else tuple(variables)
@@ -282,5 +282,5 @@ def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[Rational
 def _too_large(parts: Sequence[MapFactor]) -> str:
     return (
         f"found a composition of {counted(len(parts), 'map')} whose formulas are too large to be multiplied out, "
-        "expected a shorter one: what is asked for is about formulas"
+        "expected a shorter one, since the request needs its formulas"
     )

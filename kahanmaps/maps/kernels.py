@@ -1,4 +1,4 @@
-"""What computes many orbits: numpy, which is always there, or machine code, by numba or its compiler (extra `fast`)."""
+"""The kernels for many orbits: numpy, always available, or machine code by numba or its compiler (extra `fast`)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def has_llvm() -> bool:
 
 
 def choose_kernel(requested: str | None, is_long: bool) -> str:
-    """The wish, or numba where it is installed and `long` says that loading it pays. Raises InputError for another.
+    """Return the requested kernel, by default numba if it is installed and `is_long`. Raises InputError otherwise.
 
     >>> choose_kernel("numpy", is_long=True), choose_kernel(None, is_long=False)
     ('numpy', 'numpy')

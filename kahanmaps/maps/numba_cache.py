@@ -1,4 +1,4 @@
-"""Machine code of numba, kept on disk where there is a folder and room for it, so that it is compiled once."""
+"""The disk cache of functions compiled by numba."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numba
 
 
 def compiled(function: Callable[..., Any], **options: Any) -> Any:
-    """The function compiled by numba with these options, from the disk or for it if there is a folder that takes it."""
+    """Compile a function by numba with these options, using the disk cache if a folder is writable."""
     try:
         found = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # "no locator available": no folder that can be written to

@@ -79,7 +79,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
 def _linear_in_one_point(
     f: fmpq_mpoly, known: Sequence[Sequence[fmpq_mpoly]], step: fmpq_mpoly, degree: int
 ) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
-    """`step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and what is free of y."""
+    """Return `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term."""
     n, copies = len(known[0]), len(known)
     one = step * 0 + 1
     linear, free = [step * 0 for _ in range(n)], step * 0

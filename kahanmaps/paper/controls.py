@@ -16,7 +16,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 @dataclass(frozen=True)
 class Control:
-    """One way to break a hypothesis: what is broken, and how."""
+    """A negative control: the hypothesis that it violates, and how."""
 
     breaks: str
     function: Callable[[PaperObjects], PaperObjects]

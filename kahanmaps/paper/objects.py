@@ -1,4 +1,4 @@
-"""Everything the paper gives a letter, at one point, over one field: what the claims are written in.
+"""The objects that the paper denotes by letters, at one point, over one field; the claims are functions of them.
 
 Letters are the paper's: A, J, H (with its chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated g, K;
 x and eps; x~ is the image of x under the map of f. Numbers are elements of `K`, which may be the rationals, GF(p),
@@ -34,7 +34,7 @@ _IN_K = (
 def remembered(method: Method) -> Method:
     """Remember the values of a method by the identity of its arguments, which are kept, so that it stays theirs.
 
-    The claims ask for the same things again and again.
+    The claims need the same values again and again.
     """
     name = method.__name__
 
@@ -98,7 +98,7 @@ class PaperObjects:
 
     @property
     def m(self) -> int:
-        """Half the dimension."""
+        """Half the dimension, m."""
         return self.n // 2
 
     # ---- numbers, vectors and matrices --------------------------------------------------------------------------
@@ -118,14 +118,14 @@ class PaperObjects:
         return self.vector("x")
 
     def vector(self, name: str) -> Any:
-        """A vector of its own: the point x, another point, a direction."""
+        """Return an independent vector: the point x, another point, a direction."""
         if name not in self._memory:
             self.used.add(name)
             self._memory[name] = self.draw(name)
         return self._memory[name]
 
     def forget(self, kept: tuple[str, ...] = ()) -> None:
-        """Forget what was computed, but for the vectors that were drawn and the values of the methods `kept`."""
+        """Discard all computed values, except the drawn vectors and the values of the methods `kept`."""
         drawn = {
             key: value
             for key, value in self._memory.items()
@@ -136,7 +136,7 @@ class PaperObjects:
         self._memory.update(drawn)
 
     def scalar(self, name: str) -> Any:
-        """A number of its own."""
+        """Return an independent number."""
         return self.vector(name)[0, 0]
 
     @remembered
@@ -151,11 +151,11 @@ class PaperObjects:
     solve, det, trace = staticmethod(solve), staticmethod(det), staticmethod(trace)
 
     def inverse(self, matrix: Any) -> Any:
-        """matrix^{-1}."""
+        """Return matrix^{-1}."""
         return solve(matrix, self.I)
 
     def dot(self, left: Any, right: Any) -> Any:
-        """left^T right, a number."""
+        """Return left^T right, a number."""
         return (left.transpose() * right)[0, 0]
 
     def sum(self, terms: Sequence[Any]) -> Any:
@@ -188,7 +188,7 @@ class PaperObjects:
     # ---- any system and its Kahan map ---------------------------------------------------------------------------
 
     def value(self, f: SystemOver, x: Any) -> Any:
-        """f(x)."""
+        """Return f(x)."""
         return self.K.column(f.value(x.entries()))
 
     @remembered
@@ -203,14 +203,14 @@ class PaperObjects:
 
     @remembered
     def step(self, f: SystemOver, x: Any, times: int = 1) -> Any:
-        """Phi_f(x, eps), or Phi_f(x, times eps)."""
+        """Return Phi_f(x, eps), or Phi_f(x, times eps)."""
         eps = self.step_eps * self.number(times)
         if self.method == "euler":
             return x + self.value(f, x) * (eps * self.number(2))
         return self.K.column(KahanMap(f, eps).step(x.entries()))
 
     def jacobian_of_step(self, f: SystemOver, x: Any) -> Any:
-        """dPhi_f(x, eps)."""
+        """Return dPhi_f(x, eps)."""
         if self.method == "euler":
             return self.I + self.jac(f, x) * (self.step_eps * self.number(2))
         return KahanMap(f, self.step_eps).jacobian(x.entries())
@@ -569,7 +569,7 @@ class PaperObjects:
         return lifted
 
     def changed(self, **changes: Any) -> PaperObjects:
-        """Objects with some of the data replaced, and nothing remembered."""
+        """Return objects with some of the data replaced, and an empty cache."""
         kept = {entry.name: getattr(self, entry.name) for entry in fields(PaperObjects)}
         return PaperObjects(**{**kept, "_memory": {}, **changes})
 
@@ -603,7 +603,7 @@ class PaperObjects:
         return objects
 
     def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
-        """A quadratic system without any structure: f'', B and c are drawn."""
+        """A quadratic system without special structure: f'', B and c are random."""
         n, K = self.n, self.K
         rows: dict[tuple[int, int], Any] = {}
         for j in range(n):

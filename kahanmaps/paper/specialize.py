@@ -113,7 +113,7 @@ def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
 
 
 def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | None:
-    """All sign vectors (None), or a sample: the single flips and random ones."""
+    """Return None for all sign vectors, or a sample: the single flips and random ones."""
     if 2 ** (m - 1) <= MAX_SIGN_VECTORS:
         return None
     flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
@@ -125,7 +125,7 @@ def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | Non
 
 
 def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
-    """Random vectors of K^n."""
+    """Return random vectors of K^n."""
     return lambda name: K.column([K.random(rng) for _ in range(n)])
 
 

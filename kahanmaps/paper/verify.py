@@ -1,4 +1,4 @@
-"""Putting every claim of the paper to the test, for one member of the family or for the member in general.
+"""Verification of all claims of the paper, for one member of the family or for the generic member.
 
 How a claim is decided, and what the verdict then says:
 
@@ -12,7 +12,7 @@ How a claim is decided, and what the verdict then says:
 * *exact*: claims without x, and those about dimensions and ranks, are evaluated over Q.
 
 Beside that, claims about one block at a time are evaluated exactly over Q[t]/chi, where all roots are one, and, if
-asked for, over complex balls.
+requested, over complex balls.
 """
 
 from __future__ import annotations
@@ -83,13 +83,13 @@ NOTE_ON_RANDOM_MEMBERS = (
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """What to verify: sections (None: all), the order of the series, bits for complex balls, controls instead."""
+    """The options of `verify`: sections (None: all), order of the series, bits of complex balls, controls instead."""
 
     sections: tuple[int, ...] | None = None
     order: int = 3
     ball_bits: int | None = None
     controls: bool = False
-    beyond: bool = False  # the statements of section 10 that are asked of variations, and no others
+    beyond: bool = False  # the statements of section 10 about variations, and no others
 
     def __post_init__(self) -> None:
         if not 1 <= self.order <= 20:
@@ -112,7 +112,7 @@ def verify(
     eps: Any = None,
     time_step: Any = None,
 ) -> Report:
-    """Every claim of the paper, for a member of the family or for the member in general.
+    """Verify all claims of the paper, for a member of the family or for the generic member.
 
     Args:
         system: a member of the family, with m at most 8; or
@@ -184,7 +184,7 @@ def verify(
 
 
 class Verifier:
-    """How claims are verified: random points over GF(p), a proof, exact points, and controls.
+    """Verifies claims: at random points over GF(p), by a proof, at exact points, and with controls.
 
     For a given member, or (None) for the member in general, with half the dimension `m`.
     """
@@ -196,7 +196,7 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """One finding a claim, or one a claim and control and a last one on all controls together."""
+        """Return one finding for each claim; with controls one for each claim and control, and a final one for all."""
         sections = self.options.sections
         made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected = [c for c in made if sections is None or c.section in sections]
@@ -225,7 +225,7 @@ class Verifier:
         return findings
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
-        """The number-th random point over GF(p); with the roots of chi, if need be, or None where they are not had."""
+        """Return the number-th random point over GF(p), with the roots of chi if needed; None if there are none."""
         # In general, and where chi splits over Q, one pool of points serves all claims.
         needs_split = roots and self.member is not None and self.roots is None
         key = (needs_split, number)
@@ -256,14 +256,14 @@ class Verifier:
         return self._points[key]
 
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
-        """A random point over Q; None in general, and where the roots of chi are needed and not rational."""
+        """Return a random point over Q; None for the generic member, and if roots of chi are needed but irrational."""
         if self.member is None or (roots and self.roots is None):
             return None
         rng = random.Random(f"exact {self._seed} {number}")
         return specialize.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
-        """The objects as bounds."""
+        """The objects with bounds in place of numbers."""
         if self.member is None:
             return specialize.universal_bound_objects(self.m, self.options.order)
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
@@ -275,7 +275,7 @@ class Verifier:
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
 
     def outside(self, claim: Claim) -> str | None:
-        """Why a claim does not apply, if it does not."""
+        """Return why a claim does not apply; empty if it does."""
         if self.member is None or self.member.is_generic:
             return None
         bounds = self.bounds()
@@ -288,7 +288,7 @@ class Verifier:
         return None
 
     def what_is_special(self) -> str:
-        """Why a statement for generic A and H may fail here."""
+        """Return why a statement for generic A and H may fail for this member."""
         if self.member is None:
             return "its A or H is special"
         if not self.member.is_generic:
@@ -314,7 +314,7 @@ class Verifier:
     # one claim
 
     def verify_claim(self, claim: Claim) -> Finding:
-        """The finding on one claim."""
+        """Verify one claim and return its finding."""
         reason = self.outside(claim)
         if reason is not None:
             return self._finding(claim, Certainty.UNDECIDED, Evidence("outside the hypotheses", reason))
@@ -346,10 +346,10 @@ class Verifier:
         return replace(finding, also=(*finding.also, *also))
 
     def _verify_existence(self, claim: Claim) -> Finding:
-        """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
+        """Decide a claim that two objects differ, or that a rank is attained: one point is a proof."""
         roots, outcome, tried = False, None, 0
         for number in range(_MAX_UNDEFINED):
-            # Large matrices over Q are dear, and where there is a reason for the other side a point over GF(p) will do.
+            # Large matrices over Q are expensive; where the other side has a proof, a point over GF(p) suffices.
             modular = bool(claim.at_most) and self.m > 3
             objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
             if objects is None:
@@ -387,7 +387,7 @@ class Verifier:
         return self._finding(claim, Certainty.REFUTED, evidence, witness=witness_of(outcome))
 
     def proof(self, claim: Claim, needs: set[str], equation: CoefficientSize, poles: int) -> Evidence | None:
-        """A proof, if there is one."""
+        """Return a proof, or None."""
         blocks, order = claim.blocks_for_proof(self.m), self.options.order
         if self.member is None:
             return normal_form_proof(claim.key, blocks, order) if claim.symplectic else None
@@ -431,7 +431,7 @@ class Verifier:
                 if not evaluate(claim, objects).holds:
                     raise Contradiction(f"{claim.place}: {claim.title}: fails over Q[t]/chi, but not over GF(p)")
                 yield Evidence("exact over Q[t]/chi", f"{text}, for all roots at once", {"points": 1})
-            except UNDEFINED:  # a point where the map has no value: no evidence, and none is claimed
+            except UNDEFINED:  # the map is not defined at this point, which gives no evidence
                 pass
         if self.options.ball_bits is not None:
             bits = self.options.ball_bits
@@ -456,7 +456,7 @@ class Verifier:
             yield Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
 
     def notes(self) -> list[str]:
-        """What holds for the whole table."""
+        """Return the notes on the whole table."""
         if self.member is None:
             return [NOTE_ON_RANDOM_MEMBERS]
         notes = [diagnosis(self.member.A)]
@@ -534,7 +534,7 @@ class Verifier:
 
 
 class ClaimAtPoints:
-    """A claim as `decide` takes it: at the points of a verifier."""
+    """A claim at the points of a verifier, in the form that `decide` requires."""
 
     name = "claim"
     no_value = "a denominator seems to vanish identically"
@@ -550,7 +550,7 @@ class ClaimAtPoints:
 
     @property
     def where(self) -> str:
-        """What is assumed of the primes."""
+        """The assumption about the primes."""
         if self.conjugates == 1:
             return ""
         return " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
@@ -583,13 +583,13 @@ class ClaimAtPoints:
                 yield Trial(objects.K.characteristic)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """What evidence says beside the bounds."""
+        """Return the data of the evidence other than the bounds."""
         return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
 
 
 @lru_cache(maxsize=4096)
 def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
-    """The proof of a claim in normal form with so many blocks; None where it grows beyond the budget.
+    """Prove a claim in normal form with this number of blocks; return None if the budget is exceeded.
 
     Raises Contradiction where the two sides are different rational functions.
     """

@@ -127,7 +127,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     time_left = TimeLeft(last_step)
     is_unread = False  # the reader of a pipe (such as head) has closed it
 
-    def told(step: int) -> None:
+    def on_step(step: int) -> None:
         nonlocal is_unread
         progress(f"step {step} of {last_step}{time_left(step) if trajectory.arithmetic.kind == 'exact' else ''}")
         if output is None and not is_read():
@@ -138,7 +138,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
         interruptible(trajectory.interrupt),
         Progress(quiet or on_terminal) as progress,
     ):  # on a terminal the points show the progress
-        end = trajectory.write(target, form, file.name, told)
+        end = trajectory.write(target, form, file.name, on_step)
     if verbose and not quiet and trajectory.why != reason:
         say(trajectory.why)
     if output is not None and not quiet:

@@ -48,7 +48,7 @@ class NthIterate:
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
 
-        Raises SingularStep where the map has no value, over Q at any step, elsewhere at one of the first few or the
+        Raises SingularStep where the map is not defined: over Q at any step, elsewhere at one of the first few or the
         last; PrecisionLost for balls that are too wide; OverBudget, over Q, where an orbit that is stepped has numbers
         of more than `max_bits` bits before it is there, and before it meets a pole.
         """
@@ -67,11 +67,11 @@ class NthIterate:
             for plane, triple in zip(self.splitting.planes, self.splitting.triples(x), strict=True):
                 triples.append(self._in_plane(plane.block, triple, n))
                 if self.field.is_zero(triples[-1][2]):
-                    raise SingularStep(f"the map has a pole: its iterate {n} has no value at the start")
+                    raise SingularStep(f"the map has a pole: its iterate {n} is not defined at the initial point")
             return self.splitting.point(triples)
 
     def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
-        """P_n over a field other than Q."""
+        """Return P_n over a field other than Q."""
         from kahanmaps.maps.normal_form import translation
 
         if block.is_zero or (start[0] == 0 and start[1] == 0):
@@ -98,7 +98,7 @@ class NthIterate:
 
 
 def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any]) -> str:
-    """Empty, or why the orbit of a rational start is special in a plane, which balls cannot decide.
+    """Return why the orbit of a rational initial point is special in a plane, which balls cannot decide; or "".
 
     Special are planes in which the start is at rest, or on a singular level cubic (delta is 0 or 1).
     """

@@ -41,7 +41,7 @@ _AGREEMENTS = 8
 
 
 class PeriodKind(StrEnum):
-    """What the level cubic of a plane is, and so how its period is found (p is not 2 or 3)."""
+    """The type of the level cubic of a plane, which determines how its period is computed (p is not 2 or 3)."""
 
     FIXED = "a fixed point"  # period 1
     SMOOTH = "a smooth level cubic"  # delta is not 0, 1 or infinite: the order of T
@@ -49,7 +49,7 @@ class PeriodKind(StrEnum):
     TRIANGLE = "a level with delta = 1, three lines"  # Psi^3 multiplies by -8 along a line: 3 ord(-8), over Q none
     VERTEX = "a vertex of the three lines"  # period 3
     AT_POLE = "a pole at the start"  # W (W^2 + D) = 0, a conic and a line: period 4
-    NO_VALUE = "a start where the map has no value"  # a base point of the levels, or disc(h) = 0 there: none
+    NO_VALUE = "an initial point where the map is not defined"  # a base point of the levels, or disc(h) = 0 there: none
     STEPPED = "characteristic 2 or 3"  # walked
 
 
@@ -71,7 +71,7 @@ class PlanePeriod:
 
     @property
     def text(self) -> str:
-        """One line."""
+        """A line of text."""
         what = f"period {self.period}" if self.period is not None else self.status
         return f"{self.name}: {what} ({self.kind}{'; ' + self.reason if self.reason else ''})"
 
@@ -80,9 +80,9 @@ class PlanePeriod:
 class OrbitPeriod(Printed):
     """The period of an orbit, continued through poles: the least common multiple over the planes.
 
-    `status` is "periodic", "aperiodic" (proved), "undefined" (a plane starts where the map has no value and cannot be
-    continued) or "undecided". If `meets_pole` is False, the map itself brings the start back after `period` steps and
-    not before; if True, the orbit of the map ends at the pole; None: not known.
+    `status` is "periodic", "aperiodic" (proved), "undefined" (the map is not defined at the initial point of a plane
+    and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the map
+    itself; if True, the orbit of the map ends at the pole; None: not known.
     """
 
     period: int | None
@@ -91,11 +91,11 @@ class OrbitPeriod(Printed):
     planes: tuple[PlanePeriod, ...]
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each plane, for `pandas.DataFrame(found.rows())` and the like."""
+        """Return a row for each plane, for example for `pandas.DataFrame(period.rows())`."""
         return [{"plane": plane.name, "status": plane.status, "period": plane.period} for plane in self.planes]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return all_fields(self)
 
     @property
@@ -104,7 +104,7 @@ class OrbitPeriod(Printed):
         if self.period is None:
             sentence = {
                 "aperiodic": "the orbit has no period",
-                "undefined": "the orbit comes to a point where the map has no value and cannot be continued",
+                "undefined": "the orbit reaches a point where the map is not defined and cannot be continued",
             }.get(self.status, "the period was not found")
         elif self.meets_pole is False:
             sentence = f"the orbit has period {self.period} and meets no pole of the map"
@@ -118,7 +118,7 @@ class OrbitPeriod(Printed):
 def orbit_period(
     form: NormalForm, eps: Any, start: Sequence[Any], prime: int, *, largest: int = LARGEST_FIELD
 ) -> OrbitPeriod:
-    """The exact period modulo p of the orbit of `start` under the Kahan map at `eps` (the time step is 2 eps).
+    """Compute the exact period modulo p of the orbit of `start` under the Kahan map at `eps`, half the time step.
 
     The period of a plane over a field of more than `largest` elements is "undecided". Raises BadPrime
     where the member has no normal form modulo p, InputError for a wrong start.
@@ -164,7 +164,7 @@ def plane_period(
         for step in range(1, min(q * q + q + 1, _WALK) + 1):
             image = block.image(image)
             if all(entry == 0 for entry in image):
-                return PlanePeriod(name, q, kind, "undefined", None, True, f"no value after {step} steps")
+                return PlanePeriod(name, q, kind, "undefined", None, True, f"not defined after {step} steps")
             passed = passed or bool(image[2] == 0)
             if same_point(image, point):
                 return PlanePeriod(name, q, kind, "periodic", step, passed)
@@ -252,7 +252,7 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
 
 
 def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
-    """Whether an orbit meets a pole, by walking if the period is not long."""
+    """Return whether an orbit reaches a pole, by iteration if the period is not long."""
     image = point
     for _ in range(min(period, _WALK)):
         image = block.image(image)
@@ -272,7 +272,7 @@ def period_of(
     *,
     largest: int = LARGEST_FIELD,
 ) -> OrbitPeriod:
-    """The period of the orbit of `start`, in the system's own coordinates, modulo a prime or (None) over Q.
+    """Compute the period of the orbit of `start`, in the coordinates of the system, modulo a prime or (None) over Q.
 
     `normal_form` is that of the system (family.system_normal_form) or, where the coordinates are its own, of a member;
     otherwise like `orbit_period` and `period_over_rationals`.
@@ -326,7 +326,7 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     that there is none.
 
     Reduction modulo an unramified odd prime of good reduction is injective on torsion. So T has infinite order if it
-    has different orders modulo two such primes; where they agree, n T = 0 is put to the test over the field itself.
+    has different orders modulo two such primes; where they agree, n T = 0 is tested over the field itself.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
@@ -338,7 +338,7 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
 
 
 def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str = "the plane") -> PlanePeriod:
-    """The period of (U : V : 1) under Psi of a block over Q, or over Q[t]/g with g irreducible.
+    """Compute the period of (U : V : 1) under Psi of a block over Q, or over Q[t]/g with g irreducible.
 
     >>> block = PlanarBlock(*(fmpq(c) for c in (0, 2, -1, 2)))
     >>> plane_period_over_rationals(block, (fmpq(-1, 3), fmpq(-1, 3), fmpq(1))).text
@@ -357,7 +357,7 @@ def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str 
 
 
 def torsion_order(gamma: Any) -> tuple[int | None, str]:
-    """The order of T over Q, or Q[t]/g with g irreducible, None for an infinite one, and the reason.
+    """Return the order of T over Q or Q[t]/g with g irreducible (None: infinite), and the reason.
 
     >>> torsion_order(fmpq(32, 27)), torsion_order(fmpq(3))
     ((5, '5 T = 0'), (None, 'T has the orders 54 and 88 modulo 101 and 103'))

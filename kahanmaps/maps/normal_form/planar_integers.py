@@ -39,7 +39,7 @@ class LevelBlock(ABC):
 
     @cached_property
     def level(self) -> Any:
-        """h / (W (W^2 + D)), conserved; None where the first step has no value."""
+        """The conserved level h / (W (W^2 + D)); None if the first step is not defined."""
         numerator, denominator = self.block.level(self.start)
         return None if denominator == 0 else (fmpq(1) * numerator) / denominator
 
@@ -147,7 +147,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def integral(triple: Triple) -> IntegerTriple:
-        """A rational triple as a primitive one."""
+        """Return a rational triple as a primitive integer triple."""
         return primitive(_cleared([triple])[0])
 
     @staticmethod
@@ -157,7 +157,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def shortest(triple: IntegerTriple) -> IntegerTriple:
-        """The triple over its content."""
+        """Divide the triple by its content."""
         return primitive(triple)
 
 
@@ -188,7 +188,7 @@ def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
 
 
 def primitive(triple: Sequence[fmpz]) -> IntegerTriple:
-    """The triple over its content."""
+    """Divide the triple by its content."""
     common = content(triple)
     U, V, W = triple
     return (U, V, W) if common <= 1 else (U // common, V // common, W // common)

@@ -1,4 +1,4 @@
-"""Rational points that are kept as their primitive triples in the planes; x is put together only when asked for.
+"""Rational points stored as primitive triples in the planes; x is computed from them only on demand.
 
 x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
 product of the W_i cost a few multiplications. In lowest terms they are after three more things: the gcds of the W_i
@@ -35,7 +35,7 @@ _POWER = 3
 
 @dataclass(frozen=True)
 class _Row:
-    """One coordinate: sum of (alpha_i U_i + beta_i V_i) / (below W_i) over the planes of `support`, with integers."""
+    """A coordinate: the sum of (alpha_i U_i + beta_i V_i) / (below W_i) over the planes of `support`, with integers."""
 
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
@@ -200,7 +200,7 @@ class PlanesPoint:
         return [fractions[k] for k in range(len(rows))]
 
     def rationals(self) -> tuple[fmpq, ...]:
-        """The coordinates as fmpq (whose constructor runs a gcd of its own)."""
+        """Return the coordinates as fmpq (whose constructor runs another gcd)."""
         return tuple(fmpq(numerator, denominator) for numerator, denominator in self.lowest_terms())
 
 
@@ -250,7 +250,7 @@ class NormalSteps:
         return blocks, Assembly(blocks, [self.splitting.matrix(i) for i in range(len(planes))])
 
     def points(self, start: Sequence[Any]) -> Iterator[PlanesPoint]:
-        """The orbit, as long as the map has a value."""
+        """Yield the orbit, as long as the map is defined."""
         blocks, assembly = self.blocks(start)
         for triples_at_step in zip(*(triples(block) for block in blocks), strict=False):
             yield PlanesPoint(assembly, triples_at_step)

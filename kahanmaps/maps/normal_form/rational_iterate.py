@@ -6,9 +6,9 @@ that of an orbit which is stepped all the way.
 * Heights are known at a few steps, farther and farther apart. But for O(1) they are convex in the step (a polynomial
   of degree 2, or linear), so what is within the budget at both ends is so in between, and from a rise it follows where
   the budget is exceeded at the latest; beyond that step nothing has to be known.
-* Poles up to there are found modulo random primes of 61 bits and put to the test over Q: a pole over Q is one modulo
+* Poles up to there are found modulo random primes of 61 bits and verified over Q: a pole over Q is one modulo
   every prime.
-* A plane that comes back, or moves on a parabolic level, is no burden: its poles are known for all steps at once, and
+* The poles of a plane that is periodic, or moves on a parabolic level, are known for all steps at once, and
   its numbers stay short. If all planes do so, any n is within reach.
 """
 
@@ -31,12 +31,12 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_po
 from kahanmaps.maps.normal_form.planes_point import Block, NormalSteps, PlanesPoint
 
 _RISE = 16  # steps over which a rise of the heights is more than a fluctuation
-_WALKED = 256  # steps taken exactly at first,
-_LIGHT = 8192  # as long as the numbers have at most so many bits
-_SHORT = 24  # up to here a plane is stepped
+_EXACT_STEPS = 256  # taken first,
+_EXACT_BITS = 8192  # as long as the numbers have at most this bit length
+_SINGLE_STEPS = 24  # up to this step a plane is computed by single steps
 _PRIMES = 20
-# Where no limit is given: longer numbers take minutes. So many steps modulo a prime are cheaper than long numbers.
-_MOST_BITS, _LOOKED = 1 << 28, 250_000
+# The default limits: longer numbers take minutes; this number of steps modulo a prime is faster than long numbers.
+_MAX_BITS, _MAX_MODULAR_STEPS = 1 << 28, 250_000
 
 
 class OverBudget(Exception):
@@ -60,7 +60,7 @@ class OrbitInPlanes:
         triples = steps.splitting.triples(x)
         self._planes = [_Plane(plane.block, P) for plane, P in zip(steps.splitting.planes, triples, strict=True)]
         self._is_lazy = all(plane.lazy for plane in self._planes)
-        self._limit = _MOST_BITS if max_bits is None else max_bits
+        self._limit = _MAX_BITS if max_bits is None else max_bits
         self._end: SingularStep | OverBudget | None = None
         self._period: int | None = None
         self._walked: list[PlanesPoint] = []  # the first steps, exactly
@@ -74,7 +74,7 @@ class OrbitInPlanes:
             if step > 0 and value == self._walked[0]:
                 self._period = step
                 break
-            if step == _WALKED or value.bits > _LIGHT:
+            if step == _EXACT_STEPS or value.bits > _EXACT_BITS:
                 break
         else:
             self._end = _no_value(len(self._walked) - 1)
@@ -122,7 +122,7 @@ class OrbitInPlanes:
             if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
                 # At four times the budget, by a line, it certainly is over.
                 beyond = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
-                if beyond <= min(n - target, _LOOKED):
+                if beyond <= min(n - target, _MAX_MODULAR_STEPS):
                     return target + beyond, None, None
             previous = current
             # Four times the size is borne, but not more: heights may grow like n^2.
@@ -171,14 +171,14 @@ def _halved(n: int, step: int) -> int:
 
 
 def _no_value(step: int) -> SingularStep:
-    return SingularStep(f"the map has no value at step {step}")
+    return SingularStep(f"the map is not defined at step {step}")
 
 
 class _Plane:
     """What is known of the orbit in one plane for all steps: whether it is lazy, then its period and its pole.
 
-    Lazy means that its numbers stay short: it comes back after `period` steps, or its level is parabolic (`period` is
-    None). `pole` is the first step then that has no value, None for none.
+    Lazy means that its numbers stay short: it returns after `period` steps, or its level is parabolic (`period` is
+    None). `pole` is the first step then that is not defined, None for none.
     """
 
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
@@ -205,11 +205,11 @@ class _Plane:
 
 
 class _Pole(SingularStep):
-    """Attribute: `step`, the first one that has no value."""
+    """Attribute: `step`, the first one that is not defined."""
 
     def __init__(self, step: int) -> None:
         self.step = step
-        super().__init__(f"the map has no value at step {step - 1}")
+        super().__init__(f"the map is not defined at step {step - 1}")
 
 
 def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
@@ -225,7 +225,7 @@ def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
 
 def _reached(block: Block, n: int) -> Triple:
     """P_n; poles on the way are passed over, unless it has to be stepped. Raises SingularStep then."""
-    if n <= _SHORT or block.is_constant or block.level is None:
+    if n <= _SINGLE_STEPS or block.is_constant or block.level is None:
         points = list(islice(tau.triples(block), n + 1))
         if len(points) <= n:
             raise _no_value(len(points) - 1)

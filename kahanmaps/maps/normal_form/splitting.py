@@ -79,7 +79,7 @@ class Splitting:
 
     @property
     def dim(self) -> int:
-        """2m."""
+        """The dimension 2m."""
         return self.form.dim
 
     def matrix(self, plane: int) -> list[list[Any]]:

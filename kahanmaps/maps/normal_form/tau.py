@@ -36,7 +36,7 @@ _SHARED = 8  # so many points are taken from one table, which holds some ten tim
 
 
 def triples(block: Any) -> Iterator[Triple]:
-    """P_0, P_1, ... as `IntegerBlock.triples` gives them, up to signs, three times as fast.
+    """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
     What has to be remembered is less than the points between n/2 and n themselves.
     """
@@ -119,7 +119,7 @@ class TauTable:
         self._product: tuple[int, Any] = (0, None)  # n and psi_{n-1} psi_n of the next point
 
     def points(self) -> Iterator[Triple]:
-        """P_2, P_3, ..., primitive, as long as the map has a value."""
+        """Yield P_2, P_3, ..., primitive, as long as the map is defined."""
         for n in count(_FIRST):
             point = self.point(n)
             if point[2] == 0:
@@ -129,7 +129,7 @@ class TauTable:
             self.chi.forget(n // 2 - 4)
 
     def point(self, n: int) -> Triple:
-        """P_n for n >= 2, primitive over Q."""
+        """Return P_n for n >= 2, primitive over Q."""
         psi, chi = self.psi, self.chi
         before, here, after = (psi.integer(n + k) for k in (-1, 0, 1))
         behind = self._product[1] if self._product[0] == n else before * here

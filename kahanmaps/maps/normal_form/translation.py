@@ -31,13 +31,13 @@ _STEPPED = 16  # up to this n one steps
 
 
 class NoTranslation(Exception):
-    """Doubling does not apply to this orbit: it has to be stepped."""
+    """Doublings do not apply to this orbit: it must be computed step by step."""
 
 
 def iterate(
     block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], bool], *, inexact: bool = False
 ) -> Triple:
-    """P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
+    """Return P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
     `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep where a
     pole is met before `n`, as far as the orbit is stepped (a few points from the start); NoTranslation where it meets
@@ -116,7 +116,7 @@ def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: 
     for k in range(len(points) - 1, last):
         U, V, W = block.image(points[k])
         if is_zero(W):
-            raise SingularStep(f"the map has no value at step {k}")
+            raise SingularStep(f"the map is not defined at step {k}")
         if k:
             inverse = 1 / points[k - 1][2]
             U, V, W = U * inverse, V * inverse, W * inverse

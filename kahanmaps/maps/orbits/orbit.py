@@ -175,7 +175,7 @@ class OrbitRequest(NamedTuple):
     max_digits: int
     kernel: str | None
 
-    def wants(self, step: int) -> bool:
+    def is_requested(self, step: int) -> bool:
         """Return whether the point of this step is requested."""
         return step in self.at if self.at is not None else step % self.every == 0
 
@@ -193,7 +193,7 @@ class OrbitRequest(NamedTuple):
         if method == "doubling" and normal_form is not None:
             return Orbit(over, self.start, at=self.at or (), normal_form=normal_form, **limits)
         normal = normal_form if method == "normal-form" else None
-        is_requested = self.wants if self.at is not None or self.every > 1 else None
+        is_requested = self.is_requested if self.at is not None or self.every > 1 else None
         return Orbit(over, self.start, self.steps, normal_form=normal, is_requested=is_requested, **limits)
 
 
@@ -243,7 +243,7 @@ class Trajectory:
     @cached_property
     def points(self) -> list[OrbitPoint]:
         """All requested points."""
-        return [point for point in self._computed() if self._request.wants(point.step)]
+        return [point for point in self._computed() if self._request.is_requested(point.step)]
 
     def __len__(self) -> int:
         return len(self.points)
@@ -331,7 +331,7 @@ class Trajectory:
             try:
                 for point in self._all_points():
                     on_step(point.step)
-                    if self._request.wants(point.step):
+                    if self._request.is_requested(point.step):
                         writer.point(point.step, point.text, self.values(point))
                 end = self.end
             except OutputFull as full:
@@ -425,7 +425,7 @@ class Trajectory:
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         # a generator, since `list` calls __len__, which computes the points, before it reads the first one
-        yield from (point for point in self._all_points() if self._request.wants(point.step))
+        yield from (point for point in self._all_points() if self._request.is_requested(point.step))
 
     def _all_points(self) -> Iterator[OrbitPoint]:
         """Yield the stored points, or else all points as they are computed, including those not requested."""

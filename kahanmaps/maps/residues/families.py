@@ -1,8 +1,8 @@
 """Degrees of the iterates of many members of a family of maps: all modulo one small prime p, on lines over GF(p^2).
 
 The parameters of the members are residues modulo p, so that all of them can be tried. A line over GF(p) would meet
-points without a value all the time; over GF(p^2) it does with a probability of about 1/p^2 for each of them. A line
-can only give degrees that are too small: who wants to be certain takes several and the largest.
+indeterminacy points all the time; over GF(p^2) it does so with a probability of about 1/p^2 for each of them. A line
+can only give degrees that are too small: take the largest over several lines.
 """
 
 from __future__ import annotations

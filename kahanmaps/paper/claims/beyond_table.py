@@ -1,4 +1,4 @@
-"""What survives of the paper's statements where its hypotheses are varied: proved or refuted, cell by cell.
+"""The table of the paper's statements under varied hypotheses: proved or refuted, cell by cell.
 
 Each cell is a claim of section 10, decided like all of them for the member in general. A statement that fails is shown
 to by the smallest counterexample: all numbers 0 or 1 and eps = 1, as few ones as can be, in the order of m.
@@ -30,7 +30,7 @@ Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coo
 
 
 def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
-    """Every statement for every variation, in half the dimension m: what holds is proved, what fails is refuted.
+    """Return all statements for all variations in dimension 2m: proved if they hold, refuted if they fail.
 
     Refuted cells are expected to be, and count as controls. Returns a Report with one Finding a cell; raises InputError
     as `verify` does.
