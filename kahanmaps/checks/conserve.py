@@ -192,7 +192,7 @@ def check_integrals(
     candidates = stated(claims)
     if known or extra is None:
         candidates += known_integrals(file)
-        candidates += stated({name: one for name, one in of_file.items() if name not in claims})
+        candidates += stated({name: declared for name, declared in of_file.items() if name not in claims})
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "

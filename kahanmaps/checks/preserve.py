@@ -156,8 +156,8 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
     """Return the identity dPhi P(x) dPhi^T = P(x~), with denominators cleared."""
     n = map_.dim
 
-    def sides(field: Field, place: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        point, values = place[:n], place[n:]
+    def sides(field: Field, point_and_values: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        point, values = point_and_values[:n], point_and_values[n:]
         local = map_.at(eps_value, field, values)
         sides_at_point = transformation_sides(local, tensor, point, _image(local, point), values)
         return None if sides_at_point is None else (sides_at_point[0].entries(), sides_at_point[1].entries())

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _LONGEST_NAME = 1000
-_MOST_FACTORS = 64  # of a composition, those of its parts counted too
+_MAX_FACTORS = 64  # of a composition, those of its parts counted too
 _STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where a rational one shows mistakes as well
 
 
@@ -406,8 +406,8 @@ class DocumentReader(PartReader):
         factors = self._each("composition.of", entries, self._part)
         if factors is None or self.unsure:
             return None
-        if sum(abs(part.power) for part in factors) > _MOST_FACTORS:
-            return self._refused("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
+        if sum(abs(part.power) for part in factors) > _MAX_FACTORS:
+            return self._refused("composition.of", f"found more than {_MAX_FACTORS} steps, expected at most so many")
         self.document = {**self.document, "composition": {"of": [part.plain for part in factors]}}
         values = [part.values for part in factors]
         make = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
@@ -490,8 +490,8 @@ class DocumentReader(PartReader):
     def _part_reader(self, key: str, value: Any, numbers: Mapping[str, fmpq], values: Values) -> Self:
         """Return the reader for a part of a composition."""
         self.parts[0] += 1
-        if self.parts[0] > _MOST_FACTORS:
-            raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected at most so many")
+        if self.parts[0] > _MAX_FACTORS:
+            raise InputError(f"found more than {_MAX_FACTORS} maps in one composition, expected at most so many")
         name, name_or_path, other = "map", "", self.other
         if key == "map":
             if not isinstance(value, dict):

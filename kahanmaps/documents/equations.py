@@ -25,7 +25,7 @@ _PRIMES = {"'": 1, "′": 1, "’": 1, "‘": 1, "´": 1, "`": 1, "\u0307": 1, "
 _TOKEN = re.compile(
     r"[A-Za-z_][A-Za-z_0-9]*|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|==|:=|\*\*|[ \t\r\f\v\xa0]+|.", re.DOTALL
 )
-_MOST_TOKENS = 16  # of a derivative other than by primes
+_MAX_TOKENS = 16  # of a derivative other than by primes
 _NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
 _CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
 # Derivatives, with blanks only between two words, and their order.
@@ -204,7 +204,7 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
     if order:
         return _Derivative(first, order, _argument(tokens, end))
     text, last, ends = "", "", dict[int, int]()  # the length of the text up to a token -> the place of the next token
-    for position, token in enumerate(tokens[start : start + _MOST_TOKENS], start + 1):
+    for position, token in enumerate(tokens[start : start + _MAX_TOKENS], start + 1):
         is_apart = (last[-1:].isalnum() or last[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
         text, last = f"{text}{' ' * is_apart}{token}", token
         ends[len(text)] = position

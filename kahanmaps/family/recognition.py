@@ -220,17 +220,17 @@ def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
     n = J.nrows()
     if n != J.ncols() or n % 2 or J.transpose() != -J:
         raise InputError("J is not a skew matrix of even size")
-    rest, first, second = J, [], []
+    form, first, second = J, [], []
     for _ in range(n // 2):
-        entries = [(i, j) for i in range(n) for j in range(i + 1, n) if rest[i, j] != 0]
+        entries = [(i, j) for i in range(n) for j in range(i + 1, n) if form[i, j] != 0]
         if not entries:
             raise InputError("J is singular, expected an invertible matrix")
-        i, j = min(entries, key=lambda place: bits_of(rest[place]))
-        pivot = rest[i, j]
-        a, b = (fmpq_mat([[rest[k, column]] for k in range(n)]) for column in (i, j))
+        i, j = min(entries, key=lambda entry: bits_of(form[entry]))
+        pivot = form[i, j]
+        a, b = (fmpq_mat([[form[k, column]] for k in range(n)]) for column in (i, j))
         first.append(b.entries())
         second.append((a / -pivot).entries())
-        rest = rest - (a * b.transpose() - b * a.transpose()) / pivot
+        form = form - (a * b.transpose() - b * a.transpose()) / pivot
     return fmpq_mat([*first, *second]).transpose()
 
 

@@ -26,7 +26,7 @@ from kahanmaps.family.skew_hamiltonian import companion_matrix, evaluate_at_matr
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system
 
 GENERATOR = "t"
-_LARGEST = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
+_MAX_DIMENSION = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
 _DRAWS = 40
 
 
@@ -142,7 +142,7 @@ def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
     True
     """
     system = as_system(system)
-    if system.dim > _LARGEST or system.symbols:
+    if system.dim > _MAX_DIMENSION or system.symbols:
         return None
     space = centroid(system)
     if len(space) == 1 or any(B * C != C * B for B, C in itertools.combinations(space, 2)):

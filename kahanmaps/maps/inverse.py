@@ -96,8 +96,8 @@ def why_not_birational(rows: Rows) -> str:
             for j, entry in enumerate(row):
                 for monomial, coefficient in entry.terms():
                     value = field.convert(coefficient)
-                    for given, exponent in zip(sample[2 * n :], monomial[n:], strict=True):
-                        value = value * given**exponent
+                    for coordinate, exponent in zip(sample[2 * n :], monomial[n:], strict=True):
+                        value = value * coordinate**exponent
                     key = (*monomial[:n], *(int(j == k) for k in range(n)))
                     terms[key] = terms.get(key, field.zero) + value
             equations.append(context.from_dict({key: int(value) for key, value in terms.items() if value != 0}))
@@ -118,22 +118,22 @@ def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, 
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
     while True:
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
-        given = [field.random(rng) for _ in names]
+        arguments = [field.random(rng) for _ in names]
         try:
-            values = [evaluate(entry, field, given) for row in rows for entry in row]
+            values = [evaluate(entry, field, arguments) for row in rows for entry in row]
             matrix = field.matrix(n, n, [values[i * (n + 1) + j] for i in range(n) for j in range(n)])
             image = solve(matrix, field.column([-values[i * (n + 1) + n] for i in range(n)])).entries()
         except (BadPrime, SingularMatrix):
             continue
-        return field, [*given[:n], *image, *given[n:]]
+        return field, [*arguments[:n], *image, *arguments[n:]]
 
 
 def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool:
     total = field.zero
     for monomial, coefficient in polynomial.terms():
         value = field.convert(coefficient)
-        for given, exponent in zip(sample, monomial, strict=False):
-            value = value * given**exponent
+        for coordinate, exponent in zip(sample, monomial, strict=False):
+            value = value * coordinate**exponent
         total = total + value
     return bool(total == 0)
 
@@ -160,10 +160,10 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
         _, chosen, u = min(
             linear, key=lambda candidate: (sum(bool(candidate[1].degrees()[v]) for v in unknowns), candidate[0])
         )
-        rest, slope = _coefficients(chosen, u)
-        others = [_substituted(p, u, -rest, slope) for p in relations if p is not chosen]
+        eliminated, slope = _coefficients(chosen, u)
+        others = [_substituted(p, u, -eliminated, slope) for p in relations if p is not chosen]
         solution = _solved(others, [v for v in unknowns if v != u], on_graph)
-        (a, b), (c, d) = (_put_in(part, solution) for part in (-rest, slope))
+        (a, b), (c, d) = (_put_in(part, solution) for part in (-eliminated, slope))
         return solution | {u: _lowest(a * d, b * c)}
     # No equation is linear in an unknown: resultants eliminate one.
     if len(unknowns) == 1:
@@ -174,13 +174,13 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
     u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in relations))
     through = sorted((p for p in relations if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
     first, name = through[0], str(through[0].context().names()[u])
-    rest = [p for p in relations if not p.degrees()[u]]
+    eliminated = [p for p in relations if not p.degrees()[u]]
     for p in through[1:]:
         if len(first) * len(p) * (first.degrees()[u] + p.degrees()[u]) > _MAX_RESULTANT:
             raise TooLarge("the inverse of this map is too large to be computed: give it as well")
-        rest.append(first.resultant(p, name))
+        eliminated.append(first.resultant(p, name))
     others = [v for v in unknowns if v != u]
-    solution = _solved(rest, others, on_graph)
+    solution = _solved(eliminated, others, on_graph)
     common = None
     for p in through:
         numerator, _ = _put_in(p, solution)
@@ -210,9 +210,9 @@ def _substituted(polynomial: Any, u: int, numerator: Any, denominator: Any) -> A
 def _put_in(polynomial: Any, solution: Solution) -> Quotient:
     """Substitute the solution for the unknowns."""
     denominator = polynomial.context().constant(1)
-    for u, (numerator, below) in solution.items():
-        denominator = denominator * below ** int(polynomial.degrees()[u])
-        polynomial = _substituted(polynomial, u, numerator, below)
+    for u, (numerator, denominator_of_unknown) in solution.items():
+        denominator = denominator * denominator_of_unknown ** int(polynomial.degrees()[u])
+        polynomial = _substituted(polynomial, u, numerator, denominator_of_unknown)
     return _lowest(polynomial, denominator)
 
 

@@ -83,8 +83,8 @@ class KahanMap(DisplayedAsFormula, ElementaryMap):
             self.system, self.values, self.variables = system, tuple(values), system.variables
             self.eps = nonzero_eps(eps, field)
             self._inside = self.eps if inside is None else inside
-            rest = iter(self.values)
-            self.local = system.over(field, [self._inside if x == "eps" else next(rest) for x in system.symbols])
+            remaining = iter(self.values)
+            self.local = system.over(field, [self._inside if x == "eps" else next(remaining) for x in system.symbols])
             self._given = (system, field, self.values, self._inside)
         else:
             raise InputError(

@@ -12,14 +12,14 @@ import numba
 def compiled(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a function by numba with these options, using the disk cache if a folder is writable."""
     try:
-        found = numba.njit(cache=True, **options)(function)
+        compiled_function = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # "no locator available": no folder that can be written to
         return numba.njit(**options)(function)
-    save = found._cache.save_overload
+    save = compiled_function._cache.save_overload
 
     def save_if_possible(signature: Any, data: Any) -> None:
         with suppress(OSError):  # the disk is full, the folder gone: the code is in memory all the same
             save(signature, data)
 
-    found._cache.save_overload = save_if_possible
-    return found
+    compiled_function._cache.save_overload = save_if_possible
+    return compiled_function

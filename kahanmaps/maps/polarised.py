@@ -54,9 +54,9 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     copies = degree - 1
     variables = (*names, *(f"{name}_{k}" for k in range(1, copies) for name in names))
     context = ring((*variables, *parameters))
-    known = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
+    points = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
     step = 2 * copies * context.gens()[-1]
-    last = [_linear_in_one_point(f, known, step, degree) for f in rhs]
+    last = [_linear_in_one_point(f, points, step, degree) for f in rhs]
 
     def unit(column: int, other: Any) -> tuple[fmpq_mpoly, ...]:
         """The row that says that a coordinate of the image is `other`."""
@@ -64,23 +64,23 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
 
     # (x_k, ..., x_{k+d-2}) -> (x_{k+1}, ..., x_{k+d-1}), and for the inverse (x_{k-1}, ..., x_{k+d-3}) with -h.
     zero = [context.constant(0)] * ((copies - 1) * n)
-    forward = [unit(k * n + i, known[k + 1][i]) for k in range(copies - 1) for i in range(n)]
-    backward = [unit((k + 1) * n + i, known[k][i]) for k in range(copies - 1) for i in range(n)]
+    forward = [unit(k * n + i, points[k + 1][i]) for k in range(copies - 1) for i in range(n)]
+    backward = [unit((k + 1) * n + i, points[k][i]) for k in range(copies - 1) for i in range(n)]
     for i, (matrix, right) in enumerate(last):
         unknown = [context.constant(int(i == j)) for j in range(n)]
-        ahead = [one - entry for one, entry in zip(unknown, matrix, strict=True)]
-        behind = [one + entry for one, entry in zip(unknown, matrix, strict=True)]
-        forward.append((*zero, *ahead, -known[0][i] - right))
-        backward.append((*behind, *zero, -known[-1][i] + right))
+        new_row = [delta - entry for delta, entry in zip(unknown, matrix, strict=True)]
+        old_row = [delta + entry for delta, entry in zip(unknown, matrix, strict=True)]
+        forward.append((*zero, *new_row, -points[0][i] - right))
+        backward.append((*old_row, *zero, -points[-1][i] + right))
     field = PolynomialField(tuple(substitute(f, {parameters[-1]: fmpq(0)}) for f in rhs), parameters[:-1])
     return ImplicitMap(variables, tuple(forward), TITLE, time_steps=1, backward=tuple(backward), of_field=field)
 
 
 def _linear_in_one_point(
-    f: fmpq_mpoly, known: Sequence[Sequence[fmpq_mpoly]], step: fmpq_mpoly, degree: int
+    f: fmpq_mpoly, points: Sequence[Sequence[fmpq_mpoly]], step: fmpq_mpoly, degree: int
 ) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
     """Return `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term."""
-    n, copies = len(known[0]), len(known)
+    n, copies = len(points[0]), len(points)
     one = step * 0 + 1
     linear, free = [step * 0 for _ in range(n)], step * 0
     for monomial, coefficient in f.terms():
@@ -89,7 +89,7 @@ def _linear_in_one_point(
         share = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
         for arrangement in permutations(factors):
             product = share
-            for point, j in zip(known, arrangement[:copies], strict=True):
+            for point, j in zip(points, arrangement[:copies], strict=True):
                 product = product * (one if j is None else point[j])
             j = arrangement[-1]
             if j is None:

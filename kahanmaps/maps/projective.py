@@ -15,7 +15,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.inverse import TooLarge
 
-_MOST_TERMS = 3_000  # of a form of several factors, before a common one is divided out
+_MAX_TERMS = 3_000  # of a form of several factors, before a common one is divided out
 
 
 class HomogeneousMap(NamedTuple):
@@ -51,7 +51,7 @@ def homogeneous_map(map_over: Map) -> HomogeneousMap:
     for equation in others:
         factor_map = _of_equation(equation)
         size, degree = equation.dim, composed.degree * factor_map.degree
-        if comb(degree + size, size) > _MOST_TERMS:
+        if comb(degree + size, size) > _MAX_TERMS:
             raise TooLarge(f"the composition of {len(others) + 1} maps is too large for forms on projective space")
         moved, common = _without_common_factor([form.compose(*composed.forms) for form in factor_map.forms])
         factor, denominator = (part.compose(*composed.forms) for part in (factor_map.factor, factor_map.denominator))

@@ -138,8 +138,8 @@ class Terms:
             if n > _DIRECT + 1:
                 self._order.append(n)
             else:
-                known = self._first[i] * self._W._first[j]
-                self._first[n] = self._scales[n] * known * known
+                scale_product = self._first[i] * self._W._first[j]
+                self._first[n] = self._scales[n] * scale_product * scale_product
         return self._terms[n]
 
     def pair(self, n: int) -> tuple[Any, Any]:

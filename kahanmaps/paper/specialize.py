@@ -211,7 +211,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
         *(f"l{i + 1}" for i in range(m)),
         *blockwise,
         "eps",
-        *(name for found in letters.values() for name in found),
+        *(name for symbol_names in letters.values() for name in symbol_names),
     ]
     K = FunctionField(names, budget, reduces=True)
     by_name = dict(zip(names, K.variables, strict=True))

@@ -1,18 +1,18 @@
 """Verification of all claims of the paper, for one member of the family or for the generic member.
 
-How a claim is decided, and what the verdict then says:
+The methods of verification:
 
-* *random points*: the claim is evaluated on the member over GF(p), p random of 63 bits, at random x, eps and whatever
-  else it speaks of; p is one at which chi splits, if the claim needs its roots. A failure refutes. Success makes the
-  claim `supported`, with a bound for the error that is derived by running the claim over bounds.
-* *normal form*: the same claim is run over rational functions, for the normal form with indeterminate roots,
-  coefficients, x and eps. This proves it for every member with distinct roots: such a member is, over the splitting
-  field of chi, symplectically similar to a specialization (docs/mathematics.md); its hypotheses are verified exactly.
-* *symbolic*: where the normal form does not apply, the claim is run for this member with indeterminate x and eps.
-* *exact*: claims without x, and those about dimensions and ranks, are evaluated over Q.
+* *random points*: the claim is evaluated for the member over GF(p), p a random prime of 63 bits, at random x, eps and
+  other arguments; if the claim contains the roots of chi, p is a prime modulo which chi splits. A failure refutes the
+  claim. Otherwise the claim is `supported`, with an error bound that is computed by evaluating the claim over bounds.
+* *normal form*: the claim is evaluated over rational functions, for the normal form with indeterminate roots,
+  coefficients, x and eps. This proves it for every member with distinct roots: over the splitting field of chi such a
+  member is symplectically similar to a specialization (docs/mathematics.md); its hypotheses are verified exactly.
+* *symbolic*: if the normal form does not apply, the claim is evaluated for this member with indeterminate x and eps.
+* *exact*: claims without x, and claims about dimensions and ranks, are evaluated over Q.
 
-Beside that, claims about one block at a time are evaluated exactly over Q[t]/chi, where all roots are one, and, if
-requested, over complex balls.
+In addition, claims about single blocks are evaluated exactly over Q[t]/chi, for all roots at once, and, if requested,
+over complex balls.
 """
 
 from __future__ import annotations
@@ -572,8 +572,8 @@ class ClaimAtPoints:
                 evidence = Evidence("point over GF(p)", text)
                 # A rational point is better to look at.
                 exact = (self._verifier.exact_point(self._roots, exact_number) for exact_number in range(12))
-                if found := next((found for found in outcomes(self._claim, exact) if not found.holds), None):
-                    outcome = found
+                if failure := next((failure for failure in outcomes(self._claim, exact) if not failure.holds), None):
+                    outcome = failure
                     evidence = Evidence("exact rational point", "fails at a rational point, exactly")
                 yield Trial(decision=Decision(Certainty.REFUTED, evidence, witness_of(outcome)))
             elif not outcome.pairs:

@@ -112,7 +112,7 @@ def test_the_inverse_leads_back_and_forth(name):
 
 
 def test_a_map_without_inverse_says_so():
-    with pytest.raises(InputError, match="in general a point of its image has at least 2 preimages"):
+    with pytest.raises(InputError, match="a generic point of its image has at least 2 preimages"):
         _ = SQUARES.at(1).inverse
 
 

@@ -245,10 +245,10 @@ def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):
         (np.ones((1, 3)), {"sampled": 0}, "sample every 0 steps"),
         (np.ones((1, 3)), {"form": FORMS["a complex pair"]}, "belongs to another system"),
         (np.ones(3), {}, "one row for each point, with columns x1, x2, x3"),
-        (np.ones((2, 2)), {}, "one row for each start"),
-        (np.ones((0, 3)), {}, "one row for each start"),
-        ([[1, 2]], {}, "one row for each start"),
-        (np.array([[1.0, np.nan, 0.0]]), {}, "no finite number"),
+        (np.ones((2, 2)), {}, "one row for each point"),
+        (np.ones((0, 3)), {}, "one row for each point"),
+        ([[1, 2]], {}, "one row for each point"),
+        (np.array([[1.0, np.nan, 0.0]]), {}, "a coordinate that is not finite"),
     ],
 )
 def test_wrong_use_is_refused(starts, options, sentence):

@@ -1,8 +1,8 @@
-"""The n-th iterate of a Kahan map directly, without the iterates before it, for members of the family.
+"""The n-th iterate of a Kahan map, computed directly, for members of the family.
 
-In every plane of the normal form the map is a translation on a plane cubic, so n takes about log2(n) doublings: over
-Q in integers (`tau`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
-passed over, except over Q, where none goes unnoticed.
+In every plane of the normal form the map is a translation on a plane cubic, so the n-th iterate takes about log2(n)
+doublings: over Q in integers (`tau`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles at
+earlier steps are detected over Q only.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The level cubics of a plane as groups: the order of the translation Psi, and whether a point is an image of another.
+"""The level cubics of a plane as groups: the order of the translation Psi, and whether two points lie on one orbit.
 
-Elements are FLINT's, of a field of q elements of characteristic at least 5 (or of a number field, where only single
-sums are wanted); the levels are smooth. See planar_block.py for the cubic E, its Jacobian and T.
+The field has q elements and characteristic at least 5 (number fields are used only for single sums); the levels are
+smooth. See planar_block.py for the cubic E, its Jacobian and T.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from kahanmaps.maps.normal_form.schoof import by_doublings, trace_modulo
 
 AffinePoint = tuple[Any, Any]
 
-_LARGEST_DIGIT = 2000
+_MAX_DIGIT = 2000
 _RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm, with about 2^17 steps
 
 
@@ -182,7 +182,7 @@ class LevelCubic:
             prime, power = int(factor), int(factor) ** int(exponent)
             if points // order % prime != 0:
                 continue
-            if prime > _LARGEST_DIGIT:
+            if prime > _MAX_DIGIT:
                 unknown = True
                 continue
             # The logarithm of the part of P for that of T, whose order is `power`, digit by digit (Pohlig and Hellman).

@@ -1,12 +1,12 @@
-"""A plane over a number field K = Q[t]/g in integers: values of tau functions as short elements of Z[t], and back to Q.
+"""Planes over a number field K = Q[t]/g in integers: values of tau functions as short elements of Z[t].
 
-All that holds in a plane over Q (`planar_integers`, `tau`) holds over K prime ideal by prime ideal: outside the bad
-primes natural lifts are integral, and so are psi and chi. But ideals need not be principal, and an element may be short
-at one root of g and long at another. So a value is multiplied by a short element of the lattice of those that take its
-bad part away, with the lengths at the roots for weights: LLL finds one. Which one is free, since the product of value
-and scale is exact.
+The statements for planes over Q (`planar_integers`, `tau`) hold over K for each prime ideal: outside the bad primes
+natural lifts are integral, and so are psi and chi. But ideals need not be principal, and an element may be short at one
+root of g and long at another. So a value is multiplied by a short element of the lattice of elements that cancel its
+bad part; LLL finds such an element, with the lengths at the roots as weights. The choice is arbitrary, since the
+product of value and scale is exact.
 
-A point (U : V : W) comes back to rational numbers as U W'/N and V W'/N with N = W W', the norm of W.
+A point (U : V : W) is converted to rational numbers as U W'/N and V W'/N with N = W W', the norm of W.
 """
 
 from __future__ import annotations
@@ -187,14 +187,14 @@ class ShortElements:
         """
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]
-        below = reduce(fmpz.lcm, (denominator for _, denominator in factors))
+        common_denominator = reduce(fmpz.lcm, (denominator for _, denominator in factors))
         scaled: list[fmpz] = []
         for (factor, denominator), term in zip(factors, terms, strict=True):
             column = fmpz_mat(degree, 1, [entry.p for entry in term.coefficients])
-            scaled += (factor * (below // denominator) * column).entries()
+            scaled += (factor * (common_denominator // denominator) * column).entries()
         matrix, below_lifts = lifts
         entries = (matrix * fmpz_mat(3 * degree, 1, scaled)).entries()
-        common = below * below_lifts
+        common = common_denominator * below_lifts
         for entry in entries:
             common = common.gcd(entry % common)
         integers = [entry // common for entry in entries] if common != 1 else entries
@@ -242,13 +242,13 @@ class ShortElements:
 @lru_cache
 def _signs(count: int) -> list[tuple[int, ...]]:
     """Vectors of up to four 1 and -1, else 0, up to sign, those with few entries first."""
-    found = []
+    vectors = []
     for entries in range(1, min(count, 4) + 1):
         for positions in combinations(range(count), entries):
             for signs in product((1, -1), repeat=entries - 1):
                 chosen = dict(zip(positions, (1, *signs), strict=True))
-                found.append(tuple(chosen.get(k, 0) for k in range(count)))
-    return found
+                vectors.append(tuple(chosen.get(k, 0) for k in range(count)))
+    return vectors
 
 
 def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:

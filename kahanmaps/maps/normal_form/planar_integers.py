@@ -1,11 +1,11 @@
-"""A plane over Q in integers: primitive triples, and what the bad primes are.
+"""Planes over Q in integers: primitive triples, and the bad primes.
 
-h and the start are scaled such that h is a primitive integer form and (U, V, W) integers without a common factor; eps
-is in that scale. Psi(P_k) is quadratic in the triple P_k, and its content has to go, or the numbers would double
-their length with every step. For primes that do not divide 6 disc(h) den(level) the content of Psi(P_k) is W_{k-1}, the
-last coordinate of the point before P_k (docs/mathematics.md proves it): these are the natural lifts of `tau`. Single
-steps take their content out by gcds: long orbits do not go by them, but those on singular cubics, whose numbers hardly
-grow.
+h and the initial point are scaled such that h is a primitive integer form and (U, V, W) are integers without a common
+factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k, and its content must be removed: otherwise the
+numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level) the content of
+Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
+lifts of `tau`. Single steps remove the content by gcds. They are used for short orbits, and for orbits on singular
+cubics, whose numbers hardly grow.
 """
 
 from __future__ import annotations

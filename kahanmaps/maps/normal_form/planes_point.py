@@ -1,10 +1,11 @@
 """Rational points stored as primitive triples in the planes; x is computed from them only on demand.
 
 x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
-product of the W_i cost a few multiplications. In lowest terms they are after three more things: the gcds of the W_i
-among each other; the primes of the fixed numbers (denominators of alpha, beta and of the level, and h_i(beta,
--alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides h(beta, -alpha)); and, where
-h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits go every plane by itself.
+product of the W_i take a few multiplications. To reduce them to lowest terms, three kinds of common factors must be
+removed: the gcds of the W_i with each other; the primes of the fixed numbers (denominators of alpha, beta and of the
+level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides
+h(beta, -alpha)); and, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed in each plane
+separately.
 """
 
 from __future__ import annotations
@@ -52,7 +53,10 @@ class Assembly:
         self.dim = len(matrices[0])
         self.rows: list[_Row] = []
         for r in range(self.dim):
-            forms = [[entry / one.scale for entry in table[r]] for one, table in zip(blocks, matrices, strict=True)]
+            forms = [
+                [entry / planar_block.scale for entry in table[r]]
+                for planar_block, table in zip(blocks, matrices, strict=True)
+            ]
             support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
             _, denominator = over_one(chain(*forms))
             integers = [tuple((entry * denominator).p for entry in forms[i]) for i in support]

@@ -1,15 +1,15 @@
-"""The n-th iterate over Q, and what an orbit over Q comes to first: a pole, the end of its budget, or step n.
+"""The n-th iterate over Q, unless the orbit reaches a pole or exceeds its budget before step n.
 
-An orbit is stepped exactly while its numbers are short. From there on three things decide, and the order of events is
-that of an orbit which is stepped all the way.
+An orbit is computed exactly while its numbers are short. After that it ends at the same step as an orbit by single
+steps, which is determined as follows.
 
-* Heights are known at a few steps, farther and farther apart. But for O(1) they are convex in the step (a polynomial
-  of degree 2, or linear), so what is within the budget at both ends is so in between, and from a rise it follows where
-  the budget is exceeded at the latest; beyond that step nothing has to be known.
-* Poles up to there are found modulo random primes of 61 bits and verified over Q: a pole over Q is one modulo
-  every prime.
-* The poles of a plane that is periodic, or moves on a parabolic level, are known for all steps at once, and
-  its numbers stay short. If all planes do so, any n is within reach.
+* Heights are computed at a few steps, at increasing distances. Up to O(1) they are convex functions of the step
+  (a polynomial of degree 2, or linear). So if the height is within the budget at two steps, it is within the budget in
+  between, and a rise shows where the budget is exceeded at the latest; later steps are irrelevant.
+* Poles up to there are found modulo random primes of 61 bits and verified over Q: a pole over Q is a pole modulo every
+  prime.
+* The poles of a plane that is periodic, or whose level is parabolic, are known for all steps at once, and its numbers
+  stay short. If this holds for all planes, any n can be reached.
 """
 
 from __future__ import annotations

@@ -87,8 +87,8 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
         prime = next(n for n in range(prime + 1, 2 * prime) if fmpz(n).is_prime())
         if q % prime == 0:
             continue
-        f, found = divisions[prime], None
-        while found is None:
+        f, residue = divisions[prime], None
+        while residue is None:
             torsion = _Torsion(f, c, A)  # which trace fits on the torsion points where f is 0?
             try:
                 once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
@@ -98,15 +98,15 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
                 for t in range(1, prime // 2 + 1) if target else ():
                     image = torsion.add(image, once)
                     if image is not None and target is not None and image[0] == target[0]:
-                        found = t if image[1] == target[1] else prime - t
+                        residue = t if image[1] == target[1] else prime - t
                         break
                 else:
                     if target is not None:
                         raise AssertionError("no trace of Frobenius fits: it would be a mistake of ours")
-                    found = 0
+                    residue = 0
             except _Divisor as smaller:
                 f = smaller.divisor
-        trace += modulus * ((found - trace) * pow(modulus, -1, prime) % prime)
+        trace += modulus * ((residue - trace) * pow(modulus, -1, prime) % prime)
         modulus *= prime
     return trace, modulus
 

@@ -193,8 +193,8 @@ def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
 def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:
     planes, lifts = [], []
     slope = form.chi.derivative()
-    for found in form.chi.complex_roots():
-        root: Any = found[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
+    for complex_root in form.chi.complex_roots():
+        root: Any = complex_root[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
         if root.imag < 0:
             continue
         real = bool(root.imag == 0)

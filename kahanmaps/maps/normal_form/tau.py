@@ -1,4 +1,4 @@
-"""Tau functions: the points of an orbit in a plane as products of two Somos sequences a third of their length.
+"""Tau functions: the points of an orbit in a plane as products of terms of two Somos sequences of a third the length.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
@@ -15,9 +15,9 @@ and for a + b and a - b everything is bilinear (phi is psi or chi; there are no 
     phi_{a+b} phi_{a-b} = phi_{a+1} phi_{a-1} psi_b^2 - psi_{b+1} psi_{b-1} phi_a^2.
 
 psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4 with
-gamma = 1 - delta. The cube roots are taken out where 3 divides n. These are the sequences W and U of `somos`, whose
-terms follow from those of half the index: over Q integers prime to the bad primes, with scales that are never formed,
-since the numbers would grow by powers of the bad primes like everything else, with exponents quadratic in n.
+gamma = 1 - delta. For n divisible by 3 the cube roots are factored out. These are the sequences W and U of `somos`,
+whose terms follow from those of half the index: over Q they are integers coprime to the bad primes, times scales that
+are never computed, since they contain powers of the bad primes with exponents quadratic in n.
 docs/mathematics.md has the proofs. Source: ward-1948, for such sequences.
 """
 

@@ -1,18 +1,17 @@
 """The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
 
-In balls the formulas are those of `tau`, with natural lifts and without scales: they lose the fewest bits. For exact
-elements fewer operations do. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is found by doublings and additions.
-With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y) the point is
+In balls the formulas are those of `tau`, with natural lifts and without scales, since they lose the fewest bits. For
+exact elements there is a faster way. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is computed by doublings and
+additions. With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y), the point is
 
     P_n ~ chi_0 x (x - x_u) P_0 + chi_{-1} (Y - Y_u - m (x - x_u)) P_1 - chi_1 (Y - Y_u - m' (x - x_u)) P_{-1},
 
-m = (Y_u + 8 gamma)/x_u, m' = (Y_u - 8 gamma)/x_u, where u = (x_u, Y_u) is what the zero of chi is away from the base
-point (docs/mathematics.md). Where the
-level cubic is three lines (gamma = 0), Psi^3 is a projective map of each line: a 2 x 2 matrix to the power n. Where
-delta = 0 there is a formula for P_n: see `parabolic_ratio`.
+with m = (Y_u + 8 gamma)/x_u and m' = (Y_u - 8 gamma)/x_u, where u = (x_u, Y_u) is the difference between the zero of
+chi and the base point (docs/mathematics.md). If the level cubic consists of three lines (gamma = 0), Psi^3 is a
+projective map of each line, given by the power of a 2 x 2 matrix. If delta = 0, there is a formula for P_n: see
+`parabolic_ratio`.
 
-Poles are passed over: P_n is the value of the rational map Psi^n, also if an orbit that steps would have met W = 0
-before.
+P_n is the value of the rational map Psi^n, even if the orbit by single steps would reach a pole W = 0 before.
 """
 
 from __future__ import annotations

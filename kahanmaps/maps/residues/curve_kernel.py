@@ -191,8 +191,8 @@ def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: floa
         _add_product(b, weights[1, :, j : j + 1], 1, X[j], length, 1.0, nu)
     _reduce(a, length, p)
     _reduce(b, length, p)
-    found, size = _gcd(a, _stripped(a, length), b, _stripped(b, length), p, nu, inverses)
-    _copy(found, common, size)
+    divisor, size = _gcd(a, _stripped(a, length), b, _stripped(b, length), p, nu, inverses)
+    _copy(divisor, common, size)
     if size != 1:  # two mixtures may have a factor that not all have
         for j in range(count):
             _copy(X[j], c, length)
@@ -200,8 +200,8 @@ def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: floa
             if size:
                 quotient = _divide(c, quotient, common, size, p, nu, inverses, a)
             if quotient:
-                found, size = _gcd(common, size, c, quotient, p, nu, inverses)
-                _copy(found, common, size)
+                divisor, size = _gcd(common, size, c, quotient, p, nu, inverses)
+                _copy(divisor, common, size)
     longest = 0
     for j in range(count):
         if size > 1:

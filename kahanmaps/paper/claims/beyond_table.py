@@ -23,7 +23,7 @@ from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, ClaimOutcome, cla
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
-_MOST_ONES = 7
+_MAX_ONES = 7
 _KEY = "not "
 
 Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coordinates, "x" with one
@@ -79,7 +79,7 @@ def table(report: Report) -> str:
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
     """The data in words, and the point with both sides; None where there is none with at most seven ones."""
     m, roots, slots, extras = _SMALL[variation]
-    for count in range(2, _MOST_ONES + 1):
+    for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):
             o = _objects(m, roots, ones, **extras)
             try:

@@ -143,15 +143,15 @@ class _Search:
     def _modulo(self, prime: int) -> list[list[int]] | None:
         size, known_sections = len(self.groups[0]), self.sections
         for needed in (
-            [max(one.points_used for one in known_sections.values())] if known_sections else points_needed(size)
+            [max(factor.points_used for factor in known_sections.values())] if known_sections else points_needed(size)
         ):
             points: Rows = []  # from the initial point on, one for each step of a factor
             point = self._start.residues(prime)
-            for one in islice(cycle(self.factors), self.stride * needed):
+            for factor in islice(cycle(self.factors), self.stride * needed):
                 if point is None:
                     return None
                 points.append(point)
-                point = one.integer_steps.image_modulo(point, prime)
+                point = factor.integer_steps.image_modulo(point, prime)
             curves: dict[tuple[int, int], Curve] = {}
             try:
                 for k, g in self.new:
@@ -161,8 +161,8 @@ class _Search:
                         break
                     curves[k, g] = curve_of_group
                 else:
-                    self.sections = {key: one.sections for key, one in curves.items()}
-                    return [group for one in curves.values() for group in one.numbers]
+                    self.sections = {key: factor.sections for key, factor in curves.items()}
+                    return [group for factor in curves.values() for group in factor.numbers]
             except ArithmeticError:
                 if known_sections or needed == points_needed(size)[-1]:
                     raise

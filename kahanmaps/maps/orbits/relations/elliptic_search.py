@@ -122,12 +122,15 @@ def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
     sums = matrix(values[: sections.rows], prime)
     checks = kernel(*sums.transpose().rref())
     factors = [
-        [(1, sum((j + 2) ** 3 * x for j, x in enumerate(one))) for one in points_before]
+        [(1, sum((j + 2) ** 3 * x for j, x in enumerate(earlier))) for earlier in points_before]
         for _, *points_before in _together(points, count, lag)[: sections.rows]
     ]
     weighed = []
     for chosen in list(product((0, 1), repeat=count - 1))[1:]:
-        g = [prod(one[i] for one, i in zip(points_before, chosen, strict=True)) % prime for points_before in factors]
+        g = [
+            prod(earlier[i] for earlier, i in zip(points_before, chosen, strict=True)) % prime
+            for points_before in factors
+        ]
         weighed += [[c and c * x % prime for c, x in zip(check, g, strict=True)] for check in checks]
     kernel_rows = kernel(*(matrix(weighed, prime) * sums).rref())
     if len(kernel_rows) != sections.degree:
