@@ -228,7 +228,7 @@ def check_integrals(
 
 
 def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
-    """Whether an integral is a constant at the eps in force, as the modified H of 3 q^2 + p^2 is at eps = 1/2; exact.
+    """Return whether an integral is constant at this eps, like the modified H of 3 q^2 + p^2 at eps = 1/2; exact.
 
     False also where that is too long to expand.
     """

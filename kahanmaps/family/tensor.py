@@ -187,7 +187,7 @@ def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
 
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
-    """Whether Q^n is free over Q[C]: each factor p of chi annihilates as much as in a free module, and no more."""
+    """Return whether Q^n is free over Q[C]: each factor p of chi annihilates a space of the right dimension."""
     copies, remainder = divmod(C.nrows(), int(chi.degree()))
     return remainder == 0 and all(
         C.nrows() - evaluate_at_matrix(p, C).rank() == copies * p.degree() for p, _ in chi.factor()[1]

@@ -114,12 +114,12 @@ class ComposedMap(MapFamily):
 
     @property
     def is_small(self) -> bool:
-        """Whether the formulas of the map are short enough to be multiplied out."""
+        """Whether the formulas of the map are short enough to be expanded."""
         return self._multiplied_out is not None
 
     @property
     def multiplied_out(self) -> ImplicitMap:
-        """The same map by its formulas, without its inverse. Raises InputError (TooLarge) where they are long."""
+        """The map by its expanded formulas, without its inverse. Raises InputError (TooLarge) if they are too long."""
         if self._multiplied_out is None:
             raise TooLarge(_too_large(self.parts))
         return self._multiplied_out
@@ -131,12 +131,12 @@ class ComposedMap(MapFamily):
 
     @property
     def rows(self) -> Rows:  # type: ignore[override]  # read only
-        """Those of the map multiplied out. Raises InputError where they are long."""
+        """The rows of the expanded map. Raises InputError if the formulas are too long."""
         return self.multiplied_out.rows
 
     @cached_property
     def inverse_rows(self) -> Rows:
-        """Those of the inverses multiplied out. Raises InputError where they are long."""
+        """The rows of the expanded inverse. Raises InputError if the formulas are too long."""
         backward = _reversed(self.parts)
         image = _formulas(self.names, backward)
         if image is None:
@@ -145,7 +145,7 @@ class ComposedMap(MapFamily):
 
     @property
     def equations(self) -> tuple[fmpq_mpoly, ...]:
-        """Those of the map multiplied out. Raises InputError where they are long."""
+        """The equations of the expanded map. Raises InputError if the formulas are too long."""
         return self.multiplied_out.equations
 
     def written(self) -> dict[str, Any]:
@@ -245,7 +245,7 @@ def _reversed(parts: Sequence[MapFactor]) -> list[MapFactor]:
 
 
 def is_involution(map_: MapFamily) -> bool:
-    """Whether Phi(Phi(x)) = x, at random points modulo primes: one of them fails by chance with probability < 2^-40."""
+    """Return whether Phi(Phi(x)) = x at random points modulo primes; the probability of an error is below 2^-40."""
     rng, tried = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)

@@ -12,13 +12,13 @@ KERNELS = ("numpy", "numba")
 
 @cache
 def has_numba() -> bool:
-    """Whether numba is installed (it is not loaded)."""
+    """Return whether numba is installed (without importing it)."""
     return find_spec("numba") is not None
 
 
 @cache
 def has_llvm() -> bool:
-    """Whether the compiler of numba is there, in a version that reads our code: llvmlite 0.45 (numba 0.62) or later."""
+    """Return whether the compiler of numba is installed in a sufficient version: llvmlite 0.45 (numba 0.62)."""
     from importlib.metadata import PackageNotFoundError, version  # takes longer to load than the rest of this file
 
     try:

@@ -550,7 +550,7 @@ class PaperObjects:
     # ---- variations ---------------------------------------------------------------------------------------------
 
     def lifted(self) -> PaperObjects:
-        """The same objects over the dual numbers K[d]/(d^2)."""
+        """The objects over the dual numbers K[d]/(d^2)."""
         if "lifted" not in self._memory:
             dual = DualField(self.K)
 

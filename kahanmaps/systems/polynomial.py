@@ -78,5 +78,5 @@ class PolynomialField:
 def _from_text(
     kind: type[PolynomialField], names: tuple[str, ...], texts: Sequence[str], symbols: tuple[str, ...]
 ) -> PolynomialField:
-    """What `pickle` and `copy` make again: polynomials of FLINT go by their text."""
+    """Reconstruct a field from text, for `pickle` and `copy`, which do not support FLINT's polynomials."""
     return kind(tuple(parse_polynomial(text, names) for text in texts), symbols)

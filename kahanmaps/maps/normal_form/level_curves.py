@@ -161,11 +161,11 @@ class LevelCubic:
         return multiple
 
     def is_zero(self, P: Triple) -> bool:
-        """Whether P is the zero of the group."""
+        """Return whether P is the zero of the group."""
         return same_point(P, self.zero)
 
     def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
-        """Whether P is among the multiples of T, which has this order; None: not known.
+        """Return whether P is a multiple of T, which has this order; None if it is not known.
 
         It is none if order P is not zero. Otherwise, for every prime l that divides both the order and the index of
         the multiples of T, the parts of P and T of l-power order are compared by one logarithm; the others agree.

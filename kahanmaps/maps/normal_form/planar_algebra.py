@@ -50,7 +50,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def numbers(self) -> ShortElements:
-        """How values of tau functions are kept."""
+        """The representation of the values of tau functions."""
         return ShortElements(self.algebra, self.bad)
 
     @cached_property
@@ -64,7 +64,7 @@ class AlgebraBlock(LevelBlock):
         return [self.bad]
 
     def bits(self, triple: Triple) -> tuple[int, int]:
-        """About the bit lengths of numerators and denominator of `fraction`."""
+        """Return the approximate bit lengths of numerators and denominator of `fraction`."""
         U, V, W = (max((int(abs(c.p).bit_length()) for c in entry.polynomial.coeffs()), default=1) for entry in triple)
         if triple[2].polynomial.degree() == 0:
             denominator_bits = int(sum(entry.polynomial.denom().bit_length() for entry in triple))
@@ -73,7 +73,7 @@ class AlgebraBlock(LevelBlock):
 
     @property
     def slack(self) -> int:
-        """By so much `bits` may be wrong."""
+        """The largest error of `bits`."""
         largest = max(abs(entry.p) for entry in self.algebra.chi.coeffs())
         return int(self.algebra.degree**2 * (largest.bit_length() + self.algebra.degree + 3))
 
@@ -135,7 +135,7 @@ class AlgebraBlock(LevelBlock):
 
     @staticmethod
     def same(P: Triple, Q: Triple) -> bool:
-        """Whether two triples are one point."""
+        """Return whether two triples are the same point."""
         return same_point(P, Q)
 
 
@@ -155,7 +155,7 @@ class ShortElements:
 
     @staticmethod
     def divisor(value: EtaleElement) -> EtaleElement:
-        """What `difference` and `combined` take for a division by this element."""
+        """Return the divisor for `difference` and `combined`."""
         return 1 / value
 
     def difference(
@@ -204,7 +204,7 @@ class ShortElements:
         return U, V, W
 
     def _multiplier(self, value: EtaleElement) -> EtaleElement | None:
-        """What makes a value short; None if it is."""
+        """Return a factor that makes a value short; None if it is short."""
         degree, denominator = self._algebra.degree, value.polynomial.denom()
         integers = [(entry * denominator).p for entry in value.coefficients]
         residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))

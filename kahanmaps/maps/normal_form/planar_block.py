@@ -86,5 +86,5 @@ def determinant(P: Sequence[Any], Q: Sequence[Any], R: Sequence[Any]) -> Any:
 
 
 def same_point(P: Sequence[Any], Q: Sequence[Any]) -> bool:
-    """Whether two triples are proportional (neither of them zero)."""
+    """Return whether two nonzero triples are proportional."""
     return bool(P[0] * Q[1] == P[1] * Q[0] and P[0] * Q[2] == P[2] * Q[0] and P[1] * Q[2] == P[2] * Q[1])

@@ -34,7 +34,7 @@ class LevelBlock(ABC):
 
     @property
     def is_constant(self) -> bool:
-        """Whether every step leads to the start: h = 0, or the start is the origin."""
+        """Whether the initial point is fixed because h = 0 or it is the origin."""
         return bool(self.block.is_zero or (self.start[0] == 0 and self.start[1] == 0))
 
     @cached_property
@@ -104,7 +104,7 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def numbers(self) -> PlaneIntegers:
-        """How values of tau functions are kept."""
+        """The representation of the values of tau functions."""
         return PlaneIntegers(self.power)
 
     @property
@@ -126,7 +126,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def bits(triple: IntegerTriple) -> tuple[int, int]:
-        """About the bit lengths of numerators and denominator of `fraction`."""
+        """Return the approximate bit lengths of numerators and denominator of `fraction`."""
         return int(max(triple[0].bit_length(), triple[1].bit_length())), int(triple[2].bit_length())
 
     @staticmethod
@@ -142,7 +142,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def same(P: IntegerTriple, Q: IntegerTriple) -> bool:
-        """Whether two primitive triples are one point."""
+        """Return whether two primitive triples are the same point."""
         return P[2] in (Q[2], -Q[2]) and tuple(P) in (tuple(Q), tuple(-entry for entry in Q))
 
     @staticmethod
@@ -152,7 +152,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def residue_map(prime: int) -> Callable[[fmpz], nmod] | None:
-        """How integers are reduced modulo a prime."""
+        """Return the map that reduces integers modulo a prime."""
         return lambda entry: nmod(entry, prime)
 
     @staticmethod

@@ -46,7 +46,7 @@ class _Row:
 
 
 class Assembly:
-    """How points are put together from triples: for blocks and, for each, the rows of x = sum of R (u, v)."""
+    """The conversion of triples to points x = sum of R (u, v), for blocks and the matrix R of each."""
 
     def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
         self.blocks = blocks
@@ -105,7 +105,7 @@ class PlanesPoint:
 
     @property
     def bits(self) -> int:
-        """About the bit length of the largest of the integers over one common denominator."""
+        """The approximate bit length of the largest integer over one common denominator."""
         pairs = [block.bits(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
         return sum(denominator_bits for _, denominator_bits in pairs) + max(
             0, *(numerator_bits - denominator_bits for numerator_bits, denominator_bits in pairs)
@@ -218,7 +218,7 @@ def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fm
 
 
 def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
-    """What two numbers and the modulus have in common: all of it, unless one of its primes is there to a high power."""
+    """Return a common factor of two numbers and the modulus: all of it, except high powers of primes."""
     common = modulus.gcd(numerator % modulus)
     return common if common == 1 else common.gcd(denominator % common)
 

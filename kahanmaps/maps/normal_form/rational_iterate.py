@@ -175,7 +175,7 @@ def _no_value(step: int) -> SingularStep:
 
 
 class _Plane:
-    """What is known of the orbit in one plane for all steps: whether it is lazy, then its period and its pole.
+    """The data of the orbit in one plane for all steps: whether it is lazy, its period and its pole.
 
     Lazy means that its numbers stay short: it returns after `period` steps, or its level is parabolic (`period` is
     None). `pole` is the first step then that is not defined, None for none.
