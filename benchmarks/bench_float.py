@@ -23,8 +23,8 @@ import numpy as np
 from flint import fmpq
 
 from kahanmaps import normal_form, random_member_with_eigenvalues
-from kahanmaps.maps.floats.blocks import planar_blocks
-from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
+from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit
+from kahanmaps.maps.floats.planar_blocks import planar_blocks
 from kahanmaps.maps.kernels import has_numba
 
 EPS = fmpq(1, 10)

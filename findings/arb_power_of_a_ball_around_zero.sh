@@ -24,4 +24,4 @@ assert (x * x).is_finite() and (acb(x) ** 2).is_finite() and ((x + 1) ** 2).is_f
 assert not x**2 < 4 and x * x < 4
 print("seen: nan for the power, an enclosure for the product")
 PYTHON
-# Here: normal forms of floating-point maps compare sines of angles; kahanmaps/maps/floats/blocks.py multiplies.
+# Here: normal forms of floating-point maps compare sines of angles; kahanmaps/maps/floats/planar_blocks.py multiplies.

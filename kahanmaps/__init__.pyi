@@ -108,8 +108,8 @@ from .maps.composed import composed_map as composed_map
 from .maps.explicit import explicit_map as explicit_map
 from .maps.floats.ensemble import FloatEnsemble as FloatEnsemble
 from .maps.floats.ensemble import ensemble as ensemble
-from .maps.floats.fast import FloatOrbit as FloatOrbit
-from .maps.floats.fast import to_floats as to_floats
+from .maps.floats.float_orbit import FloatOrbit as FloatOrbit
+from .maps.floats.float_orbit import to_floats as to_floats
 from .maps.floats.lyapunov import Lyapunov as Lyapunov
 from .maps.floats.lyapunov import lyapunov_exponents as lyapunov_exponents
 from .maps.implicit import ImplicitMap as ImplicitMap

@@ -29,7 +29,7 @@ FLOORS = [
 NEVER_IN_THE_LIBRARY = {"click", "rich", "kahanmaps_cli"}
 NEVER_WHILE_LOADING = {"matplotlib", "numba", "llvmlite", "distributed"}
 NUMPY_WHILE_LOADING = (
-    "kahanmaps/maps/floats/fast.py",
+    "kahanmaps/maps/floats/float_orbit.py",
     "kahanmaps/maps/floats/",
     "kahanmaps/maps/residues/",
     "kahanmaps/plots/",
@@ -173,7 +173,11 @@ WRONG = [
     (MAPS, "def f():\n    import click", "the library imports click"),
     (MAPS, "import numpy as np", "imports numpy while it is loaded"),
     (MAPS, "def f():\n    from time import monotonic", "reads a clock"),
-    ("kahanmaps/maps/floats/fast.py", "try:\n    import numba\nexcept ImportError:\n    pass", "imports numba while"),
+    (
+        "kahanmaps/maps/floats/float_orbit.py",
+        "try:\n    import numba\nexcept ImportError:\n    pass",
+        "imports numba while",
+    ),
     (
         "kahanmaps/maps/floats/ensemble.py",
         "from kahanmaps.maps.floats.machine_code import MachineCode",
@@ -181,7 +185,11 @@ WRONG = [
     ),
     ("kahanmaps/maps/floats/machine_code.py", "import matplotlib", "imports matplotlib while"),
     ("kahanmaps/experiments/running/run.py", "class A:\n    import distributed", "imports distributed while"),
-    ("kahanmaps/maps/floats/fast.py", "if TYPE_CHECKING:\n    pass\nelse:\n    import numba", "imports numba while"),
+    (
+        "kahanmaps/maps/floats/float_orbit.py",
+        "if TYPE_CHECKING:\n    pass\nelse:\n    import numba",
+        "imports numba while",
+    ),
 ]
 
 

@@ -1,1 +1,1 @@
-"""Checks: claims about Kahan maps put to the test, each with a verdict and its evidence."""
+"""Checks: claims about maps are proved, refuted or supported, with evidence."""

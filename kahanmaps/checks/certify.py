@@ -1,9 +1,9 @@
-"""One claim from start to end: proof where there is one, random points, an exact orbit, and that they agree.
+"""Certification of identities: by a theorem, by expansion, at random points, and along an exact orbit.
 
-Proof and experiment are independent ways to the same answer, so each guards the other: a proved claim that fails at
-a point is a bug here, and is reported as one. A false claim may pass at random points, with the probability that the
-bound states; where both sides can be multiplied out, what comes out decides: the code that evaluates an identity at
-points over Q and GF(p) runs over the field of rational functions, as far as a budget on products of terms goes.
+Proof and experiment are independent: a proved claim that fails at a point shows an error in this program, and is
+reported as such. A false claim may pass at random points, with a probability that the evidence bounds. If both sides
+can be expanded, the expansion decides: the code that evaluates an identity at points over Q and GF(p) also runs over
+the field of rational functions, within a budget of products of terms.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
 from kahanmaps.checks.settings import OrbitRun, Settings, along
 
 METHOD = "expansion"
-# Beyond this dimension the budget would only be spent in vain.
+# In larger dimensions the budget is never sufficient.
 MAX_DIMENSION = 6
 
 
 class Contradiction(AssertionError):
-    """A theorem and an exact computation disagree: an error in kahanmaps, never in the input."""
+    """A theorem and an exact computation contradict each other: an error in kahanmaps, not in the input."""
 
     def __init__(self, message: str, witness: Witness | None = None) -> None:
         super().__init__(message)
@@ -37,7 +37,23 @@ def certify(
     source: str = "",
     control: bool = False,
 ) -> Finding:
-    """The finding on one claim: proved by `proof` or by expansion, or decided at random points; tried along `orbit`."""
+    """Certify a claim that is stated as an identity, and return the finding.
+
+    Args:
+        claim: the claim as a sentence.
+        identity: the claim as an identity of rational functions.
+        settings: the seed and the error bound for random points.
+        proof: the evidence of a theorem that implies the claim; without it, the identity is expanded if possible.
+        orbit: an exact orbit along which the identity is tried as well.
+        formula, source: the formula and its reference, for the report.
+        control: whether the claim is expected to be refuted; then it is not expanded.
+
+    Returns:
+        The finding: proved by the theorem or by expansion, otherwise supported, refuted (with a witness) or undecided.
+
+    Raises:
+        Contradiction: if a proved claim fails at a point.
+    """
     decision = decide(identity, settings.seed, settings.error_bits if proof is None else 1)
     also: list[Evidence] = []
     verdict, evidence, witness = decision.verdict, decision.evidence, decision.witness
@@ -45,14 +61,14 @@ def certify(
         if decision.verdict is Certainty.REFUTED:
             raise Contradiction(f"{claim}: {proof.summary}, but it {decision.evidence.summary} {decision.witness}")
         if decision.evidence.data.get("poles_met") and decision.verdict is Certainty.UNDECIDED:
-            # A theorem on a map that has no value anywhere, det(I - eps f') being zero for all x, says nothing.
+            # A theorem on a map that is defined nowhere, with det(I - eps f') = 0 for all x, says nothing.
             return Finding(claim, decision.verdict, decision.evidence, (), None, formula, source, control)
         verdict, evidence, witness = Certainty.PROVED, proof, None
         if decision.verdict is Certainty.SUPPORTED:
             also.append(_without_bound(decision.evidence))
     elif not control:
-        settled = try_expand(identity, decision, settings.seed)
-        verdict, evidence, witness = settled.verdict, settled.evidence, settled.witness
+        expanded = try_expand(identity, decision, settings.seed)
+        verdict, evidence, witness = expanded.verdict, expanded.evidence, expanded.witness
         if verdict is Certainty.PROVED:
             also.append(_without_bound(decision.evidence))
     if orbit is not None:
@@ -66,25 +82,25 @@ def certify(
 
 
 def _without_bound(evidence: Evidence) -> Evidence:
-    """Points at which a proved claim was tried as well: what is proved is not false with any probability."""
-    held = evidence.summary.partition("; false with probability")[0]
-    return Evidence(evidence.method, held, {k: v for k, v in evidence.data.items() if k != "error_bound"})
+    """Return the evidence of random points for a proved claim, without its probability of error."""
+    summary = evidence.summary.partition("; false with probability")[0]
+    return Evidence(evidence.method, summary, {k: v for k, v in evidence.data.items() if k != "error_bound"})
 
 
 class NotEqual(ArithmeticError):
-    """Both sides were expanded and differ."""
+    """The two sides were expanded and differ."""
 
 
 def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
-    """The evidence that both sides are equal as rational functions; None where the budget is exceeded.
+    """Expand both sides over the field of rational functions; return the evidence that they are equal.
 
-    `budget` bounds the products of terms; the default is smaller where coefficients are long.
-    Raises NotEqual where both sides were expanded and differ.
+    `budget` bounds the number of products of terms; its default is smaller for long coefficients. Returns None if it is
+    exceeded. Raises NotEqual if the two sides differ.
     """
     if budget is None:
         if identity.dim > MAX_DIMENSION:
             return None
-        # A product takes longer than in proportion to its bits once it has left the innermost caches.
+        # The time of a product grows faster than its bits once the numbers exceed the processor's caches.
         bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
     names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
@@ -113,7 +129,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
 
 
 def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
-    """The decision at random points or, where these support a claim and both sides can be multiplied out, that."""
+    """Decide by expansion a claim that random points support; return `decision` if it is not, or not possible."""
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:

@@ -1,8 +1,8 @@
-"""What a check says: verdicts, evidence, witnesses, findings, and the report that holds them.
+"""The results of checks: verdicts, evidence, witnesses, findings and reports.
 
-`proved`: exact, for this system and every eps (or the eps named). `refuted`: there is a witness, a point with both
-sides. `supported`: held at random points over GF(p) with a stated error bound, or along an orbit; the evidence says
-which. `undecided`: the reason is given. Each claim carries exactly one of these words.
+`proved`: exact, for this system and every eps (or the given eps). `refuted`: there is a witness, a point at which the
+two sides differ. `supported`: the claim held at random points over GF(p), with a stated error bound, or along an orbit.
+`undecided`: the reason is given. Each claim has exactly one of these verdicts.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, WithoutTru
 
 
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
-    """How much is known of a claim; its truth value is `holds`, and `bool` of it an error.
+    """How certain a claim is. Its truth value is `holds`; `bool` of a certainty is an error.
 
     Checks give one of the first four. EXPLAINED is what follows exactly from the patterns of singularities, which are
     measured; NOTE stands where certainty is not the question.
@@ -34,13 +34,13 @@ class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
 
     @property
     def holds(self) -> bool | None:
-        """True, False, or None where nothing is known."""
+        """True, False, or None if it is not known."""
         return {Certainty.REFUTED: False, Certainty.UNDECIDED: None, Certainty.NOTE: None}.get(self, True)
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Why a verdict was given: the method, a sentence, and data (plain numbers and text) for scripts."""
+    """The reason for a verdict: the method, a sentence, and plain data for scripts."""
 
     method: str
     summary: str
@@ -61,7 +61,7 @@ class Witness:
     left_label: str
     right_label: str
     field: str = "QQ"
-    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # whatever else was chosen, by name
+    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # other choices (vectors, numbers), by name
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -76,7 +76,7 @@ class Witness:
 
 @dataclass(frozen=True)
 class Finding(HtmlDisplay, WithoutTruthValue):
-    """One claim with its verdict. A `control` is a claim that is expected to be refuted and proves the check alive."""
+    """A claim with its verdict. A `control` is expected to be refuted, and shows that the check is able to fail."""
 
     claim: str
     verdict: Certainty
@@ -87,16 +87,16 @@ class Finding(HtmlDisplay, WithoutTruthValue):
     source: str = ""
     control: bool = False
     place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
-    applies: bool = True  # False: stated for generic input, and this is special; it does not count
+    applies: bool = True  # False: the claim is stated for generic input and this input is special; it does not count
 
     @property
     def holds(self) -> bool | None:
-        """Whether the claim holds; None where that is undecided."""
+        """Whether the claim holds; None if that is undecided."""
         return self.verdict.holds
 
     @property
     def is_as_expected(self) -> bool:
-        """Whether a control was refuted; true for everything that is not a control."""
+        """Whether a control was refuted; true for claims that are not controls."""
         return not self.control or self.verdict is Certainty.REFUTED
 
     def to_json(self) -> dict[str, Any]:
@@ -123,33 +123,38 @@ class Finding(HtmlDisplay, WithoutTruthValue):
 
 @dataclass(frozen=True)
 class Report(PrintableResult):
-    """The findings of one check, and what is needed to do it again (`context`)."""
+    """The findings of a check, with the data needed to reproduce it (`context`)."""
 
     check: str
     findings: tuple[Finding, ...]
     context: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
-    ended_early: bool = False  # an orbit that the user asked for could not be walked to its end
+    ended_early: bool = False  # an orbit that the user requested could not be completed
 
     @property
     def verdict(self) -> Certainty:
-        """The verdict on all claims together; controls, and claims that do not apply, do not count."""
+        """The combined verdict of all claims, without controls and claims that do not apply."""
         return combined(finding.verdict for finding in self.findings if finding.applies and not finding.control)
 
     @property
     def holds(self) -> bool | None:
-        """Whether everything claimed holds; None where that is undecided."""
+        """Whether all claims hold; None if that is undecided."""
         return self.verdict.holds
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each claim, for `pandas.DataFrame(report.rows())` and the like."""
+        """Return a row for each claim, for example for `pandas.DataFrame(report.rows())`."""
         return [
-            {"claim": one.claim, "verdict": str(one.verdict), "formula": one.formula, "evidence": one.evidence.summary}
-            for one in self.findings
+            {
+                "claim": finding.claim,
+                "verdict": str(finding.verdict),
+                "formula": finding.formula,
+                "evidence": finding.evidence.summary,
+            }
+            for finding in self.findings
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """The report as plain data, the shape that scripts rely on."""
+        """Return the report as plain data, in the documented format of the JSON output."""
         return {
             "check": self.check,
             "verdict": str(self.verdict),
@@ -162,15 +167,15 @@ class Report(PrintableResult):
 
 
 def combined(verdicts: Iterable[Certainty]) -> Certainty:
-    """The weakest of several verdicts: refuted before undecided before supported before proved.
+    """Return the weakest of several verdicts, in the order refuted, undecided, supported, proved.
 
-    Without any verdict nothing has been decided.
+    Without verdicts the result is undecided.
 
     >>> combined([Certainty.PROVED, Certainty.SUPPORTED])
     <Certainty.SUPPORTED: 'supported'>
     """
-    found = set(verdicts)
+    distinct = set(verdicts)
     for verdict in (Certainty.REFUTED, Certainty.UNDECIDED, Certainty.SUPPORTED, Certainty.PROVED):
-        if verdict in found:
+        if verdict in distinct:
             return verdict
     return Certainty.UNDECIDED

@@ -1,4 +1,4 @@
-"""Do two Kahan maps commute?  Phi_f o Phi_g = Phi_g o Phi_f."""
+"""The check whether two maps commute: Phi_f o Phi_g = Phi_g o Phi_f."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SOURCE = "petrera-suris-2016, Theorem 9"
 SAME_STEP = fmpq(1)
-# The pairs that are also tried along an orbit and at random points; the proof covers all of them.
+# The number of pairs that are also tried along an orbit and at random points; the proof covers all pairs.
 _PAIRS_TRIED = 30
-_PAIRS_TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one pair takes many seconds
+_PAIRS_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where one pair takes many seconds
 
 
 def commutativity(
@@ -37,7 +37,10 @@ def commutativity(
     names: tuple[str, str],
     ratio: fmpq = SAME_STEP,
 ) -> Identity:
-    """Phi_f o Phi_g = Phi_g o Phi_f as an identity, systems standing for their Kahan maps; g is taken at ratio eps."""
+    """Return Phi_f o Phi_g = Phi_g o Phi_f as an identity.
+
+    A system stands for its Kahan map. The map of g is taken at `ratio` times the eps of f.
+    """
     first_map, second_map = as_map(f), as_map(g)
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
@@ -56,16 +59,16 @@ def commutativity(
 
 
 def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:
-    """Raise InputError for the identity, as the Kahan map of f = 0 is: that it commutes says nothing of another map.
+    """Raise InputError if the map is the identity (as for f = 0), which commutes with every map.
 
-    It is recognized at random points, as the identity x~ = x of rational functions, with an error below 2^-100.
+    The identity x~ = x is tested at random points, with an error below 2^-100.
     """
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
         return map_.at(eps_value, field).step(point), point
 
-    told: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
-    if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **told), seed).verdict is Certainty.SUPPORTED:
+    properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
+    if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **properties), seed).verdict is Certainty.SUPPORTED:
         at = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
         raise InputError(
             f"found {file.labelled(letter)}, whose map is the identity{at}, expected another: "
@@ -82,12 +85,21 @@ def check_commute(
     eps: Any = None,
     time_step: Any = None,
 ) -> Report:
-    """Do the Kahan maps of two systems commute; of one member of the family: all its rational associated maps?
+    """Check whether the maps of two systems commute, or all rational associated maps of one member of the family.
 
-    `eps2` is the step of the second map where it differs (then `settings.eps` has to be given). For a family member the
-    maps of H_0 and H_1, grad H_1 = A grad H_0, are the control: they do not commute in general, and a check that finds
-    them commuting would be worthless. Raises InputError where there is nothing to compare, and where one of the maps is
-    the identity at the parameters and the eps in force.
+    Args:
+        system, other: the two systems or maps; a system stands for its Kahan map. Without `other`, `system` must be a
+            member of the family, and its associated maps are checked pairwise. Then the maps of H_0 and H_1, with
+            grad H_1 = A grad H_0, serve as a control: in general they do not commute.
+        settings: eps, seed, error bound and orbit.
+        eps2: the eps of the second map, if it differs (then eps must be given as well).
+        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+
+    Returns:
+        The report.
+
+    Raises:
+        InputError: if there is nothing to compare, or one of the maps is the identity.
     """
     file, settings = as_file(system), Settings.of(settings, eps, time_step)
     if other is None:
@@ -95,7 +107,7 @@ def check_commute(
             raise InputError("a second step needs a second system: kahanmaps check-commute SYSTEM OTHER --eps2 E")
         if file.member is None:
             raise InputError(
-                f"{file.name} is of kind [{file.kind}], and one system commutes with itself: "
+                f"{file.name} is of kind [{file.kind}], and every map commutes with itself: "
                 "give a second system, or one of kind [family], whose associated maps are compared pairwise"
             )
         return _check_member(file, file.member, settings)
@@ -103,7 +115,7 @@ def check_commute(
     f = file.map
     g, note = matched(file, second)
     notes = [note] if note else []
-    as_they_are = set(f.variables) != set(second.variables) or f.variables == second.variables
+    is_same_order = set(f.variables) != set(second.variables) or f.variables == second.variables
     ratio, is_same_step = SAME_STEP, True
     if eps2 is not None:
         if settings.eps is None:
@@ -114,7 +126,7 @@ def check_commute(
         ratio = eps2 / settings.eps
         note = f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps"
         if second.is_quadratic and isinstance(g, KahanFamily):
-            # For it depends on the product eps g only.
+            # Its Kahan map depends only on the product eps g.
             g, ratio, is_same_step = KahanFamily(g.system.scaled(ratio)), SAME_STEP, ratio == 1
         else:
             note = f"the map of g is taken at eps2 = {format_number(eps2)}"
@@ -123,7 +135,7 @@ def check_commute(
     at_g = None if settings.eps is None else settings.eps * ratio
     _require_another_than_identity(second, "g", g, at_g, settings.seed)
     proof = None
-    if is_same_step and as_they_are and file.member is not None and second.member is not None:
+    if is_same_step and is_same_order and file.member is not None and second.member is not None:
         proof = theorems.commuting_by_involution_of_members(file.member, second.member)
     if proof is None and file.is_quadratic and second.is_quadratic and isinstance(g, KahanFamily):
         proof = theorems.commuting_by_splitting(file.system, g.system)
@@ -139,8 +151,8 @@ def check_commute(
         formula="Phi_f o Phi_g = Phi_g o Phi_f",
         source=SOURCE if proof is not None and "Theorem 9" in proof.summary else "",
     )
-    more = {"eps2": format_number(eps2)} if eps2 is not None else {}
-    context = settings.context([file, second], orbit=orbit.to_json(), **more)
+    extra_context = {"eps2": format_number(eps2)} if eps2 is not None else {}
+    context = settings.context([file, second], orbit=orbit.to_json(), **extra_context)
     return Report("commute", (finding,), context, notes, settings.cut_short(orbit))
 
 
@@ -163,30 +175,30 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         systems: tuple[QuadraticSystem, QuadraticSystem],
         names: tuple[str, str],
         proof: Evidence | None,
-        tried: bool = True,
+        is_tried: bool = True,
         formula: str = "Phi_{0} o Phi_{1} = Phi_{1} o Phi_{0}",
-        **told: Any,
+        **details: Any,
     ) -> Finding:
         formula = formula.format(*names)
-        if not tried and proof is not None:
-            return Finding(claim, Certainty.PROVED, proof, formula=formula, **told)
+        if not is_tried and proof is not None:
+            return Finding(claim, Certainty.PROVED, proof, formula=formula, **details)
         identity = commutativity(*systems, settings.eps, names)
-        return certify(claim, identity, settings, proof, orbit if tried else None, formula=formula, **told)
+        return certify(claim, identity, settings, proof, orbit if is_tried else None, formula=formula, **details)
 
     findings = []
     pairs = list(combinations(associates, 2))
-    tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION
+    is_tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION
     for k, (first, second) in enumerate(pairs):
-        if k < tried:
-            settings.progress(f"pair {k + 1} of {len(pairs)}, the first {tried} along an orbit as well")
+        if k < is_tried:
+            settings.progress(f"pair {k + 1} of {len(pairs)}, the first {is_tried} along an orbit as well")
         proof = theorems.evidence(
             "Theorem 9 of Petrera and Suris", [*base, *verified[first.label], *verified[second.label]]
         )
         names = (f"f_{first.label}", f"f_{second.label}")
         claim = f"the Kahan maps of {names[0]} and {names[1]} commute"
-        findings.append(certified(claim, (first.system, second.system), names, proof, k < tried, source=SOURCE))
-    if len(pairs) > tried:
-        notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
+        findings.append(certified(claim, (first.system, second.system), names, proof, k < is_tried, source=SOURCE))
+    if len(pairs) > is_tried:
+        notes.append(f"the first {is_tried} pairs were also tried along an orbit; the hypotheses were verified for all")
     if len(associates) == 1:
         # Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse.
         only, inverse = associates[0].system, associates[0].system.scaled(-1)

@@ -1,4 +1,4 @@
-"""Are integrals conserved?  I(x~) = I(x), for known integrals and for claimed ones."""
+"""The check whether known or claimed integrals are conserved: I(x~) = I(x)."""
 
 from __future__ import annotations
 
@@ -37,92 +37,98 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-# The integrals that are also tried along an orbit, where there are many.
+# The largest number of integrals that are also tried along an orbit.
 _TRIED = 32
-_TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one integral takes many seconds
+_TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where one integral takes many seconds
 
 
 def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, eps: fmpq | None) -> Identity:
-    """I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
+    """Return I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
     map_, labels = as_map(system), ("I(x~)", "I(x)")
-    last: list[Any] = []  # along an orbit I(x~) at one point is I(x) at the next
+    last: list[Any] = []  # a cache: along an orbit I(x~) at one point is I(x) at the next
     in_iterates = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
-    if in_iterates is not None:  # stated for x in the middle of the piece of orbit
+    if in_iterates is not None:  # x is the middle one of the points that the identity contains
         labels = ("I on the orbit of x, a step later", "I on the orbit of x")
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
         if in_iterates is not None:
             points = orbit_about(map_.at(eps_value, field), point, in_iterates.iterates + 1)
-            before, after = (in_iterates.on(field, eps_value, points[k:]) for k in (0, 1))
-            return None if after is None or before is None else ([after], [before])
+            value_before, after = (in_iterates.on(field, eps_value, points[k:]) for k in (0, 1))
+            return None if after is None or value_before is None else ([after], [value_before])
         image = map_.at(eps_value, field).step(point)
-        known = last and last[0] is field and last[1] == eps_value and last[2] == point
-        before = last[3] if known else integral.value(field, eps_value, point)
+        is_cached = last and last[0] is field and last[1] == eps_value and last[2] == point
+        value_before = last[3] if is_cached else integral.value(field, eps_value, point)
         after = integral.value(field, eps_value, image)
         last[:] = [field, eps_value, image, after]
-        return None if after is None or before is None else ([after], [before])
+        return None if after is None or value_before is None else ([after], [value_before])
 
     subject = (map_.subject, integral.subject)
     return Identity(map_.dim, sides, eps, *labels, has_eps=map_.has_eps, root=map_.root, subject=subject)
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
-    """The integrals that a theorem gives for the system: each with its proof and source."""
-    found: list[tuple[PhaseFunction, Evidence | None, str]] = []
+    """Return the integrals that follow from theorems for the system, each with its proof and source."""
+    integrals: list[tuple[PhaseFunction, Evidence | None, str]] = []
     member = file.member
     if member is None:
         if file.hamiltonian is not None:
             proof = theorems.cubic_hamiltonian(file.hamiltonian)
-            found.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
+            integrals.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
             if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
-                found.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
-        return found
-    # Modified H in both normalizations, K~_s for every rational associated system, and those of the commutant. Where
-    # there are many factors the K~ of several minus signs are combinations of those listed.
+                integrals.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
+        return integrals
+    # The modified H in both normalizations, K~_s for every rational associated system, and those of the commutant. If
+    # chi has many factors, the K~ with several minus signs are linear combinations of those listed.
     associates = theorems.listed_associates(member)
     base = associates[0]
     proof = theorems.shared_integral(member, base)
-    found += [
+    integrals += [
         (ModifiedHamiltonian(base.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
         (PaperIntegral(base.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
     ]
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
-        found.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
-    # m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots.
+        integrals.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
+    # m - 1 further integrals, which are rational even if chi has irrational roots and the K~_s are not.
     hamiltonian = member.chosen.hamiltonian
     letter = "H" if all(sign > 0 for sign in member.signs) else "K"
     for k in range(1, member.m):
         commutant = CommutantIntegral(hamiltonian, member.A, k, letter)
         name = "A^T" if k == 1 else f"(A^T)^{k}"
-        found.append((commutant, theorems.commutant_integral(hamiltonian, commutant, name), ""))
-    return found
+        integrals.append((commutant, theorems.commutant_integral(hamiltonian, commutant, name), ""))
+    return integrals
 
 
 def functions_along(
-    file: SystemFile, asked: Sequence[tuple[str, str]], in_floats: bool, taken: Sequence[str] = ()
+    file: SystemFile, requested: Sequence[tuple[str, str]], in_floats: bool, taken: Sequence[str] = ()
 ) -> dict[str, PhaseFunction]:
-    """What is watched along orbits, in floats or not, by name, for pairs of a name, which may be empty, and a text.
+    """Return the functions to evaluate along an orbit, by name.
 
-    A text is an expression, the name of an integral of the file, or the word known, which stands for all that theorems
-    give and the file claims, this as `measured_integrals` has it. Raises InputError for the same name twice, or one
-    that is `taken` by another column.
+    Args:
+        file: the system.
+        requested: pairs of a name, which may be empty, and a text: an expression, the name of an integral of the file,
+            or "known" for all integrals that follow from theorems or are claimed by the file.
+        in_floats: whether the orbit is in floating-point numbers.
+        taken: the names of other columns.
+
+    Raises:
+        InputError: if a name occurs twice or is taken, and for functions that cannot be evaluated in floats.
     """
     file = file.real_approximation if in_floats else file
-    found: list[PhaseFunction] = []
-    for k, (name, text) in enumerate(asked, start=1):
+    functions: list[PhaseFunction] = []
+    for k, (name, text) in enumerate(requested, start=1):
         if text == "known" and not name:
             claims = {**measured_integrals(file), **file.integrals_in_iterates}
-            known = [integral for integral, _, _ in known_integrals(file)]
-            if not known and not claims:
+            known_functions = [integral for integral, _, _ in known_integrals(file)]
+            if not known_functions and not claims:
                 raise InputError(f"--integral known: no integral of {file.name} is known or claimed")
-            if known and in_floats:
+            if known_functions and in_floats:
                 raise InputError(
                     "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
                 )
-            found += known
-        elif text in (every := {**file.integrals, **file.integrals_in_iterates}):
-            claims = {name or text: every[text]}
+            functions += known_functions
+        elif text in (declared := {**file.integrals, **file.integrals_in_iterates}):
+            claims = {name or text: declared[text]}
         else:
             short = " ".join(text.split()) if len(text) <= 30 else f"I{k}"
             claims = {name or short: claimed_function(file, text)}
@@ -130,13 +136,13 @@ def functions_along(
             raise InputError(
                 f"found {', '.join(moved)} with x~ in it, which needs exact, mod:P or ball:BITS arithmetic, not float"
             )
-        found += [ClaimedFunction(name, function, file.map.root, file.map) for name, function in claims.items()]
-    names = [*taken, *(function.name for function in found)]
+        functions += [ClaimedFunction(name, function, file.map.root, file.map) for name, function in claims.items()]
+    names = [*taken, *(function.name for function in functions)]
     for name in names:
         if names.count(name) > 1:
             kind = "columns" if taken else "integrals"
             raise InputError(f"found two {kind} of the name {name}: write --integral NAME=EXPR")
-    return {function.name: function for function in found}
+    return {function.name: function for function in functions}
 
 
 def check_integrals(
@@ -148,12 +154,22 @@ def check_integrals(
     eps: Any = None,
     time_step: Any = None,
 ) -> Report:
-    """Are the integrals `extra` conserved; without them, those of theorems and of the file: identically, on an orbit?
+    """Check whether integrals are conserved, identically and along an exact orbit.
 
-    `extra` are rational functions of the system's variables and eps, by name, or one, or a list; functions, text or
-    expressions of SymPy, in the place of the settings if there are none. The name of an integral of the file stands for
-    it. They come first in the report, and alone unless those of theorems and of the file are requested by `known`.
-    Raises InputError where there is nothing to check, and for two integrals of one name.
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
+        extra: the claimed integrals, rational functions of the variables and eps: one, a list, or a mapping by name, as
+            functions, text or SymPy expressions; or names of integrals of the file. By default the integrals that
+            follow from theorems and those of the file.
+        known: check those integrals in addition to `extra`.
+        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+
+    Returns:
+        The report; the claimed integrals come first.
+
+    Raises:
+        InputError: if there is nothing to check, or two integrals have the same name.
 
     >>> from kahanmaps.documents.inline import System
     >>> str(check_integrals(System("x' = y; y' = -x"), "x^2 + y^2").verdict)
@@ -165,16 +181,18 @@ def check_integrals(
     for name, function in claims.items():
         file.require_claim(f"the integral {name}", function)
         if known and of_file.get(name, function) != function:
-            raise InputError(f"found two integrals of the name {name}, expected a name of its own for each")
+            raise InputError(f"found two integrals of the name {name}, expected different names")
 
     def stated(functions: Mapping[str, RationalFunction]) -> list[tuple[PhaseFunction, Evidence | None, str]]:
         map_ = file.map
-        return [(ClaimedIntegral(k, one, settings.eps, map_.root, map_), None, "") for k, one in functions.items()]
+        return [
+            (ClaimedIntegral(k, function, settings.eps, map_.root, map_), None, "") for k, function in functions.items()
+        ]
 
     candidates = stated(claims)
     if known or extra is None:
         candidates += known_integrals(file)
-        candidates += stated({name: one for name, one in of_file.items() if name not in claims})
+        candidates += stated({name: declared for name, declared in of_file.items() if name not in claims})
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
@@ -187,19 +205,19 @@ def check_integrals(
     for k, (integral, proof, source) in enumerate(candidates):
         settings.progress(f"integral {k + 1} of {len(candidates)}")
         claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
-        told: dict[str, Any] = {"formula": integral.formula, "source": source}
+        details: dict[str, Any] = {"formula": integral.formula, "source": source}
         if _is_constant(integral, settings):
             at = "" if settings.eps is None else f" at eps = {settings.eps}"
             reason = Evidence(
                 "constant", f"it is a constant{at}: every map conserves constants, so this is no integral"
             )
             is_claimed = isinstance(integral, ClaimedIntegral)  # others do not count
-            finding = Finding(claim, Certainty.UNDECIDED, reason, **told, applies=is_claimed)
+            finding = Finding(claim, Certainty.UNDECIDED, reason, **details, applies=is_claimed)
         elif proof is not None and k >= tried and file.dim > 16:
-            finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **told)
+            finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **details)
         else:
             identity, walked = conservation(file.map, integral, settings.eps), k < tried or proof is None
-            finding = certify(claim, identity, settings, proof, orbit if walked else None, **told)
+            finding = certify(claim, identity, settings, proof, orbit if walked else None, **details)
         findings.append(finding)
     notes = []
     proved = [finding for finding in findings if finding.verdict is Certainty.PROVED]
@@ -210,7 +228,7 @@ def check_integrals(
 
 
 def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
-    """Whether an integral is a constant at the eps in force, as the modified H of 3 q^2 + p^2 is at eps = 1/2; exact.
+    """Return whether an integral is constant at this eps, like the modified H of 3 q^2 + p^2 at eps = 1/2; exact.
 
     False also where that is too long to expand.
     """

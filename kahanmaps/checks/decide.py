@@ -1,15 +1,14 @@
-"""Deciding an identity of rational functions at random points, with a bound on the probability of error.
+"""The Schwartz-Zippel test of identities of rational functions at random points, with a bound on the error.
 
-The identity is a polynomial equation P(x, eps) = 0 over the integers once denominators are cleared. For each trial
-a prime p is drawn from [2^62, 2^63) and then a point over GF(p), by a hash of the identity and a seed, so that nobody
-can write an identity for given points (algebra/chance.py). If P is not the zero polynomial, the
-trial passes only if p divides all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a
-root (probability at most degree/(p - 1), and p - 1 >= 2^62). Points where a denominator vanishes are drawn again;
-since that happens less than half of the time, the sum of both is doubled. Trials are independent, so the bounds
-multiply. Sources:
-schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
+With denominators cleared, the identity is a polynomial equation P(x, eps) = 0 over the integers. For each trial a prime
+p is drawn from [2^62, 2^63), and then a point over GF(p), by a hash of the identity and a seed, so that no identity can
+be constructed for given points (algebra/chance.py). If P is not the zero polynomial, the trial passes only if p divides
+all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a root (probability at most
+degree/(p - 1), and p - 1 >= 2^62). Points where a denominator vanishes are drawn again; since their probability is
+below 1/2, the sum of both probabilities is doubled. Trials are independent, so the bounds multiply.
+Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
 
-A trial that fails refutes the identity; a small rational point is then found at which both sides differ.
+A trial that fails refutes the identity; then a small rational point is sought at which both sides differ.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ DEFAULT_ERROR_BITS = 100
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
 _MAX_POLES = 200
 _WITNESS_TRIES = 400
-_HIGH_TRIES = 20  # beyond them: a function that is not 0 is hardly ever 0 at points of this many bits
+_HIGH_TRIES = 20  # further tries with long numbers, at which a nonzero function hardly ever vanishes
 _HIGH_BITS = 62
 
 Sides = tuple[Sequence[Any], Sequence[Any]]
@@ -47,11 +46,11 @@ Sides = tuple[Sequence[Any], Sequence[Any]]
 
 @dataclass(frozen=True)
 class Identity:
-    """Two sides to be equal at every point of a space of dimension `dim`.
+    """An identity of two lists of rational functions on a space of dimension `dim`.
 
-    `sides(field, x, eps)` gives both as lists of field elements; it returns None, or raises SingularStep, where
-    they are not defined. `eps` is the step the identity is stated for, None for every eps. `subject` is all that
-    determines the two sides, as `derive_seed` takes it: points are drawn by its hash.
+    `sides(field, x, eps)` returns both lists of field elements; it returns None, or raises SingularStep, where they are
+    not defined. `eps` is the value for which the identity is stated, None for every eps. `subject` are the data that
+    determine the two sides, for `derive_seed`: random points are drawn by its hash.
     """
 
     dim: int
@@ -59,45 +58,45 @@ class Identity:
     eps: fmpq | None
     left_label: str = "left side"
     right_label: str = "right side"
-    entries: tuple[str, ...] = ()  # names of the entries, where a witness should show only one that differs
-    scope: str = ""  # for what it is stated, in words, where there is more to say than eps
-    has_eps: bool = True  # whether the sides depend on it
-    no_value: str = "a denominator seems to vanish identically"  # where it is defined nowhere
-    root: Root | None = None  # the algebraic number in the coefficients, where there is one
+    entries: tuple[str, ...] = ()  # names of the entries, if a witness should show only one that differs
+    scope: str = ""  # for what it is stated, as text, if eps alone does not say it
+    has_eps: bool = True  # whether the sides depend on eps
+    no_value: str = "a denominator seems to vanish identically"  # the likely reason if it is defined nowhere
+    root: Root | None = None  # the algebraic number in the coefficients, if any
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
     def seed(self, seed: int) -> int:
-        """What everything drawn for this identity is drawn from."""
+        """Return the seed of everything that is drawn at random for this identity."""
         return derive_seed(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
 
     @cached_property
     def bound(self) -> tuple[CoefficientSize, int]:
-        """Bounds for the polynomials that vanish where the sides are equal, and the degree of what must not be zero.
+        """Bounds for degree and coefficients of the differences of the sides, and for the degree of the denominators.
 
-        They come from the two sides themselves, computed with bounds in the place of numbers.
+        They are computed by evaluating the two sides with bounds in place of numbers.
         """
         field, before = BoundField(), work.counted()
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
-        work.count(7 * (work.counted() - before))  # bounds are slower than numbers, of which values count themselves
-        # Without values no bound: such an identity is never supported, whatever it does over GF(p).
+        work.count(7 * (work.counted() - before))  # bounds take longer than the numbers that were counted
+        # If the sides are not defined there is no bound, and the identity cannot be supported.
         return (CoefficientSize(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 
     def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
-        """Both sides, None where they are not defined."""
+        """Return both sides, None where they are not defined."""
         try:
             return self.sides(field, point, eps)
         except (SingularStep, SingularMatrix):
             return None
 
-    # What `decide` asks of a statement.
+    # The interface Decidable.
 
     name = "identity"
     max_failures = _MAX_POLES
 
     @property
     def conjugates(self) -> int:
-        """The degree of the number field that the coefficients lie in."""
+        """The degree of the number field of the coefficients."""
         return 1 if self.root is None else self.root.degree
 
     @property
@@ -107,14 +106,14 @@ class Identity:
 
     @property
     def where(self) -> str:
-        """For what it is stated, as a part of a sentence."""
+        """The scope of the identity, as a part of a sentence."""
         scope = self.scope
         if not scope and self.has_eps:
             scope = "for every eps" if self.eps is None else f"for eps = {self.eps}"
         return f", {scope}" if scope else ""
 
     def trials(self, seed: int) -> Iterator[Trial]:
-        """The identity at random points, each over GF(p) for another random p."""
+        """Yield trials at random points, each over GF(p) for another random prime p."""
         rng = random.Random(f"identity {self.seed(seed)}")
         while True:
             field = random_prime_field(rng)
@@ -122,7 +121,7 @@ class Identity:
             if self.root is not None:
                 try:
                     self.root.over(field)
-                except BadPrime:  # it has no root there: the primes that count are the others
+                except BadPrime:  # only primes with a root count
                     continue
             with suppress(BadPrime):
                 point = tuple(field.random(rng) for _ in range(self.dim))
@@ -134,7 +133,7 @@ class Identity:
                 yield Trial(None if sides is None else field.prime)
                 continue
             decision = fails_over_Q(self, seed)
-            if decision is None:  # the modular witness is as good
+            if decision is None:  # the witness modulo p also refutes it
                 summary = (
                     f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
                     f"none of {_WITNESS_TRIES + _HIGH_TRIES} rational points shows it"
@@ -144,13 +143,13 @@ class Identity:
             yield Trial(field.prime, decision)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """What evidence from random points says beside the bounds."""
+        """Return the data of the evidence other than the bounds."""
         return {"poles_met": undefined, "eps": "every" if self.eps is None else str(self.eps)}
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The outcome: a verdict (supported, refuted or undecided), its evidence, and for refuted ones a witness."""
+    """A verdict (supported, refuted or undecided) with its evidence and, if refuted, a witness."""
 
     verdict: Certainty
     evidence: Evidence
@@ -159,17 +158,17 @@ class Decision:
 
 @dataclass(frozen=True)
 class Trial:
-    """A statement at one random point modulo `prime`; None: it has no value there. `decision` is there if it is one."""
+    """The result at one random point modulo `prime` (None: not defined there); `decision` if the trial refutes."""
 
     prime: int | None = None
     decision: Decision | None = None
 
 
 class Decidable(Protocol):
-    """What can be decided at random points: identities, and the claims of the paper on objects of their own.
+    """A statement that can be tested at random points: an identity, or a claim of the paper about its own objects.
 
-    `bound` is as that of an identity, `conjugates` as for `log2_error`; `patience` is the number of points without a
-    value after which there is no hope, and `trials` ends where no further point is to be had.
+    `bound` is defined as for an identity, `conjugates` as for `log2_error`; the test gives up after `max_failures`
+    points at which the statement is not defined, or when `trials` ends.
     """
 
     @property
@@ -196,7 +195,7 @@ class Decidable(Protocol):
 
 
 def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
-    """Decide a statement at random points over GF(p): supported with error below 2^-error_bits, or refuted."""
+    """Test a statement at random points over GF(p): supported with error below 2^-error_bits, refuted, or undecided."""
     equation, pole_degree = statement.bound
     per_trial = log2_error(equation, pole_degree, statement.conjugates)
     is_bounded = not math.isinf(equation.bits)
@@ -247,34 +246,34 @@ def _undecided(text: str, **data: Any) -> Decision:
 
 
 def log2_error(equation: CoefficientSize, poles: int, conjugates: int = 1) -> float:
-    """log2 of the probability that a random point over GF(p) passes although the polynomial equation is false.
+    """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
-    `poles` is the degree of the product of all denominators. Coefficients may lie in a number field of degree at most
-    `conjugates`, and p be random among the primes that split there: of those there are at least half as many as
-    Chebotarev's density gives, is assumed, and a nonzero coefficient is divided by one only if its norm is.
+    `poles` is the degree of the product of all denominators. If the coefficients lie in a number field of degree at
+    most `conjugates`, p is random among the primes that split there. It is assumed that there are at least half as many
+    of these as Chebotarev's density predicts; a prime divides a nonzero coefficient only if it divides its norm.
     """
     if max(equation.degree, poles) >= 1 << (PRIME_BITS - 2):
-        return 0.0  # no bound: too many points may be roots, or have no value
+        return 0.0  # no bound: too many points may be roots or poles
     primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
     bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / PRIME_BITS)) - primes_log2)
     scale = 2.0**PRIME_BITS
-    # The factor 2 is for the condition that all denominators are defined and not zero at the point: that holds with
-    # probability at least 1/2, since their degree is below 2^60 and their coefficients fit into a computer's memory.
+    # The factor 2 accounts for the condition that no denominator vanishes at the point: it holds with probability at
+    # least 1/2, since their degree is below 2^60 and their coefficients fit into a computer's memory.
     return math.log2(2 * (bad_primes + equation.degree / scale))
 
 
 def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, ...]]:
-    """Rational points of slowly growing height: integers first, then small fractions."""
+    """Return random rational points of slowly growing height: first integers, then small fractions."""
     points = []
     for k in range(count):
         height = 1 + k // 10
-        below = 1 if k < count // 2 else 1 + k % 7
-        points.append(tuple(fmpq(rng.randint(-height, height), rng.randint(1, below)) for _ in range(dim)))
+        denominator = 1 if k < count // 2 else 1 + k % 7
+        points.append(tuple(fmpq(rng.randint(-height, height), rng.randint(1, denominator)) for _ in range(dim)))
     return points
 
 
 def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
-    """The refutation by a rational point at which the sides differ: a small one if possible; None where none shows."""
+    """Refute an identity by a rational point, a small one if possible; return None if no point is found."""
     rng = random.Random(f"witness {identity.seed(seed)}")
     points = small_points(identity.dim, rng, _WITNESS_TRIES)
     points += [tuple(fmpq(rng.getrandbits(_HIGH_BITS)) for _ in range(identity.dim)) for _ in range(_HIGH_TRIES)]
@@ -282,8 +281,8 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
     for k, candidate in enumerate(points):
         at_eps = ground.convert(identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5))
         point = tuple(ground.convert(entry) for entry in candidate)
-        found = identity.at(ground, point, at_eps)
-        witness = witness_of(identity, ground, point, at_eps, found) if found is not None else None
+        sides = identity.at(ground, point, at_eps)
+        witness = witness_of(identity, ground, point, at_eps, sides) if sides is not None else None
         if witness is not None:
             height = max(max(abs(int(entry.p)), int(entry.q)) for entry in candidate)
             where = f"fails at a rational point of height at most {height}, exactly"
@@ -292,7 +291,7 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
 
 
 def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: Any, sides: Sides) -> Witness | None:
-    """The two sides at a point as a witness; None where they are equal."""
+    """Return the two sides at a point as a witness; None if they are equal."""
     left, right = sides
     if _equal(field, sides):
         return None

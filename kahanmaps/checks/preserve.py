@@ -1,4 +1,4 @@
-"""Invariant measures and Poisson structures of Kahan maps."""
+"""The checks of invariant measures and Poisson structures."""
 
 from __future__ import annotations
 
@@ -33,47 +33,47 @@ from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_NO_TENSOR = "the map seems to have no value, or the tensor or a denominator to vanish identically"
+_NO_TENSOR = "the map seems to be defined nowhere, or the tensor or a denominator to vanish identically"
 
 
 def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction, eps: fmpq | None) -> Identity:
-    """phi(x~) det M(x) = phi(x) det N(x, x~): the measure dx/phi is invariant; dPhi(x) is M^{-1} N.
+    """Return the identity phi(x~) det M(x) = phi(x) det N(x, x~), which says that the measure dx/phi is invariant.
 
-    A system stands for its Kahan map, with M = I - eps f'(x) and N = I + eps f'(x~).
+    Here dPhi(x) = M^{-1} N. A system stands for its Kahan map, with M = I - eps f'(x) and N = I + eps f'(x~).
     """
     map_ = as_map(system)
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
         kahan = map_.at(eps_value, field)
         image = _image(kahan, point)
-        after, before = density.value(field, eps_value, image), density.value(field, eps_value, point)
-        if after is None or before is None:
+        density_after, density_before = density.value(field, eps_value, image), density.value(field, eps_value, point)
+        if density_after is None or density_before is None:
             return None
-        above, below = jacobian_determinant_sides(kahan, point, image)
-        if field.is_zero(above) or field.is_zero(below):
-            return None  # where the map has no inverse both sides may vanish, and say nothing of a measure
-        return [after * below], [before * above]
+        numerator, denominator = jacobian_determinant_sides(kahan, point, image)
+        if field.is_zero(numerator) or field.is_zero(denominator):
+            return None  # if the map has no inverse, both sides may vanish, which says nothing about a measure
+        return [density_after * denominator], [density_before * numerator]
 
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
     if not isinstance(map_, KahanFamily):
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
     subject = (map_.subject, density.subject)
-    no_value = "the map seems to have no inverse, or no value, or a denominator to vanish identically"
+    no_value = "the map seems to have no inverse, to be defined nowhere, or a denominator to vanish identically"
     return Identity(
         map_.dim, sides, eps, *labels, no_value=no_value, has_eps=map_.has_eps, root=map_.root, subject=subject
     )
 
 
 def _image(kahan: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
-    """x~, put into the defining equation.
+    """Return x~, after a test that it satisfies the defining equation.
 
-    The formula for dPhi that both laws use comes from this equation; the laws themselves would not notice a wrong
-    x~: for phi = det(I - eps f') of a Hamiltonian f, and for Pi of the family, they hold at any two points x and x~.
+    The formula for dPhi follows from this equation. A wrong x~ would not be noticed otherwise: the laws hold at any two
+    points x and x~ for phi = det(I - eps f') with Hamiltonian f, and for Pi of the family.
     """
     image = kahan.step(point)
     field = kahan.field
     if not isinstance(kahan, KahanMap) or (field is not QQ and not field.characteristic):
-        return image  # expanding it would cost much and add nothing to what points have shown
+        return image  # no test over other fields: the equation was tested at points, and expanding it takes long
     factor = field.convert(2) * kahan.eps
     means = kahan.local.polarised(point, image)
     for x, after, mean in zip(point, image, means, strict=True):
@@ -91,11 +91,21 @@ def check_measure(
     eps: Any = None,
     time_step: Any = None,
 ) -> Report:
-    """Is dx/phi invariant for phi = `extra`; without it, for det(I - eps f') of Hamiltonian systems and the [density]?
+    """Check whether the measure dx/phi is invariant.
 
-    `extra` is a function, text or an expression of SymPy, in the place of the settings if there are none. It comes
-    first in the report, and alone unless the others are requested by `known`. Raises InputError where no density is
-    known or claimed.
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
+        extra: phi, as a function, text or SymPy expression. By default det(I - eps f') for Hamiltonian systems, and the
+            [density] of the file.
+        known: check those densities in addition to `extra`.
+        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+
+    Returns:
+        The report.
+
+    Raises:
+        InputError: if no density is known or claimed.
 
     >>> from kahanmaps.documents.inline import System
     >>> str(check_measure(System("x' = x*(1 - y); y' = y*(x - 2)"), "x*y").verdict)
@@ -143,14 +153,14 @@ def check_measure(
 
 
 def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | None) -> Identity:
-    """dPhi P(x) dPhi^T = P(x~), multiplied out."""
+    """Return the identity dPhi P(x) dPhi^T = P(x~), with denominators cleared."""
     n = map_.dim
 
-    def sides(field: Field, place: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        point, values = place[:n], place[n:]
+    def sides(field: Field, point_and_values: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        point, values = point_and_values[:n], point_and_values[n:]
         local = map_.at(eps_value, field, values)
-        found = transformation_sides(local, tensor, point, _image(local, point), values)
-        return None if found is None else (found[0].entries(), found[1].entries())
+        sides_at_point = transformation_sides(local, tensor, point, _image(local, point), values)
+        return None if sides_at_point is None else (sides_at_point[0].entries(), sides_at_point[1].entries())
 
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
     labels = ("N(x, x~) P(x) N(x, x~)^T", "M(x) P(x~) M(x)^T")
@@ -163,7 +173,7 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
 
 
 def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
-    """The Jacobi identity of a tensor for all triples of coordinates."""
+    """Return the Jacobi identity of a tensor for all triples of coordinates."""
     n = tensor.dim
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
@@ -186,11 +196,20 @@ def check_poisson(
     eps: Any = None,
     time_step: Any = None,
 ) -> Report:
-    """Is `extra`, or without it Pi(x) = J - eps^2 f'(x)^2 J, a Poisson tensor that the map preserves?
+    """Check whether a tensor is a Poisson tensor that the map preserves.
 
-    `extra` is a tensor or a matrix of formulas, in the place of the settings if there are none. Raises InputError for
-    systems without a Hamiltonian where no tensor is given, for a tensor of another dimension, and for one that is
-    identically zero at the parameters and the eps in force.
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
+        extra: the tensor, or a matrix of formulas. By default Pi(x) = J - eps^2 f'(x)^2 J, for Hamiltonian systems.
+        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+
+    Returns:
+        The report: the transformation law and the Jacobi identity.
+
+    Raises:
+        InputError: if no tensor is given for a system without a Hamiltonian, and for a tensor that has another
+            dimension or is identically zero.
     """
     file = as_file(system)
     settings, extra = settings_and_claim(settings, extra, eps, time_step)
@@ -228,7 +247,7 @@ def check_poisson(
     )
     jacobi = certify(
         f"{name} is a Poisson tensor{where}",
-        jacobi_identity(tensor, settings.eps),  # of x alone: an orbit would add nothing
+        jacobi_identity(tensor, settings.eps),  # contains only x, so an orbit would add nothing
         settings,
         proof,
         formula=f"sum_l {name}_il d_l {name}_jk + cyclic = 0",

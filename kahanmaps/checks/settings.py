@@ -1,4 +1,4 @@
-"""What a check is run with, and the part of a report that lets anyone run it again."""
+"""The settings of a check, the exact orbit on which claims are tried, and the data to reproduce a report."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
 
 @dataclass(frozen=True)
 class Settings:
-    """How to check: at one `eps` or (None) for every eps; `steps` of an exact orbit from `start` (None: a random one).
+    """The settings of a check.
 
-    `eps` and the coordinates of `start` may be given as any exact number: 1, Fraction(1, 10), "1/10"; coordinates also
-    as elements of one number field.
-    `max_digits` (None: by dimension). `orbit_is_asked` says that the user gave the start or the number of steps, so
-    that an orbit cut short is to be told.
+    `eps` is half the time step, None for every eps. Claims are also tried along `steps` steps of an exact orbit from
+    the initial point `start` (None: a random one), within `max_digits` digits (None: by dimension). `eps` and the
+    coordinates may be any exact numbers: 1, Fraction(1, 10), "1/10"; coordinates also elements of one number field.
+    `orbit_is_asked` is true if the user gave the initial point or the number of steps: then the report must say whether
+    the orbit was completed.
     """
 
     eps: fmpq | None = None
@@ -67,16 +68,16 @@ class Settings:
 
     @classmethod
     def of(cls, settings: Settings | None, eps: Any, time_step: Any) -> Settings:
-        """The settings, or the defaults, at an eps or time step if one is given."""
+        """Return the settings (default: the default settings), with eps or the time step replaced if given."""
         settings, eps = settings or cls(), resolve_eps(eps, time_step)
         return settings if eps is None else replace(settings, eps=eps)
 
     def cut_short(self, run: OrbitRun) -> bool:
-        """Whether an orbit that the user asked for ended early."""
+        """Return whether an orbit that the user requested ended early."""
         return self.orbit_is_asked and not run.end.is_whole
 
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
-        """What is needed to redo the check, as plain data: the systems themselves among it."""
+        """Return the data needed to reproduce the check, including the systems."""
         return {
             "version": __version__,
             "system": files[0].name,
@@ -93,7 +94,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class OrbitRun:
-    """An exact orbit on which identities are tried: its points, how it ended, where it started."""
+    """An exact orbit along which identities are tried."""
 
     start: tuple[Any, ...]
     points: tuple[tuple[Any, ...], ...]
@@ -111,9 +112,9 @@ class OrbitRun:
 
 
 def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
-    """Small rational points, one after the other, the same ones for the same seed.
+    """Yield random small rational points, determined by the seed.
 
-    No coordinate is 0: many systems leave x_i = 0 invariant, where a claim may hold for no good reason.
+    No coordinate is 0: many systems leave x_i = 0 invariant, and a claim may hold there although it is false.
 
     >>> next(random_starts(2, seed=0))
     (1, -2/3)
@@ -129,18 +130,18 @@ def run_orbit(
     subject: Sequence[Any] = (),
     is_integrable: bool = False,
 ) -> OrbitRun:
-    """The exact orbit of the given start, or of random small rational starts until one has no singular point.
+    """Compute the exact orbit of the given initial point, or of random ones until an orbit has no singular point.
 
-    A claim for every eps is tried at one that is drawn. Everything drawn follows the system and the `subject`, what
-    is claimed of it: no claim can be written for an orbit that is known in advance.
+    A claim for every eps is tried at a random eps. Random choices depend on the system and on the claim (`subject`), so
+    no claim can be constructed for an orbit that is known in advance.
     """
     seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, subject)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
     of_field = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
     kahan = as_map(system).at(eps, of_field[0] if of_field else QQ)
-    # A claim that takes two more steps of a map without a normal form multiplies the digits by dim^2, and elimination
-    # by dim once more; for the family numbers hardly grow from one step to the next.
+    # Without a normal form, a claim that contains two more steps multiplies the number of digits by dim^2, and the
+    # elimination by dim again; for members of the family it hardly grows from step to step.
     by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
     max_digits = by_dimension if settings.max_digits is None else settings.max_digits
     draws = random_starts(kahan.dim, seed)
@@ -154,7 +155,7 @@ def run_orbit(
             points.append(point.x)
         end = orbit.end
         if end is None:  # the loop above runs to its end, and then the orbit has one
-            raise AssertionError("an orbit ended without saying how")
+            raise AssertionError("an orbit ended without a status")
         attempt += 1
         if end.status != "singular" or settings.start is not None or attempt >= 20:
             return OrbitRun(orbit.start, tuple(points), eps, end)
@@ -191,25 +192,24 @@ def _orbit_data(run: OrbitRun, tried: int, poles: int) -> Mapping[str, Any]:
     return {"points": tried, "undefined_at": poles, "eps": format_number(run.eps)}
 
 
-# ---- claims as they are written: formulas as text or of SymPy ------------------------------------------------------
+# ---- claims as the user writes them: formulas as text or SymPy expressions ----------------------------------------
 
 
 def settings_and_claim(
     settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None
 ) -> tuple[Settings, Any]:
-    """The two in this order, at an eps or time step if one is given: a claim may stand in the place of the settings."""
+    """Return (settings, claim), also if the claim was given in place of the settings; replace eps if given."""
     if settings is None or isinstance(settings, Settings):
         return Settings.of(settings, eps, time_step), extra
     if extra is not None:
-        raise InputError(f"found claims as second and as third argument, expected Settings, not {settings!r}")
+        raise InputError(f"expected Settings as second argument, since the third is a claim; got {settings!r}")
     return Settings.of(None, eps, time_step), settings
 
 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
-    """A formula in the variables of a file, its parameters and eps, as a function of the variables and eps.
+    """Convert a claim to a function of the variables of a file and eps (and iterates, if it contains x~).
 
-    With x~ in it, it is one of the variables, their iterates and eps. The name of an integral of the file stands for
-    it.
+    The claim is a function, a formula in the variables, parameters and eps, or the name of an integral of the file.
     """
     if isinstance(claim, RationalFunction):
         return claim
@@ -220,7 +220,7 @@ def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
 
 
 def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFunction]:
-    """Formulas by name; those of a list, and a single one, are called I1, I2, ..., as far as these names are free."""
+    """Convert claims to functions by name; claims without a name are called I1, I2, ..., skipping names in use."""
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):
@@ -229,12 +229,14 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
         free = (f"I{k}" for k in count(1) if f"I{k}" not in of_file)
         claims = {c if isinstance(c, str) and c in of_file else next(free): c for c in unnamed}
     if not claims:
-        raise InputError("found no integral, expected at least one, or None for those of theorems and of the file")
+        raise InputError(
+            "found no integral, expected at least one, or None for the known integrals and those of the file"
+        )
     return {name: claimed_function(file, claim) for name, claim in claims.items()}
 
 
 def claimed_tensor(file: SystemFile, claim: Any) -> MatrixPoissonTensor | None:
-    """A matrix of formulas as a tensor. Raises InputError for what is none, and for one that is not skew."""
+    """Convert a matrix of formulas to a tensor. Raises InputError if it is not a skew-symmetric matrix."""
     if claim is None or isinstance(claim, MatrixPoissonTensor):
         return claim
     rows = claim.tolist() if hasattr(claim, "tolist") else claim

@@ -1,7 +1,7 @@
-"""All checks: what each asks, of what, and where the function is that answers.
+"""The table of all checks: the question, the options and the function of each.
 
-The commands check-..., the tasks of batches, the pages of reports and the schemas follow this table. It loads nothing
-before a check is run.
+The commands check-..., the tasks of experiments, the pages of reports and the schemas are derived from this table. The
+functions are imported only when a check is run.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ClaimOption:
-    """The option of a command that takes a claim; `read` makes of its text what the check takes as `extra`.
+    """The command-line option for a claim; `read` converts its text to the argument `extra` of the check.
 
-    With `many` it may be given several times, as EXPR or NAME=EXPR, and the check takes texts by name; the word known
-    stands for what is checked without the option.
+    If `many`, it may be repeated, as EXPR or NAME=EXPR, and the check takes texts by name; the word "known" stands for
+    the claims that are checked without the option.
     """
 
     flag: str
@@ -33,10 +33,10 @@ class ClaimOption:
 
 @dataclass(frozen=True)
 class Check:
-    """One check. `question` is asked in lists, `headline` and `text` in the help of its command.
+    """A check. `question` appears in lists, `headline` and `text` in the help of its command.
 
-    `function` is "module:name", of a function (file, settings, extra) that returns a Report; where the question is of a
-    pair of systems, (file, other, settings, eps2). `examples` are command lines without "kahanmaps check-NAME".
+    `function` is "module:name" of a function (file, settings, extra) that returns a Report; for a check of a pair of
+    systems (file, other, settings, eps2). `examples` are command lines without "kahanmaps check-NAME".
     """
 
     name: str
@@ -48,7 +48,7 @@ class Check:
     outcome: str
     claim: ClaimOption | None = None
     is_of_pair: bool = False
-    for_batch: str = ""  # the question as batches ask it, where no claim can be given
+    for_batch: str = ""  # the question in experiments, where no claim can be given
 
     @property
     def command(self) -> str:
@@ -56,7 +56,7 @@ class Check:
         return f"check-{self.name}"
 
     def __call__(self, *arguments: Any, **options: Any) -> Report:
-        """The report. Raises InputError where the check does not apply."""
+        """Run the check and return its report. Raises InputError if it does not apply."""
         module, _, name = self.function.partition(":")
         report: Report = getattr(import_module(module), name)(*arguments, **options)
         return report
@@ -82,14 +82,14 @@ _CHECKS = [
             "paper_m2 --json | jq .verdict",
         ),
         """
-        Without --eps the question is asked for every eps.
+        Without --eps the maps are compared for every eps.
 
-        For one SYSTEM of kind [family] the maps of H_0 and H_1, grad H_1 = A grad H_0, come along as a control: they
-        are expected NOT to commute, and this does not change the exit status.
+        For a single SYSTEM of kind [family], the maps of H_0 and H_1 with grad H_1 = A grad H_0 serve as a control:
+        they are expected NOT to commute, and this does not affect the exit status.
 
         SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p
-        sets a parameter of both, or of the one that has it. An inline system (--rhs) and a SYSTEM are f and g in the
-        order in which they stand.
+        sets a parameter of both systems, or of the one that has it. An inline system (--rhs) and a SYSTEM are f and g
+        in the order in which they are typed.
         """,
         "they commute",
         is_of_pair=True,
@@ -107,17 +107,18 @@ _CHECKS = [
             "--vars x,y --rhs y --rhs=-x --integral x^2+y^2",
         ),
         """
-        Without --eps the question is asked for every eps.
+        Without --eps the integrals are checked for every eps.
 
-        Known ones: the modified Hamiltonian of Hamiltonian systems, in both normalisations of the paper, and for
-        members of the family the K~ of all rational associated systems. Claimed ones: the [integrals] of the file.
-        With --integral those given are checked instead; --integral known adds the others.
+        Known integrals are the modified Hamiltonian of Hamiltonian systems, in both normalizations of the paper, and
+        for members of the family the K~ of all rational associated systems. Claimed integrals are the [integrals] of
+        the file. With --integral only the given ones are checked; --integral known adds the others.
         """,
         "conserved",
         ClaimOption(
             "--integral",
             "[NAME=]EXPR",
-            "A claimed integral: a rational function of x, its images x~, x~~ and eps; one of the file by name; known.",
+            "An integral to check: a rational function of x, its images x~, x~~ and eps; the name of one of the file; "
+            "or known.",
             many=True,
         ),
     ),
@@ -128,8 +129,8 @@ _CHECKS = [
         "Is the measure dx/phi invariant under the map of SYSTEM?",
         ("paper_m3", "lotka_volterra --eps 1/10", "--vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\\n--density x*y"),
         """
-        Without --eps the question is asked for every eps. For Hamiltonian systems phi = det(I - eps f'(x)), and the
-        [density] of the file; with --density that one instead.
+        Without --eps the measure is checked for every eps. By default phi is det(I - eps f'(x)) for Hamiltonian
+        systems, and the [density] of the file; --density gives another phi instead.
         """,
         "invariant",
         ClaimOption("--density", "EXPR", "A claimed density phi: a rational function of the variables and eps."),
@@ -141,8 +142,8 @@ _CHECKS = [
         "Is Pi(x) = J - eps^2 f'(x)^2 J, or the tensor P of a file, a Poisson tensor that the map of SYSTEM preserves?",
         ("paper_m3", "henon_heiles    # Hamiltonian, and it fails", "lotka_volterra --tensor p.toml"),
         """
-        Both the transformation law dPhi P(x) dPhi^T = P(x~) and the Jacobi identity are put to the test. Without --eps
-        the question is asked for every eps. Without --tensor P is Pi, for Hamiltonian systems.
+        The transformation law dPhi P(x) dPhi^T = P(x~) and the Jacobi identity are both checked. Without --eps they are
+        checked for every eps. Without --tensor P is Pi, for Hamiltonian systems.
         """,
         "it is",
         ClaimOption(

@@ -38,7 +38,7 @@ def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence |
 
 
 def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> list[tuple[str, bool]]:
-    """What makes `associate` an associated system of f_0 = J grad H, each verified here and now."""
+    """Return the verified conditions under which `associate` is an associated system of f_0 = J grad H."""
     at_A = evaluate_at_matrix(fmpq_poly(list(associate.coefficients)), member.A)
     return [
         (f"B_{associate.label} is a polynomial in A", bool(at_A == associate.B)),
@@ -60,7 +60,7 @@ def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
 
 
 def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
-    """What makes (A, H) a member of the family."""
+    """Return the verified conditions under which (A, H) is a member of the family."""
     return [
         ("A^T J = J A", not defects(member.A)),
         ("H is a homogeneous cubic with A Hess(H) = Hess(H) A^T", belongs(member.A, member.H)),

@@ -1,1 +1,1 @@
-"""Systems in text: files in TOML, what they claim, the catalogue."""
+"""System files in TOML, their claims, and the catalogue of named systems."""

@@ -1,6 +1,6 @@
-"""The contents of a system file: a document of plain data becomes systems, members and claims, or a list of mistakes.
+"""Reading a system file: a document of plain data becomes systems, members and claims, or a list of mistakes.
 
-Every part is read as far as it can be, so that all mistakes of a file are told at once, each with its key.
+Every part is read as far as possible, so that all mistakes of a file are reported together, each with its key.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _LONGEST_NAME = 1000
-_MOST_FACTORS = 64  # of a composition, those of its parts counted too
+_MAX_FACTORS = 64  # of a composition, those of its parts counted too
 _STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where a rational one shows mistakes as well
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
-    """The Kahan map of right-hand sides in the variables, symbols, then eps, which may not occur."""
+    """Return the Kahan map of right-hand sides in the variables, symbols and eps (which must not occur)."""
     symbols = names_of(rhs[0])[len(rhs) :]
     if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
         return KahanFamily(QuadraticSystem(tuple(rhs), symbols))
@@ -70,10 +70,10 @@ class _Part(NamedTuple):
 
 
 class DocumentReader(PartReader):
-    """One pass over a document: every part is read as far as it can be, mistakes are collected."""
+    """Reads a document in one pass: every part as far as possible, collecting mistakes."""
 
     def read(self) -> dict[str, Any]:
-        """The fields of a `SystemFile`. Raises SystemFileError with every mistake of the document."""
+        """Return the fields of a `SystemFile`. Raises SystemFileError with all mistakes of the document."""
         try:
             self.document, notes = without_left_sides(self.document)
         except InputError as error:
@@ -81,10 +81,10 @@ class DocumentReader(PartReader):
         self._unknown_keys("", self.document)
         kinds = [kind for kind in KINDS if kind in self.document]
         if len(kinds) != 1:
-            found = ", ".join(f"[{kind}]" for kind in kinds) or "none"
+            sections = ", ".join(f"[{kind}]" for kind in kinds) or "none"
             self._mistake(
                 "file",
-                f"found {found} of the sections {', '.join(f'[{kind}]' for kind in KINDS)}, expected exactly one",
+                f"found {sections} of the sections {', '.join(f'[{kind}]' for kind in KINDS)}, expected exactly one",
             )
         self._read_parameters()
         stem = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
@@ -141,7 +141,7 @@ class DocumentReader(PartReader):
     def _read_section(
         self, kind: str, section: Mapping[str, Any] | None
     ) -> tuple[MapFamily | None, CubicHamiltonian | None, FamilyMember | None]:
-        """What the section says that the document is of; of a mistake nothing."""
+        """Read the section that determines the kind of the document; return an empty result for a mistake."""
         if section is None:
             return None, None, None
         map_, hamiltonian, member = None, None, None
@@ -171,8 +171,8 @@ class DocumentReader(PartReader):
                 def at_number(value: fmpq) -> MapFamily:  # for floats
                     overrides = {**self.overrides, parameter: value}
                     reader = DocumentReader(self.document, self.where, overrides, self.other)
-                    found: MapFamily = reader.read()["map"]
-                    return found
+                    parsed_map: MapFamily = reader.read()["map"]
+                    return parsed_map
 
                 map_ = AlgebraicMap(map_, root, at_number)
             self.variables = map_.variables  # a polarised map has more of them
@@ -181,7 +181,7 @@ class DocumentReader(PartReader):
         return map_, hamiltonian, member
 
     def read_map(self, kind: str, symbols: Sequence[str]) -> MapFamily:
-        """The map of a section with these parameters as symbols. Raises InputError for a [family]."""
+        """Return the map of the document with these parameters as symbols. Raises InputError for a [family]."""
         if kind == "family":
             raise InputError(
                 f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
@@ -240,13 +240,13 @@ class DocumentReader(PartReader):
         declared = self.document.get("parameters", {})
         for name in self.overrides:
             if not isinstance(declared, dict) or name not in declared:
-                known = ", ".join(self.parameters) or "none"
+                known_names = ", ".join(self.parameters) or "none"
                 hint = suggestion(name, list(self.parameters))
-                self._mistake("parameters", f"unknown parameter {quoted(name)}, this system has: {known}{hint}")
+                self._mistake("parameters", f"unknown parameter {quoted(name)}, this system has: {known_names}{hint}")
 
     def _read_variables(self, kind: str) -> None:
-        given = self.document.get("variables")
-        if given is None:
+        names = self.document.get("variables")
+        if names is None:
             if kind == "family":
                 A = (self._table("family") or {}).get("A")
                 if isinstance(A, list) and 0 < len(A) <= MAX_DIMENSION:
@@ -256,49 +256,49 @@ class DocumentReader(PartReader):
             elif kind != "composition":  # which has those of its first map
                 self._mistake("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
             return
-        if not isinstance(given, list) or not given or not all(isinstance(name, str) for name in given):
-            self._mistake("variables", f'found {show(given)}, expected a list of names, e.g. ["x", "y"]')
+        if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+            self._mistake("variables", f'found {show(names)}, expected a list of names, e.g. ["x", "y"]')
             return
-        if len(given) > MAX_DIMENSION:
-            self._mistake("variables", f"found {len(given)} variables, expected at most {MAX_DIMENSION}")
+        if len(names) > MAX_DIMENSION:
+            self._mistake("variables", f"found {len(names)} variables, expected at most {MAX_DIMENSION}")
             return
         try:
-            check_names(given)
+            check_names(names)
         except InputError as error:
             self._mistake("variables", str(error))
             return
-        clash = [name for name in given if name in self.parameters]
-        if "eps" in given:
+        clash = [name for name in names if name in self.parameters]
+        if "eps" in names:
             self._mistake(
                 "variables", "eps is half the time step of the map and cannot be a variable: rename it, to epsilon, say"
             )
         elif clash:
             self._mistake("variables", f"{quoted(clash[0])} is a parameter as well, expected distinct names")
         else:
-            self.variables = tuple(given)
+            self.variables = tuple(names)
 
     def _read_system(self, section: Mapping[str, Any]) -> MapFamily | None:
         method = section.get("discretization", "kahan")
         method = "polarised" if method == "polarized" else method
         if method not in _DISCRETIZATIONS:
-            words = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
-            return self._refused("system.discretization", f"found {show(method)}, expected one of {words}")
+            allowed = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
+            return self._refused("system.discretization", f"found {show(method)}, expected one of {allowed}")
         make, usual, largest = _DISCRETIZATIONS[method]
         degree = section.get("degree", usual)
         if type(degree) is not int or not 2 <= degree <= largest:
             return self._refused("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
-        given = self._required("system", section, "rhs")
-        known = self._each("system.rhs", given, lambda path, value: self._polynomial(path, value, degree))
-        rhs = self._list("system", "rhs", given, "right-hand side")
-        if rhs is None or known is None or self.variables is None or self.unsure:
+        formulas = self._required("system", section, "rhs")
+        right_sides = self._each("system.rhs", formulas, lambda path, value: self._polynomial(path, value, degree))
+        rhs = self._list("system", "rhs", formulas, "right-hand side")
+        if rhs is None or right_sides is None or self.variables is None or self.unsure:
             return None
-        return self._made("system.rhs", make, known, degree)
+        return self._made("system.rhs", make, right_sides, degree)
 
     def _read_bilinear(self, section: Mapping[str, Any]) -> MapFamily | None:
         new = section.get("new", [name.upper() for name in self.variables or ()])
         new = self._list("bilinear", "new", new, "name")
-        given = self._list("bilinear", "equations", self._required("bilinear", section, "equations"), "equation")
-        if new is None or given is None or self.variables is None:
+        formulas = self._list("bilinear", "equations", self._required("bilinear", section, "equations"), "equation")
+        if new is None or formulas is None or self.variables is None:
             return None
         try:
             check_names(new)
@@ -311,13 +311,13 @@ class DocumentReader(PartReader):
             sides = (self._text(path, value) or "").split("=")
             if len(sides) != 2:
                 return self._refused(path, f'found {show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
-            left, right = (self._polynomial(path, side, 1, new) for side in sides)
-            return None if left is None or right is None else left - right
+            old_side, new_side = (self._polynomial(path, side, 1, new) for side in sides)
+            return None if old_side is None or new_side is None else old_side - new_side
 
-        found = self._each("bilinear.equations", given, equation)
-        if found is None or self.unsure:
+        polynomials = self._each("bilinear.equations", formulas, equation)
+        if polynomials is None or self.unsure:
             return None
-        return self._sound(bilinear_map, "bilinear", self.variables, found)
+        return self._sound(bilinear_map, "bilinear", self.variables, polynomials)
 
     def _read_map(self, section: Mapping[str, Any]) -> MapFamily | None:
         self._required("map", section, "image")
@@ -329,9 +329,9 @@ class DocumentReader(PartReader):
             return None
         return self._sound(explicit_map, "map", self.variables, image, inverse)
 
-    def _sound(self, make: Callable[..., ImplicitMap], path: str, *given: Any) -> ImplicitMap | None:
-        """The map made of what is given, if it has values, and an inverse where one is given."""
-        map_ = self._made(path, make, *given)
+    def _sound(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
+        """Return the map if it is defined and dominant, and a given inverse is right; otherwise note a mistake."""
+        map_ = self._made(path, make, *arguments)
         if map_ is None:
             return None
         if reason := why_no_map(map_, None if self.root is None else self.root[1]):
@@ -341,17 +341,17 @@ class DocumentReader(PartReader):
     def _read_hamiltonian(self, section: Mapping[str, Any]) -> CubicHamiltonian | None:
         value = self._required("hamiltonian", section, "H")
         H = self._polynomial("hamiltonian.H", value, 3, of_map=False) if value is not None else None
-        given = self._required("hamiltonian", section, "J")
-        if given is None:
+        matrix = self._required("hamiltonian", section, "J")
+        if matrix is None:
             return None
         n = len(self.variables) if self.variables is not None else None
         J: fmpq_mat | None = None
-        if given == "standard":
+        if matrix == "standard":
             J = None if n is None else self._made("hamiltonian.J", standard_structure, n)
-        elif isinstance(given, str):
-            self._mistake("hamiltonian.J", f'found {show(given)}, expected "standard" or a skew matrix')
+        elif isinstance(matrix, str):
+            self._mistake("hamiltonian.J", f'found {show(matrix)}, expected "standard" or a skew matrix')
         else:
-            J = self._matrix("hamiltonian.J", given, n)
+            J = self._matrix("hamiltonian.J", matrix, n)
         if J is None or self.variables is None or self.unsure:
             return None
         zero = parse_polynomial("0", self.variables)
@@ -359,12 +359,12 @@ class DocumentReader(PartReader):
         return None if H is None else hamiltonian
 
     def _read_field(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """The Kahan map of J grad H, where both may contain symbols."""
+        """Return the Kahan map of J grad H, where both may contain symbols."""
         H, n = self._polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
-        given = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
+        matrix = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
         J = [
             [self._polynomial(f"hamiltonian.J[{i + 1}][{j + 1}]", str(e), 0) for j, e in enumerate(row)]
-            for i, row in enumerate(given)
+            for i, row in enumerate(matrix)
         ]
         if H is None or self.mistakes:
             return None
@@ -375,9 +375,9 @@ class DocumentReader(PartReader):
         return _kahan(rhs, 2)
 
     def _read_member(self, section: Mapping[str, Any]) -> FamilyMember | None:
-        given, value = self._required("family", section, "A"), self._required("family", section, "H")
+        matrix, value = self._required("family", section, "A"), self._required("family", section, "H")
         size = len(self.variables) if self.variables is not None else None
-        A = self._matrix("family.A", given, size) if given is not None else None
+        A = self._matrix("family.A", matrix, size) if matrix is not None else None
         H = self._polynomial("family.H", value, 3, of_map=False) if value is not None else None
         signs = section.get("signs", [])
         signs_are_good = isinstance(signs, list) and all(type(sign) is int and sign in (1, -1) for sign in signs)
@@ -397,26 +397,26 @@ class DocumentReader(PartReader):
     # ---- [composition]: maps of other files, of the catalogue and in tables, one after the other ---------------------
 
     def _read_composition(self, section: Mapping[str, Any]) -> MapFamily | None:
-        """The composition; what its parts name is put in their places, so that the document says all by itself."""
-        given = self._required("composition", section, "of")
-        if not isinstance(given, list) or not given:
-            if given is not None:
-                self._mistake("composition.of", f"found {show(given)}, expected {EXPECTED['composition', 'of']}")
+        """Read a composition; parts given by name are replaced by their contents, so the document is self-contained."""
+        entries = self._required("composition", section, "of")
+        if not isinstance(entries, list) or not entries:
+            if entries is not None:
+                self._mistake("composition.of", f"found {show(entries)}, expected {EXPECTED['composition', 'of']}")
             return None
-        known = self._each("composition.of", given, self._part)
-        if known is None or self.unsure:
+        factors = self._each("composition.of", entries, self._part)
+        if factors is None or self.unsure:
             return None
-        if sum(abs(part.power) for part in known) > _MOST_FACTORS:
-            return self._refused("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
-        self.document = {**self.document, "composition": {"of": [part.plain for part in known]}}
-        values = [part.values for part in known]
+        if sum(abs(part.power) for part in factors) > _MAX_FACTORS:
+            return self._refused("composition.of", f"found more than {_MAX_FACTORS} steps, expected at most so many")
+        self.document = {**self.document, "composition": {"of": [part.plain for part in factors]}}
+        values = [part.values for part in factors]
         make = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
-        return self._made("composition.of", make, *((part.map, part.power) for part in known))
+        return self._made("composition.of", make, *((part.map, part.power) for part in factors))
 
     def _part(self, path: str, entry: Any) -> _Part | None:
         if not isinstance(entry, dict):
             return self._refused(path, f'found {show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
-        before = len(self.mistakes)
+        mistakes_before = len(self.mistakes)
         for key in entry:
             if key not in KEYS["composition.of"]:
                 expected = ", ".join(sorted(KEYS["composition.of"]))
@@ -434,7 +434,7 @@ class DocumentReader(PartReader):
             if not isinstance(entry.get(name, False), bool):
                 self._mistake(f"{path}.{name}", f"found {show(entry[name])}, expected true or false")
         numbers, values = self._part_parameters(path, entry)
-        if len(self.mistakes) > before:
+        if len(self.mistakes) > mistakes_before:
             return None
         try:
             reader = self._part_reader(key, entry[key], numbers, values)
@@ -449,48 +449,50 @@ class DocumentReader(PartReader):
                 f"{path}.involution", "found a map whose square is not the identity, expected an involution"
             )
         plain = {name: value for name, value in entry.items() if name not in named}
-        found = dict(reader.document)
+        document = dict(reader.document)
         if key != "map":
-            found.setdefault("parameters", {})  # so that, as a table, it knows no others
+            document.setdefault("parameters", {})  # so that, as a table, it knows no others
         elif "parameters" not in entry[key]:
-            del found["parameters"]
-        return _Part(map_, -power if inverse else power, values, {"map": json_like(found), **plain})
+            del document["parameters"]
+        return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **plain})
 
     def _part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
-        """The values of parameters of a part: numbers, and functions of the symbols."""
+        """Return the values of the parameters of a part: numbers, or functions of the symbols."""
         numbers: dict[str, fmpq] = {}
         values: Values = {}
-        given = entry.get("parameters", {})
-        if not isinstance(given, dict):
-            self._mistake(f"{path}.parameters", f"found {show(given)}, expected a table of numbers")
+        parameters = entry.get("parameters", {})
+        if not isinstance(parameters, dict):
+            self._mistake(f"{path}.parameters", f"found {show(parameters)}, expected a table of numbers")
             return numbers, values
         table = entry.get("map")
         if isinstance(table, dict) and "parameters" not in table:  # it knows those around it
             context = ring(self.symbols)
             for name, symbol in zip(self.symbols, context.gens(), strict=True):
                 values[name] = RationalFunction(symbol, context.constant(1))
-        for name, value in given.items():
+        for name, value in parameters.items():
             text = self._text(f"{path}.parameters.{name}", value)
             if text is None:
                 continue
-            place = f"{path}.parameters.{name}"
-            function = self._made(place, parse_rational_function, text, self.symbols, self.parameters)
+            entry_path = f"{path}.parameters.{name}"
+            function = self._made(entry_path, parse_rational_function, text, self.symbols, self.parameters)
             if function is None:
                 continue
             values.pop(name, None)
-            above, below = function.numerator, function.denominator
-            if above.is_constant() and below.is_constant():
-                numbers[name] = above.leading_coefficient() / below.leading_coefficient() if above else fmpq(0)
+            numerator, denominator = function.numerator, function.denominator
+            if numerator.is_constant() and denominator.is_constant():
+                numbers[name] = (
+                    numerator.leading_coefficient() / denominator.leading_coefficient() if numerator else fmpq(0)
+                )
             else:
                 values[name] = function
         return numbers, values
 
     def _part_reader(self, key: str, value: Any, numbers: Mapping[str, fmpq], values: Values) -> Self:
-        """What reads a part of a composition."""
+        """Return the reader for a part of a composition."""
         self.parts[0] += 1
-        if self.parts[0] > _MOST_FACTORS:
-            raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected at most so many")
-        name, place, other = "map", "", self.other
+        if self.parts[0] > _MAX_FACTORS:
+            raise InputError(f"found more than {_MAX_FACTORS} maps in one composition, expected at most so many")
+        name, name_or_path, other = "map", "", self.other
         if key == "map":
             if not isinstance(value, dict):
                 raise InputError(f"found {show(value)}, expected a table like a system file")
@@ -503,10 +505,10 @@ class DocumentReader(PartReader):
             raise InputError(f"found {quoted(value)}, expected map = {{ ... }}: files are not looked up here")
         else:
             name = value
-            document, place, other = self.other(key, value)
-            if key == "file" and place in self.inside:
+            document, name_or_path, other = self.other(key, value)
+            if key == "file" and name_or_path in self.inside:
                 raise InputError(f"found {quoted(name)} as a part of itself")
         document = {part: data for part, data in document.items() if part not in ("catalog", "integrals", "density")}
         reader = type(self)(document, name, numbers, other)
-        reader.inside, reader.parts = (*self.inside, place), self.parts
+        reader.inside, reader.parts = (*self.inside, name_or_path), self.parts
         return reader

@@ -1,7 +1,7 @@
-"""Differential equations as people write and paste them, as the right-hand sides of a system file.
+"""Conversion of differential equations in common notations to the right-hand sides of a system file.
 
-A text is a list of equations with ; or , or ends of lines between them, perhaps in one pair of brackets. On the left
-stands a derivative, and on the right a formula, in which x(t) is x:
+A text is a list of equations separated by ; or , or line breaks, perhaps in one pair of brackets. The left side is a
+derivative, the right side a formula, in which x(t) means x:
 
     x'    dx/dt    x_dot    xdot    dxdt    x'[t]    dx(t)/dt    d^2x/dt^2    diff(x(t), t)    D[x[t], t]    x[0]'
 
@@ -25,7 +25,7 @@ _PRIMES = {"'": 1, "′": 1, "’": 1, "‘": 1, "´": 1, "`": 1, "\u0307": 1, "
 _TOKEN = re.compile(
     r"[A-Za-z_][A-Za-z_0-9]*|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|==|:=|\*\*|[ \t\r\f\v\xa0]+|.", re.DOTALL
 )
-_MOST_TOKENS = 16  # of a derivative other than by primes
+_MAX_TOKENS = 16  # of a derivative other than by primes
 _NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
 _CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
 # Derivatives, with blanks only between two words, and their order.
@@ -54,7 +54,7 @@ class _Derivative(NamedTuple):
 
 
 def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """The document with a list of right-hand sides, and variables, where its [system] has equations or one text.
+    """Replace equations in [system] by a list of right-hand sides and the variables.
 
     The order of the equations is that of the variables, where these are not given; velocities of equations of second
     order come last. Other documents come back equal. The notes say which names were made.
@@ -64,20 +64,22 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     ({'variables': ['x', 'y'], 'system': {'rhs': ['x*y', '-x']}}, [])
     """
     section = document.get("system")
-    given = section.get("rhs") if isinstance(section, dict) else None
-    texts = [given] if isinstance(given, str) else given
+    right_sides = section.get("rhs") if isinstance(section, dict) else None
+    texts = [right_sides] if isinstance(right_sides, str) else right_sides
     if not isinstance(texts, list) or not all(isinstance(text, str) for text in texts):
         return dict(document), []
     marks = "=;,[{" if len(texts) == 1 else "=;"  # [x*y, -x] is a list of formulas in one text
-    if isinstance(given, list) and not any(mark in text for text in texts for mark in marks):
+    if isinstance(right_sides, list) and not any(mark in text for text in texts for mark in marks):
         return dict(document), []
     pieces = pieces_of("\n".join(texts))
     notes: list[str] = []
     if any(token in piece for piece in pieces for token in _EQUALS):
         names, parameters = document.get("variables"), document.get("parameters")
-        given = [str(name) for name in names] if isinstance(names, list) else []
-        sides, velocities, notes = read_equations(pieces, given, parameters if isinstance(parameters, dict) else ())
-        variables = list(sides) if names is None else [*given, *(v for v in velocities if v not in given)]
+        right_sides = [str(name) for name in names] if isinstance(names, list) else []
+        sides, velocities, notes = read_equations(
+            pieces, right_sides, parameters if isinstance(parameters, dict) else ()
+        )
+        variables = list(sides) if names is None else [*right_sides, *(v for v in velocities if v not in right_sides)]
         if set(variables) != set(sides):
             raise InputError(f"found equations for {', '.join(sides)}, expected one for each of the variables")
         document = {"variables": variables, **document}
@@ -89,7 +91,7 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
 
 
 def tokens_of(text: str) -> list[str]:
-    """The tokens of a text, blanks among them. Raises InputError where it is too long."""
+    """Split a text into tokens, including blanks. Raises InputError if it is too long."""
     if len(text) > MAX_CHARACTERS:
         raise InputError(f"found equations of {len(text)} characters, expected at most {MAX_CHARACTERS}")
     decomposed = text if text.isascii() else unicodedata.normalize("NFD", text)
@@ -97,7 +99,7 @@ def tokens_of(text: str) -> list[str]:
 
 
 def pieces_of(text: str) -> list[list[str]]:
-    """The tokens of each equation, or formula, of a list. Raises InputError for brackets that do not balance."""
+    """Return the tokens of each equation or formula of a list. Raises InputError for unbalanced brackets."""
     tokens = _without_outer_brackets(_list_in(tokens_of(text)))
     pieces: list[list[str]] = [[]]
     depth = 0
@@ -117,32 +119,37 @@ def pieces_of(text: str) -> list[list[str]]:
 
 
 def _list_in(tokens: list[str]) -> list[str]:
-    """The tokens of a list without the name that it is given, eqs := [x' = y, y' = -x], and what ends it."""
-    words = [k for k, token in enumerate(tokens) if not token.isspace()]
-    while words and tokens[words[-1]] in (";", ":", ","):
-        words.pop()
-    if len(words) > 2 and is_name(tokens[words[0]]) and tokens[words[1]] in ("=", ":=") and tokens[words[2]] in "[{":
-        words = words[2:]
-    return tokens[words[0] : words[-1] + 1] if words else []
+    """Return the tokens of a list without its name and terminator, as in eqs := [x' = y, y' = -x]."""
+    positions = [k for k, token in enumerate(tokens) if not token.isspace()]
+    while positions and tokens[positions[-1]] in (";", ":", ","):
+        positions.pop()
+    if (
+        len(positions) > 2
+        and is_name(tokens[positions[0]])
+        and tokens[positions[1]] in ("=", ":=")
+        and tokens[positions[2]] in "[{"
+    ):
+        positions = positions[2:]
+    return tokens[positions[0] : positions[-1] + 1] if positions else []
 
 
 def _without_outer_brackets(tokens: list[str]) -> list[str]:
-    """The tokens between the brackets of a list, {x' = y, y' = -x}, where there is one around all of them."""
-    places = [k for k, token in enumerate(tokens) if not token.isspace()]
-    if len(places) < 2 or tokens[places[0]] not in _OPEN or tokens[places[-1]] not in _CLOSE:
+    """Return the tokens without outer brackets, as in {x' = y, y' = -x}."""
+    positions = [k for k, token in enumerate(tokens) if not token.isspace()]
+    if len(positions) < 2 or tokens[positions[0]] not in _OPEN or tokens[positions[-1]] not in _CLOSE:
         return tokens
     depth = 0
-    for k in places:
+    for k in positions:
         depth += (tokens[k] in _OPEN) - (tokens[k] in _CLOSE)
         if depth == 0:
-            return tokens[places[0] + 1 : places[-1]] if k == places[-1] else tokens
+            return tokens[positions[0] + 1 : positions[-1]] if k == positions[-1] else tokens
     return tokens
 
 
 def read_equations(
     pieces: Sequence[list[str]], variables: Sequence[str] = (), parameters: Collection[str] = ()
 ) -> tuple[dict[str, str], list[str], list[str]]:
-    """The right-hand sides of equations of first and second order, one for each variable.
+    """Read equations of first and second order, one for each variable.
 
     Args:
         pieces: the tokens of each equation.
@@ -159,22 +166,22 @@ def read_equations(
     pieces, notes = _with_plain_names(pieces, parameters)
     orders, formulas = dict[str, int](), dict[str, list[str]]()
     for piece in pieces:
-        places = [k for k, token in enumerate(piece) if token in _EQUALS]
-        left = [token for token in piece[: places[0]] if not token.isspace()] if places else []
-        found = derivative_at(left, 0)
-        if len(places) != 1 or found is None or found.end < len(left):
+        equals_at = [k for k, token in enumerate(piece) if token in _EQUALS]
+        left_side = [token for token in piece[: equals_at[0]] if not token.isspace()] if equals_at else []
+        derivative = derivative_at(left_side, 0)
+        if len(equals_at) != 1 or derivative is None or derivative.end < len(left_side):
             raise InputError(
-                f"found {quoted(_text(piece))}, expected an equation such as {_EXAMPLES}{_hint(left, piece)}"
+                f"found {quoted(_text(piece))}, expected an equation such as {_EXAMPLES}{_hint(left_side, piece)}"
             )
-        if found.order > 2:
+        if derivative.order > 2:
             text = quoted(_text(piece))
             raise InputError(
-                f"found {text}, of order {found.order}, expected order 1 or 2: name the derivatives, "
-                f"{found.name}' = u; u' = v; v' = ..."
+                f"found {text}, of order {derivative.order}, expected order 1 or 2: name the derivatives, "
+                f"{derivative.name}' = u; u' = v; v' = ..."
             )
-        if found.name in orders:
-            raise InputError(f"found two equations for {found.name}, expected one")
-        orders[found.name], formulas[found.name] = found.order, piece[places[0] + 1 :]
+        if derivative.name in orders:
+            raise InputError(f"found two equations for {derivative.name}, expected one")
+        orders[derivative.name], formulas[derivative.name] = derivative.order, piece[equals_at[0] + 1 :]
     velocities = _velocities(orders, variables, {*parameters, *(t for piece in pieces for t in piece)})
     notes += [f"{name}'' is read with a velocity, the variable {v}: {name}' = {v}" for name, v in velocities.items()]
     sides = dict[str, str]()
@@ -186,7 +193,7 @@ def read_equations(
 
 
 def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
-    """The derivative that begins at a token, blanks left out: x', dx/dt, x_dot, diff(x(t), t); None if none does."""
+    """Return the derivative that begins at a token (x', dx/dt, x_dot, diff(x(t), t)), or None."""
     first = tokens[start] if start < len(tokens) else ""
     if not is_name(first):
         return None
@@ -197,10 +204,10 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
     if order:
         return _Derivative(first, order, _argument(tokens, end))
     text, last, ends = "", "", dict[int, int]()  # the length of the text up to a token -> the place of the next token
-    for place, token in enumerate(tokens[start : start + _MOST_TOKENS], start + 1):
+    for position, token in enumerate(tokens[start : start + _MAX_TOKENS], start + 1):
         is_apart = (last[-1:].isalnum() or last[-1:] == "_") and (token[0].isalnum() or token[0] == "_")
         text, last = f"{text}{' ' * is_apart}{token}", token
-        ends[len(text)] = place
+        ends[len(text)] = position
     for pattern, order in _WRITTEN:
         match = pattern.match(text)
         if match is not None and match.end() in ends:
@@ -208,14 +215,14 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
     return None
 
 
-def _argument(tokens: Sequence[str], place: int) -> int:
-    """The place behind (t) or [t], if it stands there, otherwise the same."""
-    return place + 3 if "".join(tokens[place : place + 3]) in ("(t)", "[t]") else place
+def _argument(tokens: Sequence[str], position: int) -> int:
+    """Return the position after (t) or [t], if it is there, otherwise the same position."""
+    return position + 3 if "".join(tokens[position : position + 3]) in ("(t)", "[t]") else position
 
 
 def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
-    """A right-hand side as text: x(t) as x, and x' as the velocity where there is one."""
-    words = [token for token in tokens if not token.isspace()]
+    """Return a right-hand side as text, with x(t) replaced by x, and x' by the velocity if there is one."""
+    tokens_kept = [token for token in tokens if not token.isspace()]
     gaps, blank = list[str](), ""  # what stands before each word: "x y" must not become "xy"
     for token in tokens:
         if token.isspace():
@@ -223,43 +230,47 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
         else:
             gaps.append(blank)
             blank = ""
-    found: list[str] = []
+    formula: list[str] = []
     k = 0
-    while k < len(words):
-        derivative = derivative_at(words, k)
+    while k < len(tokens_kept):
+        derivative = derivative_at(tokens_kept, k)
         # x_dot is the derivative of x, but for a variable that is itself called x_dot.
-        if derivative and derivative.name in orders and (words[k] not in orders or words[k] == derivative.name):
+        if (
+            derivative
+            and derivative.name in orders
+            and (tokens_kept[k] not in orders or tokens_kept[k] == derivative.name)
+        ):
             if derivative.order != 1 or derivative.name not in velocities:
                 raise InputError(
                     f"found a derivative of {derivative.name} on the right side of the equation for {name}, expected a "
                     "formula in the variables: write out what it is equal to"
                 )
-            found.append(gaps[k] + velocities[derivative.name])
+            formula.append(gaps[k] + velocities[derivative.name])
             k = derivative.end
         else:
-            found.append(gaps[k] + words[k])
-            k = _argument(words, k + 1) if words[k] in orders else k + 1
-    return "".join(found).strip()
+            formula.append(gaps[k] + tokens_kept[k])
+            k = _argument(tokens_kept, k + 1) if tokens_kept[k] in orders else k + 1
+    return "".join(formula).strip()
 
 
 def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Collection[str]) -> dict[str, str]:
-    """The name of the velocity of each variable with an equation of second order: one of those given, or vx for x."""
+    """Return the velocity of each variable with an equation of second order: a given name, or vx for x."""
     second = [name for name, order in orders.items() if order == 2]
     named = [name for name in variables if name not in orders]
     if len(named) == len(second):
         return dict(zip(second, named, strict=True))
-    found = dict[str, str]()
+    velocities = dict[str, str]()
     for name in second:
         velocity = f"v{name}"
-        while velocity in taken or velocity in found.values():
+        while velocity in taken or velocity in velocities.values():
             velocity += "_"
-        found[name] = velocity
-    return found
+        velocities[name] = velocity
+    return velocities
 
 
 def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tuple[list[list[str]], list[str]]:
-    """The pieces with x0 in the place of x[0], or x_0 where x0 is another name; and notes that say so."""
-    words = {*taken, *(token for piece in pieces for token in piece)}
+    """Replace x[0] by x0 (or x_0 if x0 is taken); return the pieces and notes."""
+    used_names = {*taken, *(token for piece in pieces for token in piece)}
     names = dict[tuple[str, str], str]()
     made: list[list[str]] = []
     for piece in pieces:
@@ -271,7 +282,7 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
             is_indexed = is_indexed and word[2].isdigit() and len(word[2]) < 5
             if is_indexed:
                 name = f"{word[0]}{word[2]}"
-                while name in words:
+                while name in used_names:
                     name = f"{word[0]}_{word[2]}" if "_" not in name else f"{name}_"
                 made[-1].append(names.setdefault((word[0], word[2]), name))
             else:
@@ -280,28 +291,28 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
     return made, [f"{name}[{index}] is called {short}" for (name, index), short in names.items()]
 
 
-def _hint(left: Sequence[str], piece: Sequence[str]) -> str:
-    """What to type in the place of something that people put between equations."""
-    if "\\" in left:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
-        name = next((token for token in left if is_name(token) and token not in _LATEX), "x")
-        name, primes = name.removeprefix("d" if "dt" in left else ""), "''" if "ddot" in left else "'"
+def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
+    """Return a hint what to type instead of an unsupported statement."""
+    if "\\" in left_side:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
+        name = next((token for token in left_side if is_name(token) and token not in _LATEX), "x")
+        name, primes = name.removeprefix("d" if "dt" in left_side else ""), "''" if "ddot" in left_side else "'"
         return f"; LaTeX is not read: write {name}{primes} = ..., and products with *"
-    if left and left[0].isalpha() and not left[0].isascii():
-        return f"; a name is made of ASCII letters, digits and _: rename {left[0]}"
-    if len(left) == 1 and left[0][0] == "d" and is_name(left[0][1:]):
-        return f"; did you mean {left[0]}/dt = ...?"
-    if len(left) == 1 and is_name(left[0]):
+    if left_side and left_side[0].isalpha() and not left_side[0].isascii():
+        return f"; a name is made of ASCII letters, digits and _: rename {left_side[0]}"
+    if len(left_side) == 1 and left_side[0][0] == "d" and is_name(left_side[0][1:]):
+        return f"; did you mean {left_side[0]}/dt = ...?"
+    if len(left_side) == 1 and is_name(left_side[0]):
         value = _text(piece).partition("=")[2].lstrip("= ")[:40]
-        return f"; a parameter is given by -p {left[0]}={value}"
-    if len(left) == 4 and left[1] in "([" and left[2] in ("0", "0.0"):
+        return f"; a parameter is given by -p {left_side[0]}={value}"
+    if len(left_side) == 4 and left_side[1] in "([" and left_side[2] in ("0", "0.0"):
         return "; an initial value is given by --start"
-    if "~" in left or "".join(left[1:]) in ("(t+1)", "[t+1]", "(n+1)", "[n+1]"):
+    if "~" in left_side or "".join(left_side[1:]) in ("(t+1)", "[t+1]", "(n+1)", "[n+1]"):
         return "; a map is given by --vars X,Y,... and one --image EXPR for each variable"
     return ""
 
 
 def is_name(token: str) -> bool:
-    """Whether a token is a name."""
+    """Return whether a token is a name."""
     return (token[:1].isalpha() and token.isascii()) or token[:1] == "_"
 
 

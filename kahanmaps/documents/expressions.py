@@ -1,4 +1,4 @@
-"""Formulas and numbers of other Python libraries as the text of a system file; nothing of theirs is imported first."""
+"""Conversion of formulas and numbers of SymPy and other libraries to text, without importing these libraries."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _NUMBERS = (int, float, complex)
 
 
 def formula_text(value: Any) -> str:
-    """A right-hand side or a claim as text, exactly.
+    """Convert a right-hand side or a claim to text, exactly.
 
-    Raises InexactNumber for machine floats, also inside expressions of SymPy, where 1/3*x has become one unnoticed;
+    Raises InexactNumber for floats, also inside expressions of SymPy, where 1/3*x silently becomes one;
     InputError for irrational numbers there.
 
     >>> formula_text("x*y"), formula_text(2)
@@ -36,22 +36,22 @@ def formula_text(value: Any) -> str:
 
 
 def roots_named(sides: Sequence[Any], taken: Collection[str]) -> tuple[list[Any], dict[str, Any]]:
-    """Expressions of SymPy with a name for the one irrational number in them, if it is one, and its value."""
+    """Replace the irrational number in SymPy expressions by a name, if there is exactly one; return its value too."""
     from_sympy = [side for side in sides if _is_sympy(side)]
-    found = {part for side in from_sympy for part in _irrational(side)}
-    if len(found) != 1 or any(part.is_Float for part in found):
+    irrational_numbers = {part for side in from_sympy for part in _irrational(side)}
+    if len(irrational_numbers) != 1 or any(part.is_Float for part in irrational_numbers):
         return list(sides), {}
     from sympy import Symbol
 
-    [value] = found
-    known = {str(one) for side in from_sympy for one in side.free_symbols}.union(taken)
-    name = next(name for k in count() if (name := f"r{k or ''}") not in known)
+    [value] = irrational_numbers
+    taken_names = {str(symbol) for side in from_sympy for symbol in side.free_symbols}.union(taken)
+    name = next(name for k in count() if (name := f"r{k or ''}") not in taken_names)
     named = {value: Symbol(name)}
     return [side.xreplace(named) if _is_sympy(side) else side for side in sides], {name: value}
 
 
 def number(value: Any) -> Any:
-    """An algebraic number of SymPy as the text of a root of its polynomial; all else is as it was.
+    """Convert an algebraic number of SymPy to text, "root of ..."; return other values unchanged.
 
     Raises InputError for other irrational numbers of SymPy.
     """
@@ -66,23 +66,23 @@ def number(value: Any) -> Any:
 
 
 def sides_of_equations(equations: Sequence[Any]) -> Mapping[str, Any] | None:
-    """The right-hand sides by variable of equations of SymPy, Eq(x(t).diff(t), y(t)); None for anything else.
+    """Return the right-hand sides of SymPy equations Eq(x(t).diff(t), y(t)) by variable; None for anything else.
 
     Raises InputError for other equations of SymPy.
     """
-    if not equations or not all(getattr(one, "is_Equality", False) for one in equations):
+    if not equations or not all(getattr(equation, "is_Equality", False) for equation in equations):
         return None
     from sympy import Derivative, Symbol
 
-    for one in equations:
-        if not isinstance(one.lhs, Derivative) or one.lhs.derivative_count != 1:
-            raise InputError(f"found {one}, expected a first derivative on the left: Eq(x(t).diff(t), y(t))")
-    names = {one.lhs.expr: Symbol(one.lhs.expr.func.__name__) for one in equations}
-    return {str(names[one.lhs.expr]): one.rhs.subs(names) for one in equations}
+    for equation in equations:
+        if not isinstance(equation.lhs, Derivative) or equation.lhs.derivative_count != 1:
+            raise InputError(f"found {equation}, expected a first derivative on the left: Eq(x(t).diff(t), y(t))")
+    names = {equation.lhs.expr: Symbol(equation.lhs.expr.func.__name__) for equation in equations}
+    return {str(names[equation.lhs.expr]): equation.rhs.subs(names) for equation in equations}
 
 
 def _irrational(value: Any) -> Iterator[Any]:
-    """The numbers in an expression of SymPy that are not rational, as far as sums and products do not hide them."""
+    """Return the irrational numbers that occur in an expression of SymPy."""
     from sympy import preorder_traversal
 
     parts = preorder_traversal(value)

@@ -1,6 +1,6 @@
-"""Names of the catalogue that take arguments: `lv(7,3)` is a member of the family `lv`, made when it is asked for.
+"""Families of the catalogue, whose members are named with arguments, such as `lv(7,3)`, and generated on demand.
 
-The Bogoyavlenskij-Itoh systems LV(n, k) as documents: Lotka-Volterra systems that the catalogue makes on demand.
+The Bogoyavlenskij-Itoh systems LV(n, k) are Lotka-Volterra systems:
 
     x_i' = x_i sum_j a_ij x_j,    a_ij = -a_ji,    a_ij = 1 for 0 < j - i < n - k and -1 for j - i >= n - k,
 
@@ -26,7 +26,7 @@ _SHOWN_DEGREES = 4
 
 
 class NamedFamily(NamedTuple):
-    """How its members are written, what they are, and the document that belongs to integer arguments."""
+    """A family of systems: the notation of its members, a title, and the document for integer arguments."""
 
     form: str
     example: str
@@ -35,7 +35,7 @@ class NamedFamily(NamedTuple):
 
 
 def degree(n: int, k: int, m: int) -> int:
-    """The degree of the m-th iterate of the Kahan map of LV(n, k): measured, a formula without a proof for all n.
+    """Return the degree of the m-th iterate of the Kahan map of LV(n, k): measured, not proved for all n.
 
     >>> [degree(5, 2, m) for m in range(5)]
     [1, 5, 21, 45, 81]
@@ -46,7 +46,7 @@ def degree(n: int, k: int, m: int) -> int:
 
 
 def lotka_volterra(n: int, k: int) -> dict[str, Any]:
-    """The document of LV(n, k).
+    """Return the document of LV(n, k).
 
     Args:
         n: the number of species, at least 2.
@@ -70,8 +70,8 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
     m = " + ".join(middle)
     integrals = {"I1": " + ".join(x)}
     for a in range(2, len(middle)):
-        below = f"({' + '.join(middle[:a])})*({' + '.join(middle[a - 1 :])})"
-        integrals[f"I{len(integrals) + 1}"] = f"{middle[a - 1]}*({m})/({below})"
+        denominator = f"({' + '.join(middle[:a])})*({' + '.join(middle[a - 1 :])})"
+        integrals[f"I{len(integrals) + 1}"] = f"{middle[a - 1]}*({m})/({denominator})"
     if k == 1:
         first, last = x[0], x[-1]
         minus = f"2*{first}*({m}) - 2*({m})*{last} - 2*{first}*{last}"
@@ -83,7 +83,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         terms = [f"{'+' if signs[j] > 0 else '-'} x{j + 1}" for j in sorted(signs, key=lambda j: -signs[j])]
         text = " ".join(terms)
         rows.append(text.removeprefix("+ ") if text.startswith("+ ") else f"-{text.removeprefix('- ')}")
-    cross, whole = n - 2 * k - 2, n == 2 * k + 1
+    cross, is_full = n - 2 * k - 2, n == 2 * k + 1
     # What is known of the flow and the map, each with its status.
     facts = [
         "Classical: the flow is integrable, by k + 1 integrals for n = 2k + 1 and in general by those of LV(2k + 1, k) "
@@ -97,7 +97,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
             f"Proved: I2, ..., I{cross + 1} are cross-ratios of x{k + 1}, x{k + 1} + x{k + 2}, ..., conserved."
         )
     if k:
-        where = "" if whole else f" of LV({2 * k + 1},{k}), to which the map projects,"
+        where = "" if is_full else f" of LV({2 * k + 1},{k}), to which the map projects,"
         facts.append(
             f"Proved: the product of the variables{where} divided by det(I - eps f'), and the modified Hamiltonian of "
             "a cubic H are conserved."
@@ -128,7 +128,7 @@ FAMILIES = {"lv": NamedFamily("lv(n,k)", "lv(7,3)", "Bogoyavlenskij-Itoh systems
 
 
 def family_member(reference: str) -> tuple[str, dict[str, Any]] | None:
-    """The name, without spaces, and the document of a member of a family; None for what does not name a family.
+    """Return the name, without spaces, and the document of a member of a family; None for other names.
 
     Raises InputError for arguments that are missing or that the family does not have.
 

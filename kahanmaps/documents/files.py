@@ -1,4 +1,4 @@
-"""System files: a differential equation in TOML, all its mistakes told at once, written so that it reads back equal.
+"""System files: a differential equation or map in TOML, read with all mistakes reported together, and written.
 
 A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J), [family] (A, H, signs), [bilinear],
 [map] and [composition], and may have [parameters], [integrals] and [density]; docs/system-files.md describes them.
@@ -47,7 +47,7 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 @dataclass(frozen=True, eq=False)
 class SystemFile(HtmlDisplay):
-    """A system with everything that its file says of it.
+    """A system or map with the parameters and claims of its file.
 
     `map` is the map that is meant, of a differential equation its Kahan map; `hamiltonian` and `member` are there when
     the file (or the Python object it was made from) says so. `integrals` and `density` are claims: rational functions
@@ -68,15 +68,15 @@ class SystemFile(HtmlDisplay):
 
     @property
     def label(self) -> str:
-        """What pictures and pages call it: its name, or the equations of a system from the command line, if short."""
+        """The title in pictures and pages: the name, or the equations of a system from the command line, if short."""
         if self.name != "inline" or not self.is_quadratic:
             return self.name
         rhs = zip(self.variables, self.system.rhs, strict=True)
-        shown = ", ".join(f"{name}' = {format_polynomial(f)}" for name, f in rhs)
-        return shown if len(shown) <= _LONGEST_LABEL else self.name
+        equations = ", ".join(f"{name}' = {format_polynomial(f)}" for name, f in rhs)
+        return equations if len(equations) <= _LONGEST_LABEL else self.name
 
     def labelled(self, letter: str) -> str:
-        """The system with a letter for it: f = euler_top, or f: (x' = y, y' = -x)."""
+        """Return the system with a letter for it: f = euler_top, or f: (x' = y, y' = -x)."""
         return f"{letter} = {self.name}" if self.label == self.name else f"{letter}: ({self.label})"
 
     @property
@@ -91,7 +91,7 @@ class SystemFile(HtmlDisplay):
 
     @property
     def claim_names(self) -> tuple[str, ...]:
-        """What claims are functions of: the variables, an algebraic parameter where there is one, eps."""
+        """The arguments of claims: the variables, the algebraic parameter if there is one, and eps."""
         return (*self.variables, *(self.map.given.symbols if isinstance(self.map, AlgebraicMap) else ()), "eps")
 
     @property
@@ -101,7 +101,7 @@ class SystemFile(HtmlDisplay):
 
     @property
     def system(self) -> QuadraticSystem:
-        """The quadratic system whose Kahan map is meant. Raises InputError where it is another map."""
+        """The quadratic system of a Kahan map. Raises InputError for another map."""
         if self.is_quadratic and isinstance(self.map, KahanFamily):
             return self.map.system
         if self.map.unsupported_reason:
@@ -109,17 +109,15 @@ class SystemFile(HtmlDisplay):
         what = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, KahanFamily):
             what = f"stands for a {self.map.title}"
-        raise InputError(
-            f"{self.name} {what}, expected a quadratic vector field without eps: what is asked for is about fields"
-        )
+        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps")
 
     @property
     def rhs(self) -> tuple[fmpq_mpoly, ...]:
-        """The right-hand sides of the quadratic system. Raises InputError where it is another map."""
+        """The right-hand sides of the quadratic system. Raises InputError for another map."""
         return self.system.rhs
 
     def at(self, eps: Any = None) -> Map:
-        """The map at an exact eps, half the time step where it has one: callable. Raises InputError where it lacks."""
+        """Return the map at an exact eps, half the time step; it is callable. Raises InputError if eps is missing."""
         if eps is None and self.map.has_eps:
             raise InputError(f'found no eps, expected an exact number such as "1/10": {self.name} depends on it')
         return self.map.at(fmpq(1) if eps is None else rational(eps))
@@ -132,7 +130,7 @@ class SystemFile(HtmlDisplay):
 
     @property
     def real_approximation(self) -> SystemFile:
-        """The file, for floats: with a rational number next to the root where a parameter is an algebraic one.
+        """The file for floats: an algebraic parameter is replaced by a rational number close to it.
 
         Raises InputError where that is not real.
         """
@@ -143,13 +141,13 @@ class SystemFile(HtmlDisplay):
 
     @property
     def normal_form(self) -> SystemNormalForm | NoNormalForm:
-        """The normal form of the system, looked for anew each time, or why there is none."""
+        """The normal form of the system, computed at each access, or the reason why there is none."""
         if not self.is_quadratic:
             return NoNormalForm(f"it is {self.map.kind}")
         return system_normal_form(self.system, self.hamiltonian, self.member)
 
     def require_claim(self, what: str, function: RationalFunction) -> None:
-        """Raises InputError unless the function is one of the system's variables and eps, in this order."""
+        """Raise InputError unless the function is one of the system's variables and eps, in this order."""
         expected = self.claim_names
         n = self.dim
         if function.names != with_iterates(expected[:n], iterates_in(*function.names), expected[n:]):
@@ -161,19 +159,19 @@ class SystemFile(HtmlDisplay):
     @property
     def catalog(self) -> Mapping[str, Any]:
         """Title, sources, convention and facts, for files of the catalogue."""
-        found: Mapping[str, Any] = self.document.get("catalog", {})
-        return found
+        section: Mapping[str, Any] = self.document.get("catalog", {})
+        return section
 
     @classmethod
     def from_system(cls, system: QuadraticSystem, name: str = "system") -> SystemFile:
-        """A quadratic system without further structure."""
+        """Return the file of a quadratic system without further structure."""
         rhs = [format_polynomial(polynomial) for polynomial in system.rhs]
         document = {"name": name, "variables": list(system.variables), "system": {"rhs": rhs}}
         return cls(name, "system", {}, KahanFamily(system), None, None, {}, None, document)
 
     @classmethod
     def from_hamiltonian(cls, hamiltonian: CubicHamiltonian, name: str = "system") -> SystemFile:
-        """A Hamiltonian system."""
+        """Return the file of a Hamiltonian system."""
         normal_form: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
         section = {"H": format_polynomial(hamiltonian.H), "J": normal_form}
         document = {"name": name, "variables": list(hamiltonian.variables), "hamiltonian": section}
@@ -181,7 +179,7 @@ class SystemFile(HtmlDisplay):
 
     @classmethod
     def from_member(cls, member: FamilyMember, name: str = "member") -> SystemFile:
-        """A member of the commuting family, or the associated system that its signs pick."""
+        """Return the file of a member of the family, or of the associated system given by its signs."""
         from kahanmaps.family.cubics import default_variables
 
         section: dict[str, Any] = {"A": _rows(member.A), "H": format_polynomial(member.H)}
@@ -194,18 +192,18 @@ class SystemFile(HtmlDisplay):
         return cls(name, "family", {}, KahanFamily(chosen.system), chosen.hamiltonian, member, {}, None, document)
 
     @classmethod
-    def from_conjugate(cls, given: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
-        """An associated system over a number field: a Hamiltonian system with the root as its parameter."""
+    def from_conjugate(cls, associate: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
+        """Return the file of an associated system over a number field, with the root as parameter."""
         document = {
             "name": name,
-            "variables": list(names_of(given.chain[0])),
-            "parameters": {given.name: str(given.root)},
-            "hamiltonian": {"H": given.K_text, "J": "standard"},
+            "variables": list(names_of(associate.chain[0])),
+            "parameters": {associate.name: str(associate.root)},
+            "hamiltonian": {"H": associate.K_text, "J": "standard"},
         }
         return parse_system(to_toml(document, ("name", "variables"), _SECTIONS), name)
 
     def to_toml(self) -> str:
-        """The file as text; `parse_system` reads it back equal."""
+        """Return the file as text, which `parse_system` reads back equal."""
         return to_toml(self.document, ("name", "variables"), _SECTIONS)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -236,7 +234,7 @@ class SystemFile(HtmlDisplay):
 
 
 def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
-    """The system in a TOML file; `parameters` replace those of the file.
+    """Read a system from a TOML file; `parameters` replace those of the file.
 
     Raises SystemFileError with every mistake of the file, InputError where it cannot be read.
     """
@@ -246,7 +244,7 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
 
 
 def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[str, Any] | None = None) -> SystemFile:
-    """The system that a text in TOML describes, or one in lines as XPP has them; `where` names it in messages.
+    """Parse a system from text in TOML, or in the format of XPP; `where` names it in messages.
 
     >>> parse_system('variables = ["x"]\\n[system]\\nrhs = ["x", "x"]', "example")
     Traceback (most recent call last):
@@ -262,7 +260,7 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
 
 
 def _document(text: str | bytes, where: str) -> tuple[dict[str, Any], list[str]]:
-    """The plain data of a text in TOML, or of one that has equations in lines, and notes on these."""
+    """Return the plain data of a text in TOML or with equations in lines, and notes on them."""
     is_of_xpp = where.endswith(ENDING)
     try:
         if not is_of_xpp:
@@ -279,15 +277,15 @@ def _decoded(text: str | bytes) -> str:
 
 
 def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
-    """What `DocumentReader` asks of parts of compositions: a "system" of the catalogue, a "file" seen from `base`."""
+    """Look up a part of a composition: a "system" of the catalogue, or a "file" relative to `base`."""
     if key == "system":
         made = family_member(name)
         if made is not None:
             return made[1], made[0], None
         folder = resources.files("kahanmaps.documents").joinpath("catalog")
-        for found in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
-            if name.isidentifier() and found.is_file():
-                return _TOML.document(found.read_bytes(), name), name, None
+        for candidate in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
+            if name.isidentifier() and candidate.is_file():
+                return _TOML.document(candidate.read_bytes(), name), name, None
         raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     path = base / name
     return _document(_TOML.read(path), name)[0], os.path.abspath(path), partial(_named, path.parent)
@@ -298,7 +296,7 @@ def _rows(matrix: fmpq_mat) -> list[list[str]]:
 
 
 def matched(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
-    """The second of two maps in the variables of the first, and a note where these are not the same in order.
+    """Return the second of two maps in the variables of the first, and a note if they differ.
 
     Variables are matched by name where the names agree, otherwise by position. Raises InputError for two dimensions,
     and for maps other than Kahan's where variables would have to be exchanged.

@@ -1,4 +1,4 @@
-"""The system file that equations on a command line, or in Python, abbreviate, so that the same rules hold for them."""
+"""Systems given by equations on the command line or in Python, converted to system files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def inline_file(
     variables: str | None, parameters: Mapping[str, str], kind: str, section: Mapping[str, str | Sequence[str]]
 ) -> str:
-    """The text of the file with one section of this kind; `variables` are names between commas.
+    """Return the file with one section of this kind; `variables` are names separated by commas.
 
     >>> print(inline_file("x,y", {"a": "1/2"}, "system", {"rhs": ["a*y", "-x"]}))
     variables = ["x", "y"]
@@ -44,7 +44,7 @@ def inline_file(
 
 
 def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = None, **parameters: Any) -> SystemFile:
-    """A system x' = f(x) of degree at most 2, from its equations.
+    """Create a system x' = f(x) of degree at most 2 from its equations.
 
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
@@ -70,12 +70,14 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
         equations = sides_of_equations(equations) or equations
     if isinstance(equations, Mapping):
         variables, equations = list(equations), list(equations.values())
-    elif not isinstance(equations, str) and variables is None and not any("=" in str(one) for one in equations):
+    elif (
+        not isinstance(equations, str) and variables is None and not any("=" in str(equation) for equation in equations)
+    ):
         raise InputError(f"found {len(equations)} right-hand sides without variables, expected these too: x, y, ...")
     if not isinstance(equations, str):
         equations, roots = roots_named(equations, [*map(str, variables or ()), *parameters])
         parameters |= roots
-    rhs = equations if isinstance(equations, str) else [formula_text(one) for one in equations]
+    rhs = equations if isinstance(equations, str) else [formula_text(equation) for equation in equations]
     if isinstance(variables, str):
         variables = variables.replace(",", " ").split()
     names = None if variables is None else ",".join(map(str, variables))
@@ -84,7 +86,7 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
 
 
 def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> Map:
-    """The map of a system at an exact eps: callable, and composed by @ and powers. Raises InputError where eps lacks.
+    """Return the map of a system at an exact eps: callable, composed by @ and **. Raises InputError without eps.
 
     >>> map_at("euler_top", "1/10")([1, 2, 3])
     (65/37, 10/37, 125/37)
@@ -92,26 +94,26 @@ def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> Map
     return as_file(system).at(resolve_eps(eps, time_step))
 
 
-def as_file(given: Any) -> SystemFile:
-    """The file that anything stands for: a file, a system, a name of the catalogue, a path, or equations as text.
+def as_file(value: Any) -> SystemFile:
+    """Convert a value to a file: a file, a system, a name of the catalogue, a path, or equations as text.
 
     Raises InputError for anything else.
     """
-    if isinstance(given, SystemFile):
-        return given
-    if isinstance(given, QuadraticSystem):
-        return SystemFile.from_system(given)
-    if isinstance(given, FamilyMember):
-        return SystemFile.from_member(given)
-    if isinstance(given, AssociatedSystem):
-        given = given.hamiltonian
-    if isinstance(given, CubicHamiltonian):
-        return SystemFile.from_hamiltonian(given)
-    if isinstance(given, str) and "=" in given:
-        return System(given)
-    if isinstance(given, str | Path):
-        return load(given)
-    if isinstance(given, Map):
-        raise InputError(f"found {given!r}, a map at one eps, expected what it was made of, and eps=")
-    kind = type(given).__name__
+    if isinstance(value, SystemFile):
+        return value
+    if isinstance(value, QuadraticSystem):
+        return SystemFile.from_system(value)
+    if isinstance(value, FamilyMember):
+        return SystemFile.from_member(value)
+    if isinstance(value, AssociatedSystem):
+        value = value.hamiltonian
+    if isinstance(value, CubicHamiltonian):
+        return SystemFile.from_hamiltonian(value)
+    if isinstance(value, str) and "=" in value:
+        return System(value)
+    if isinstance(value, str | Path):
+        return load(value)
+    if isinstance(value, Map):
+        raise InputError(f"found {value!r}, a map at one eps, expected what it was made of, and eps=")
+    kind = type(value).__name__
     raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")

@@ -1,7 +1,7 @@
-"""Functions of a point and its iterates in text: x~ is the image of x, x~~ that of x~, as integrals are printed.
+"""Parsing of functions of a point and its iterates: x~ is the image of x, x~~ the image of x~.
 
-Minors have letters for the functions that they are made of, which are told behind them: F0*F1~ - F1*F0~, F0 = x*y~,
-F1 = y. Then F0~ is F0 with one ~ more at every variable.
+A formula may contain letters for functions, which are defined after it: F0*F1~ - F1*F0~, F0 = x*y~, F1 = y. Then F0~ is
+F0 with one more ~ at every variable.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _MAX_PRODUCTS = 1_000_000  # of terms, where letters are replaced
 
 
 def iterates_in(*texts: str) -> int:
-    """How many ~ follow a name at most.
+    """Return the largest number of ~ after a name.
 
     >>> iterates_in("x*y~ - x~~", "x")
     2
@@ -30,7 +30,7 @@ def iterates_in(*texts: str) -> int:
 
 
 def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = ()) -> tuple[str, ...]:
-    """The variables, those with ~, ~~, ... up to `count`, then the others.
+    """Return the variables, those with ~, ~~, ... up to `count`, then the others.
 
     >>> with_iterates(["x", "y"], 1, ["eps"])
     ('x', 'y', 'x~', 'y~', 'eps')
@@ -41,7 +41,7 @@ def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = 
 def parse_with_iterates(
     text: str, variables: Sequence[str], others: Sequence[str], constants: Mapping[str, fmpq]
 ) -> RationalFunction:
-    """The function of the variables, as many of their iterates as the text has, and the other names.
+    """Parse a function of the variables, their iterates and the other names.
 
     Args:
         text: a formula, perhaps with letters, which are defined behind it.
@@ -68,9 +68,9 @@ def parse_with_iterates(
             pieces.append("")
         else:
             pieces[-1] += character
-    formula, *behind = pieces
+    formula, *definition_texts = pieces
     definitions = {}
-    for piece in behind:
+    for piece in definition_texts:
         name, equals, value = (part.strip() for part in piece.partition("="))
         if not equals or not is_name(name):
             expected = "expected what a letter stands for: F0 = x*y~"
@@ -83,11 +83,11 @@ def parse_with_iterates(
     names = with_iterates(variables, count, others)
     if not definitions:
         return parse_rational_function(formula, names, constants)
-    if len(definitions) < len(behind) or {*definitions} & {*variables, *others, *constants}:
-        found = ", ".join(definitions)
-        raise InputError(f"found the letters {found}, expected each once, and no names of something else")
+    if len(definitions) < len(definition_texts) or {*definitions} & {*variables, *others, *constants}:
+        names_given = ", ".join(definitions)
+        raise InputError(f"found the letters {names_given}, expected each once, and no names of something else")
     context, n = ring(names), len(variables)
-    functions = [parse_polynomial(one, names, constants) for one in definitions.values()]
+    functions = [parse_polynomial(definition, names, constants) for definition in definitions.values()]
     letters = with_iterates(tuple(definitions), outer)
     function = parse_rational_function(formula, (*letters, *names), constants)
     parts = (function.numerator, function.denominator)
@@ -103,5 +103,5 @@ def parse_with_iterates(
         return P.compose(*moved, *gens[coordinates:], ctx=context)
 
     values = [later(P, steps) for steps in range(outer + 1) for P in functions]
-    above, below = (part.compose(*values, *gens, ctx=context) for part in parts)
-    return RationalFunction(above, below)
+    numerator, denominator = (part.compose(*values, *gens, ctx=context) for part in parts)
+    return RationalFunction(numerator, denominator)

@@ -1,6 +1,6 @@
-"""How the parts of a system file are read: tables, texts, polynomials, matrices, and the mistakes that are found.
+"""Reading the parts of a system file: tables, texts, polynomials and matrices, with a list of mistakes.
 
-What is read goes by the names that hold there: the variables, the parameters with their values, and the symbols.
+The names that may occur are the variables, the parameters with their values, and the symbols.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ Other = Callable[[str, str], tuple[dict[str, Any], str, Any]]
 
 
 class PartReader:
-    """A document with the names that hold in it and the mistakes found so far; what its parts are read with."""
+    """Reads the parts of a document: holds its names and the mistakes found so far."""
 
     def __init__(
         self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], other: Other | None = None
     ) -> None:
-        """`other` looks up what parts of compositions name."""
+        """`other` looks up the parts of compositions that are given by name."""
         self.document = document
         self.where = where
         self.overrides = overrides
@@ -68,7 +68,7 @@ class PartReader:
         self.parts = [0]  # how many were read in all
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
-        self.unsure = False  # some parameter has no value: what depends on values is not judged
+        self.unsure = False  # a parameter could not be read: parts that depend on it are not checked
         self.variables: tuple[str, ...] | None = None
         self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
         self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number, which is such a symbol
@@ -78,24 +78,24 @@ class PartReader:
         self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
     def _refused(self, key: str, sentence: str) -> T | None:
-        """None, which stands for what cannot be read, and a mistake."""
+        """Note a mistake and return None."""
         self._mistake(key, sentence)
         return None
 
-    def _made(self, path: str, make: Callable[..., T], *given: Any) -> T | None:
-        """What is made of what is given; None, and a mistake, where it cannot be."""
+    def _made(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
+        """Return make(*arguments); on InputError note a mistake and return None."""
         try:
-            return make(*given)
+            return make(*arguments)
         except InputError as error:
             return self._refused(path, str(error))
 
     def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
-        known = KEYS[section]
+        known_keys = KEYS[section]
         for key in table:
-            if key not in known:
+            if key not in known_keys:
                 path = f"{section}.{key}" if section else key
                 hint = " (a batch spec is for kahanmaps batch run)" if path == "experiments" else ""
-                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known))}{hint}")
+                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known_keys))}{hint}")
 
     def _table(self, key: str) -> dict[str, Any] | None:
         value = self.document.get(key, {})
@@ -109,7 +109,7 @@ class PartReader:
         return self._refused(path, f"found {show(value)}, expected an expression in quotes")
 
     def _polynomial(
-        self, path: str, value: Any, at_most: int, more: Sequence[str] = (), *, of_map: bool = True
+        self, path: str, value: Any, at_most: int, extra_names: Sequence[str] = (), *, of_map: bool = True
     ) -> fmpq_mpoly | None:
         """A polynomial in the variables, `more` names and, of a map, the symbols and eps; its degree in the variables
         is bounded.
@@ -119,20 +119,21 @@ class PartReader:
             return None
         try:
             tail = (*self.symbols, "eps") if of_map else ()
-            polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
+            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *tail), self.parameters)
         except UnknownName as error:
             where = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
             return self._refused(path, f"{error}\nif it is a parameter, give its value: {where}")
         except InputError as error:
             return self._refused(path, str(error))
-        found = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
-        if found > at_most and not self.unsure:
-            degree = "" if found == 3 else f" and degree = {found}"
-            polarised = (
-                f'\nfor a field of degree {found} write discretization = "polarised"{degree} into [system] of a file'
+        actual_degree = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
+        if actual_degree > at_most and not self.unsure:
+            degree = "" if actual_degree == 3 else f" and degree = {actual_degree}"
+            polarised = f'discretization = "polarised"{degree} into [system] of a file'
+            polarised = f"\nfor a field of degree {actual_degree} write {polarised}"
+            hint = polarised if path.startswith("system.rhs") and actual_degree <= MAX_DEGREE else ""
+            return self._refused(
+                path, f"found a polynomial of degree {actual_degree}, expected at most {at_most}{hint}"
             )
-            hint = polarised if path.startswith("system.rhs") and found <= MAX_DEGREE else ""
-            return self._refused(path, f"found a polynomial of degree {found}, expected at most {at_most}{hint}")
         return polynomial
 
     def _matrix(self, path: str, value: Any, size: int | None) -> fmpq_mat | None:
@@ -151,9 +152,9 @@ class PartReader:
                 self._mistake(f"{path}[{i + 1}]", f"found {len(row)} entries, expected {expected}")
                 bad = True
             for j, entry in enumerate(row):
-                place = f"{path}[{i + 1}][{j + 1}]"
-                text = self._text(place, entry)
-                number = None if text is None else self._made(place, parse_constant, text, self.parameters)
+                entry_path = f"{path}[{i + 1}][{j + 1}]"
+                text = self._text(entry_path, entry)
+                number = None if text is None else self._made(entry_path, parse_constant, text, self.parameters)
                 entries.append(fmpq(0) if number is None else number)
                 bad = bad or number is None
         return None if bad else fmpq_mat(expected, expected, entries)
@@ -164,7 +165,7 @@ class PartReader:
         return table.get(key)
 
     def _list(self, section: str, key: str, value: Any, what: str) -> list[Any] | None:
-        """A list with one entry for each variable; None, and a mistake, where it is another or missing."""
+        """Read a list with one entry for each variable; otherwise note a mistake and return None."""
         path = f"{section}.{key}"
         if value is None:
             return None
@@ -177,12 +178,12 @@ class PartReader:
             return self._refused(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
         return value
 
-    def _each(self, path: str, given: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
-        """What is read of every entry of a list, mistakes of all of them noted; None where one cannot be read."""
-        entries = given if isinstance(given, list) else []
-        found = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
-        known = [one for one in found if one is not None]
-        return known if len(known) == len(found) else None
+    def _each(self, path: str, value: Any, read: Callable[[str, Any], T | None]) -> list[T] | None:
+        """Read every entry of a list, noting all mistakes; return None if an entry cannot be read."""
+        entries = value if isinstance(value, list) else []
+        results = [read(f"{path}[{k + 1}]", entry) for k, entry in enumerate(entries)]
+        valid = [result for result in results if result is not None]
+        return valid if len(valid) == len(results) else None
 
     def _claim(self, path: str, value: Any) -> RationalFunction | None:
         text = self._text(path, value)
@@ -195,7 +196,7 @@ class PartReader:
 
 
 def json_like(value: Any) -> Any:
-    """Plain data with long integers as text."""
+    """Return plain data with long integers as text."""
     if isinstance(value, dict):
         return {key: json_like(item) for key, item in value.items()}
     if isinstance(value, list):

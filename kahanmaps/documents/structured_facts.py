@@ -1,4 +1,4 @@
-"""The facts of a [catalog] section that a program can use: degrees, growth, verdict, relations along an orbit.
+"""The structured facts of a [catalog] section: degrees, growth, verdict, relations along an orbit.
 
     degrees = [3, 9, 19, 33, 51]          of the iterates Phi, Phi^2, ... on a generic line
     growth = "quadratic"                  bounded, linear, quadratic or exponential
@@ -10,8 +10,8 @@
     monomials = ["x1^2", "x2^2", "x3^2", "1"]
     dimension = 2
 
-All of them are for generic parameters and generic eps, so that relations know no parameters. What kind of evidence
-there is, the facts in words say.
+All of them are for generic parameters and generic eps, so relations do not contain parameters. The evidence for them is
+stated in the facts of the section.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ _RELATION_KEYS = ("monomials", "dimension")
 
 
 class ClaimedRelations(NamedTuple):
-    """A Hirota-Kimura basis: along a generic orbit `dimension` independent combinations of `functions` vanish.
+    """A Hirota-Kimura basis: along a generic orbit `dimension` independent linear combinations of `functions` vanish.
 
-    `text` is how the file writes the functions; they are polynomials over Q in the variables of the system.
+    `text` contains the functions as written in the file; they are polynomials over Q in the variables of the system.
     """
 
     text: str
@@ -68,7 +68,7 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
     )
 
 
-def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
+def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
     """The functions that "degree <= d" or a list of polynomials stands for, as exact polynomials in `variables`.
 
     Raises InputError for anything else, for more than 100000 monomials, and for functions that are 0 or stand twice.
@@ -77,20 +77,20 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
     >>> relation_functions(["x^2 + y^2", "1"], ["x", "y"])
     (x^2 + y^2, 1)
     """
-    match = _UP_TO.fullmatch(given) if isinstance(given, str) else None
-    if match is None and not (_are_texts(given) and given):
-        raise InputError(f'found {show(given)}, expected "degree <= d" or a list of polynomials')
+    match = _UP_TO.fullmatch(texts) if isinstance(texts, str) else None
+    if match is None and not (_are_texts(texts) and texts):
+        raise InputError(f'found {show(texts)}, expected "degree <= d" or a list of polynomials')
     if match is not None:
         top = int(match[1])
         count = comb(top + len(variables), top)
         if count > MAX_MONOMIALS:
-            raise InputError(f"found {show(given)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
+            raise InputError(f"found {show(texts)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
         context = ring(variables)
         exponents = chain.from_iterable(monomials(len(variables), d) for d in range(top + 1))
         return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)
-    if len(given) > MAX_MONOMIALS:
-        raise InputError(f"found {len(given)} functions, expected at most {MAX_MONOMIALS}")
-    functions = tuple(parse_polynomial(text, variables) for text in given)
+    if len(texts) > MAX_MONOMIALS:
+        raise InputError(f"found {len(texts)} functions, expected at most {MAX_MONOMIALS}")
+    functions = tuple(parse_polynomial(text, variables) for text in texts)
     seen = set()
     for k, function in enumerate(functions):
         if function.is_zero():
@@ -104,7 +104,7 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
 def read_structured_facts(
     section: Mapping[str, Any], variables: Sequence[str] | None, mistake: Callable[[str, str], None]
 ) -> None:
-    """Look through a [catalog] section, all keys of which are known; `mistake(key, sentence)` is told what is wrong."""
+    """Validate a [catalog] section, all keys of which are known; call `mistake(key, sentence)` for each mistake."""
     at_most = 10**9 if variables is None else len(variables)
     bound = "an integer, 0 or more" if variables is None else f"an integer from 0 to {at_most}, the dimension"
     rules: dict[str, tuple[Callable[[Any], bool], str]] = {
@@ -154,7 +154,7 @@ def _are_degrees(value: Any) -> bool:
 
 
 def _is_minimal(text: Any) -> bool:
-    """Whether a text is an irreducible monic polynomial in x."""
+    """Return whether a text is an irreducible monic polynomial in x."""
     try:
         polynomial = parse_polynomial(text, ["x"])
     except InputError:

@@ -1,4 +1,4 @@
-"""The system or map of a file with some of its parameters left as symbols."""
+"""The system or map of a file, with some of its parameters as symbols."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily:
-    """The map of a file, the parameters named in `symbols` without values, the others with theirs.
+    """Return the map of a file with the given parameters as symbols, and the other parameters at their values.
 
-    Raises InputError as `with_symbols` does, for another map only where a name is no parameter.
+    Raises InputError as `with_symbols` does; for a map other than Kahan's, only if a name is not a parameter.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
@@ -35,7 +35,7 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily
 
 
 def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
-    """The system of a file with other values of some of its parameters, and without its claims.
+    """Return the system of a file with other values of some parameters, without its claims.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
@@ -45,40 +45,41 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
     """
     _parameters(file, list(values))
     document = {key: value for key, value in file.document.items() if key not in ("catalog", "integrals", "density")}
-    given = {name: format_number(value) for name, value in {**file.parameters, **values}.items()}
-    title = f"{file.name} at {', '.join(f'{name} = {given[name]}' for name in values)}"
-    return SystemFile(**DocumentReader({**document, "name": title, "parameters": given}, file.name, {}).read())
+    numbers = {name: format_number(value) for name, value in {**file.parameters, **values}.items()}
+    title = f"{file.name} at {', '.join(f'{name} = {numbers[name]}' for name in values)}"
+    return SystemFile(**DocumentReader({**document, "name": title, "parameters": numbers}, file.name, {}).read())
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:
-    """The system of a file, the parameters named in `symbols` without values, the others with theirs.
+    """Return the system of a file with the given parameters as symbols, and the other parameters at their values.
 
     Args:
         file: the system.
-        symbols: names of its parameters; eps is a symbol anyway and is not to be named.
+        symbols: names of its parameters; eps is always a symbol and must not be named.
 
     Returns:
-        The system, its right-hand sides exact.
+        The system, with exact right-hand sides.
 
     Raises:
-        InputError: for a name that is no parameter, for right-hand sides that with the symbols free have a degree
-            above 2 or are no polynomials, and for a member of the family, whose A and H must fit together at
-            every value.
+        InputError: for a name that is not a parameter, for right-hand sides that are not polynomials of degree at most
+            2 if the symbols are free, and for a member of the family, whose A and H must fit together at every value.
 
     >>> from kahanmaps.documents.catalog import load
     >>> with_symbols(load("euler_top"), ["a1"]).rhs
     (x2*x3*a1, -2*x1*x3, x1*x2)
     """
     _ = file.system  # of another map there is none
-    found = map_with_symbols(file, symbols)
-    assert isinstance(found, KahanFamily)
-    return found.system
+    map_ = map_with_symbols(file, symbols)
+    assert isinstance(map_, KahanFamily)
+    return map_.system
 
 
 def _parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, ...]:
-    """The names, each once. Raises InputError for one that is no parameter."""
+    """Return the names without repetition. Raises InputError for a name that is not a parameter."""
     for name in symbols:
         if name not in file.parameters:
-            known = ", ".join(file.parameters) or "none"
-            raise InputError(f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known}")
+            known_names = ", ".join(file.parameters) or "none"
+            raise InputError(
+                f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known_names}"
+            )
     return tuple(dict.fromkeys(symbols))

@@ -1,4 +1,4 @@
-"""The file of a system over an algebra K = Q[t]/(chi), written over Q, with the claims that it inherits."""
+"""Conversion of a system over an algebra K = Q[t]/(chi) to a system over Q, with the claims that it inherits."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Plain data from TOML text and as TOML text: system files and batch specs.
+"""Reading and writing of TOML: system files and specifications of experiments.
 
-Python reads TOML and does not write it; a dependency for forty lines would be one too many. Written is what system
-files need: text, integers, lists, tables, lists of tables in them.
+Python's standard library only reads TOML. The writer supports what system files need: text, integers, lists, tables,
+and lists of tables.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from kahanmaps.errors import InputError, SystemFileError
 
 
 class TomlKind(NamedTuple):
-    """A kind of file in TOML: what it is called, how many bytes one may have, the error that has its mistakes."""
+    """A kind of TOML file: its name, the largest size, and the class of errors for its mistakes."""
 
     name: str
     most: int
     error: type[SystemFileError]
 
     def read(self, path: str | Path) -> bytes:
-        """The bytes of a file, one more at most than it may have. Raises InputError where it cannot be read."""
+        """Read the bytes of a file, at most one more than allowed. Raises InputError if it cannot be read."""
         try:
             # Nobody may ever write to a pipe, and a device need not end. But /dev/fd/63 is the shell's <(...).
             mode = os.stat(path).st_mode
@@ -44,7 +44,7 @@ class TomlKind(NamedTuple):
             raise InputError(f"cannot read the {self.name} {str(path)!r}: {error}") from error
 
     def document(self, text: str | bytes, where: str) -> dict[str, Any]:
-        """The plain data of a text, decimals as text; `where` names it in messages. Raises `error`, InputError."""
+        """Parse a text to plain data, decimals as text; `where` names it in messages. Raises `error`, InputError."""
         if len(text) > self.most:
             raise InputError(f"{where} is larger than {self.most} bytes, the limit for a {self.name}")
         try:
@@ -63,7 +63,7 @@ class TomlKind(NamedTuple):
 
 
 def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[str]) -> str:
-    """The document as text: the keys `top` first, then the tables `sections`, in this order; others are left out.
+    """Write a document: first the keys `top`, then the tables `sections`, in this order; others are omitted.
 
     >>> print(to_toml({"name": "a", "system": {"rhs": ["x^2"]}}, ["name"], ["system"]), end="")
     name = "a"
@@ -120,5 +120,5 @@ def _toml_value(value: Any) -> str:
 
 def _toml_string(text: str) -> str:
     # A JSON string is a TOML basic string, but for DEL, which TOML wants escaped; a terminal obeys some others too.
-    shown = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
-    return "".join(shown)
+    characters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
+    return "".join(characters)

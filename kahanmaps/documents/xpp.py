@@ -1,9 +1,10 @@
-"""Files of XPP (XPPAUT, .ode) as documents: equations, parameters and definitions; what else they have is named.
+"""Reading of XPPAUT files (.ode): equations, parameters and definitions.
 
-Read are x' = ..., dx/dt = ..., par, number, init, x(0) = ..., name = formula and !name = formula, which are put in the
-places of the names. Options (@), aux, set and boundary conditions are about the integration and left out. What would
-change the equations (functions, arrays, Markov variables, tables, maps x(t+1)) is refused with its line. XPP does not
-tell upper from lower case. Source: Ermentrout's documentation of XPPAUT 8, "Structure of ODE files".
+The reader accepts x' = ..., dx/dt = ..., par, number, init, x(0) = ..., and definitions name = formula and
+!name = formula, which are substituted. Options (@), aux, set and boundary conditions concern the integration and are
+skipped, with a note. Statements that would change the equations (functions, arrays, Markov variables, tables, maps
+x(t+1)) raise an error with the line. XPP is not case-sensitive. Source: Ermentrout's documentation of XPPAUT 8,
+"Structure of ODE files".
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ _READ = "x' = ..., dx/dt = ..., par a=1, init x=0 and name = formula"
 
 
 def is_ode(text: str) -> bool:
-    """Whether a text that is not TOML has equations in lines: on the left of one stands a derivative.
+    """Return whether a text that is not TOML contains a line with a derivative on its left side.
 
     >>> is_ode("x' = -x\\ny' = x"), is_ode('[system]\\nrhs = "x')
     (True, False)
@@ -30,15 +31,15 @@ def is_ode(text: str) -> bool:
     for line in text[: LIMITS.characters].split("\n"):
         if line.lstrip().startswith("["):
             return False
-        left = [token for token in tokens_of(line.partition("=")[0]) if not token.isspace()]
-        found = derivative_at(left, 0) if "=" in line else None
-        if found is not None and found.end == len(left):
+        left_side = [token for token in tokens_of(line.partition("=")[0]) if not token.isspace()]
+        derivative = derivative_at(left_side, 0) if "=" in line else None
+        if derivative is not None and derivative.end == len(left_side):
             return True
     return False
 
 
 def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
-    """The document that the lines of a file of XPP describe, and notes on what was left out; `where` names it.
+    """Read an XPP file; return the document and notes on skipped lines. `where` names the file in messages.
 
     Raises SystemFileError with every line that cannot be read.
 
@@ -60,7 +61,7 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
     if mistakes:
         raise SystemFileError(where, mistakes)
     try:
-        equations = [left + reader.expanded(right) for left, right in reader.equations]
+        equations = [left_side + reader.expanded(right_side) for left_side, right_side in reader.equations]
     except InputError as error:
         raise SystemFileError(where, [("file", str(error))]) from error
     document = {"parameters": reader.parameters, "system": {"rhs": equations}}
@@ -76,7 +77,7 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
 
 
 class _Lines:
-    """What the lines so far say."""
+    """The content of the lines read so far."""
 
     def __init__(self) -> None:
         self.equations: list[tuple[str, list[str]]] = []  # the left side, and the tokens of the right one
@@ -88,57 +89,59 @@ class _Lines:
         self.has_capitals = False  # in what is read
 
     def read(self, line: str) -> None:
-        """Read a line. Raises InputError for what cannot be read."""
+        """Read a line. Raises InputError if it cannot be read."""
         if not line or line[0] in '#"':
             return
         if line[0] == "@":
             self.left_out["@"] = None
             return
         self.has_capitals |= line != line.lower()
-        word, rest = [*line.lower().split(None, 1), ""][:2]
+        word, arguments = [*line.lower().split(None, 1), ""][:2]
         tokens = tokens_of(line.lower().lstrip("!"))
-        words = [token for token in tokens if not token.isspace()]
-        is_keyword = is_name(word) and is_name(rest[:1])
+        tokens_kept = [token for token in tokens if not token.isspace()]
+        is_keyword = is_name(word) and is_name(arguments[:1])
         if is_keyword and word in _LEFT_OUT:
             self.left_out[word] = None
         elif is_keyword and word in (*_VALUES, *_INITIAL):
-            self._values(words[1:], self.parameters if word in _VALUES else self.initial)
-        elif (place := next((k for k, token in enumerate(words) if token == "="), None)) is None:
+            self._values(tokens_kept[1:], self.parameters if word in _VALUES else self.initial)
+        elif (equals_at := next((k for k, token in enumerate(tokens_kept) if token == "="), None)) is None:
             raise InputError(f"found {quoted(line)}, expected {_READ}")
-        elif len(words) > 5 and words[1:5] == ["(", "0", ")", "="]:
-            self.initial[words[0]] = "".join(words[5:])
+        elif len(tokens_kept) > 5 and tokens_kept[1:5] == ["(", "0", ")", "="]:
+            self.initial[tokens_kept[0]] = "".join(tokens_kept[5:])
         else:
-            found = derivative_at(words[:place], 0)
-            is_equation = found is not None and found.end == place
-            if not is_equation and (place != 1 or not is_name(words[0])):
+            derivative = derivative_at(tokens_kept[:equals_at], 0)
+            is_equation = derivative is not None and derivative.end == equals_at
+            if not is_equation and (equals_at != 1 or not is_name(tokens_kept[0])):
                 raise InputError(f"found {quoted(line)}, expected {_READ}: write functions, arrays and maps out")
             split = tokens.index("=") + 1
             if is_equation:
                 self.equations.append(("".join(tokens[:split]), tokens[split:]))
             else:  # of what was defined before
-                self.definitions[words[0]] = f"({self.expanded(tokens[split:])})"
+                self.definitions[tokens_kept[0]] = f"({self.expanded(tokens[split:])})"
 
-    def _values(self, words: list[str], values: dict[str, str]) -> None:
-        """a=1,b=-2.5 c=8/3: pairs with commas or blanks between them; an initial value alone is 0, as in XPP."""
+    def _values(self, tokens: list[str], values: dict[str, str]) -> None:
+        """Read pairs a=1,b=-2.5 c=8/3, separated by commas or blanks; an initial value alone is 0, as in XPP."""
         k = 0
-        while k < len(words):
-            name = words[k]
+        while k < len(tokens):
+            name = tokens[k]
             if not is_name(name):
                 raise InputError(f"found {quoted(name)}, expected NAME=NUMBER, as in par a=1, b=2.5")
             value, k = "0", k + 1
-            if words[k : k + 1] == ["="]:
-                end = k + 1 + (words[k + 1 : k + 2] == ["-"] or words[k + 1 : k + 2] == ["+"])
-                if words[end + 1 : end + 2] == ["/"]:  # where XPP stops reading, without a word
+            if tokens[k : k + 1] == ["="]:
+                end = k + 1 + (tokens[k + 1 : k + 2] == ["-"] or tokens[k + 1 : k + 2] == ["+"])
+                if tokens[end + 1 : end + 2] == ["/"]:  # where XPP stops reading, without a word
                     end += 2
-                    self.notes.append(f"{name} = {''.join(words[k + 1 : end + 1])} is read as it stands, unlike in XPP")
-                value, k = "".join(words[k + 1 : end + 1]), end + 1
+                    self.notes.append(
+                        f"{name} = {''.join(tokens[k + 1 : end + 1])} is read as it stands, unlike in XPP"
+                    )
+                value, k = "".join(tokens[k + 1 : end + 1]), end + 1
             elif values is self.parameters:  # XPP reads 0, which is rarely what is meant
                 raise InputError(f"found the parameter {quoted(name)} without a value, expected one: par {name}=0")
             values[name] = value
-            k += words[k : k + 1] == [","]
+            k += tokens[k : k + 1] == [","]
 
     def expanded(self, tokens: list[str]) -> str:
-        """A formula with definitions in the places of their names. Raises InputError where it becomes too long."""
+        """Substitute the definitions in a formula. Raises InputError if it becomes too long."""
         parts = [self.definitions.get(token, token) for token in tokens]
         if sum(map(len, parts)) > LIMITS.characters:
             raise InputError(f"found a formula of more than {LIMITS.characters} characters with its definitions put in")

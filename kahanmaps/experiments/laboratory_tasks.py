@@ -294,9 +294,9 @@ def lyapunov(
     transient: int | None = None,
     seed: int = 0,
 ) -> Result:
-    """Estimate Lyapunov exponents of floating-point orbits, by the exact tangent map, per unit of time."""
-    from kahanmaps.maps.floats.doubles import to_floats
+    """Lyapunov exponents of float orbits from random starts, by the exact tangent map, per unit of time."""
     from kahanmaps.maps.floats.ensemble import starts_in_box
+    from kahanmaps.maps.floats.float_conversion import to_floats
     from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)

@@ -173,7 +173,7 @@ def ensemble(
 ) -> Result:
     """Compute floating-point orbits from random initial points; count how many complete, and measure drift."""
     from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
-    from kahanmaps.maps.floats.fast import to_floats
+    from kahanmaps.maps.floats.float_orbit import to_floats
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     normal_form = _float_normal_form(system, method)

@@ -28,7 +28,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 @dataclass(frozen=True, eq=False)
 class AssociatedSystem(HtmlDisplay):
-    """f_s = B^T f_0: the signs, the matrix B with its coefficients as a polynomial in A, and the cubic K."""
+    """An associated system f_s = B^T f_0: the signs, B with its coefficients as a polynomial in A, and the cubic K."""
 
     signs: tuple[int, ...]
     coefficients: tuple[fmpq, ...]
@@ -37,7 +37,7 @@ class AssociatedSystem(HtmlDisplay):
 
     @cached_property
     def hamiltonian(self) -> CubicHamiltonian:
-        """K with the standard structure J."""
+        """The Hamiltonian K with the standard structure J."""
         return CubicHamiltonian(self.K, standard_structure(self.B.nrows()))
 
     @property
@@ -53,9 +53,9 @@ class AssociatedSystem(HtmlDisplay):
 
 @dataclass(frozen=True, eq=False)
 class ConjugateAssociate:
-    """f_s for signs that are those of a rational associated system but at the `root` t of a factor of chi.
+    """An associated system over Q[t]/g: the signs are rational except at the `root` t of a factor g of chi.
 
-    `coefficients` are those of B as a polynomial in A, in Q[t]/g; with the `chain` of H they give K.
+    `coefficients` are the coefficients in Q[t]/g of B as a polynomial in A; with the `chain` of H they give K.
     """
 
     root: Root
@@ -65,14 +65,14 @@ class ConjugateAssociate:
 
     @cached_property
     def name(self) -> str:
-        """A name for the root that is none of the variables."""
+        """A name for the root, different from the variables."""
         names = names_of(self.chain[0])
         candidates = itertools.chain(["t"], (f"t{k}" for k in itertools.count()))
         return next(name for name in candidates if name not in names)
 
     @cached_property
     def K_text(self) -> str:
-        """The cubic K with grad K = B grad H, its coefficients polynomials in the root."""
+        """The cubic K with grad K = B grad H, as text; its coefficients are polynomials in the root."""
         terms: dict[tuple[int, ...], EtaleElement] = {}
         for coefficient, H in zip(self.coefficients, self.chain, strict=True):
             for monomial, number in H.terms():
@@ -89,9 +89,10 @@ class ConjugateAssociate:
 
 @dataclass(frozen=True, eq=False)
 class FamilyMember(HtmlDisplay):
-    """A skew-Hamiltonian A, a cubic H of its space, and signs that pick one associated system (all + : f_0 itself).
+    """A member of the family: a skew-Hamiltonian A, a cubic H with A Hess(H) = Hess(H) A^T, and signs.
 
-    Raises HypothesisError where A is not skew-Hamiltonian or H not in its space.
+    The signs choose an associated system (all positive: f_0 itself). Raises HypothesisError if A is not
+    skew-Hamiltonian, or A Hess(H) is not Hess(H) A^T.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2])
@@ -119,7 +120,7 @@ class FamilyMember(HtmlDisplay):
 
     @property
     def dim(self) -> int:
-        """2m."""
+        """The dimension 2m."""
         return int(self.A.nrows())
 
     @property
@@ -152,7 +153,7 @@ class FamilyMember(HtmlDisplay):
         return tuple(CubicHamiltonian(H, standard_structure(self.dim)) for H in self.chain)
 
     def associate(self, signs: Sequence[int]) -> AssociatedSystem:
-        """The associated system with these signs. Raises InputError unless they are 1 or -1, one for each factor."""
+        """Return the associated system with these signs, 1 or -1 for each factor. Raises InputError for other signs."""
         if len(signs) != len(self.factors):
             raise InputError(f"found {len(signs)} signs, expected {len(self.factors)}, one for each factor of chi")
         if any(sign not in (1, -1) for sign in signs):
@@ -166,22 +167,22 @@ class FamilyMember(HtmlDisplay):
         return AssociatedSystem(tuple(signs), coefficients, evaluate_at_matrix(polynomial, self.A), K)
 
     def associated(self) -> Iterator[AssociatedSystem]:
-        """All rational associated systems up to an overall sign, 2^(r-1) for r factors; the first is f_0 itself."""
-        for rest in itertools.product((1, -1), repeat=len(self.factors) - 1):
-            yield self.associate((1, *rest))
+        """Return all rational associated systems up to an overall sign, 2^(r-1) for r factors; the first is f_0."""
+        for other_signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
+            yield self.associate((1, *other_signs))
 
     @cached_property
     def roots(self) -> dict[int, Root]:
-        """Roots of the factors, by their place, of degree 2 or more that occur once."""
+        """The roots of the factors of degree 2 or more with multiplicity 1, by the index of the factor."""
         factors = enumerate(self.factors)
         return {k: Root(f.polynomial) for k, f in factors if f.multiplicity == 1 and 2 <= f.degree <= MAX_DEGREE}
 
     def conjugate_associates(self) -> Iterator[ConjugateAssociate]:
-        """Those with the other sign at one root t of an irreducible factor g of degree 2 or more, over Q[t]/g.
+        """Return the associated systems with the opposite sign at one root t of a factor g of degree 2 or more.
 
-        For every such factor that occurs once and every choice of signs for the others, up to an overall sign. The
-        conjugates of B differ in the root, and the product of two of them has the other sign at both: with the rational
-        ones they generate all B_s where no root is repeated.
+        There is one over Q[t]/g for every such factor with multiplicity 1 and every choice of signs of the others, up
+        to an overall sign. Conjugates of B belong to other roots, and the product of two of them has the opposite sign
+        at both: together with the rational ones they generate all B_s if no root is repeated.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])
@@ -190,19 +191,21 @@ class FamilyMember(HtmlDisplay):
         [('root of t^2 - 2', '(-3*t)*x1^2*x2 + (-1/2*t)*x2^3 + (-3*t)*x3^2*x4 + (-2*t)*x4^3')]
         """
         for k, root in self.roots.items():
-            rest = [root.number_field.one]  # chi/(x - t), the highest coefficient first
+            quotient = [root.number_field.one]  # chi/(x - t), the highest coefficient first
             for c in chi(self.A).coeffs()[-2:0:-1]:
-                rest.append(rest[-1] * root.number_field.generator + c)
-            at_root = sum((c * root.number_field.generator**j for j, c in enumerate(reversed(rest))), 0 * rest[0])
-            flipped = [2 * c / at_root for c in reversed(rest)]
+                quotient.append(quotient[-1] * root.number_field.generator + c)
+            at_root = sum(
+                (c * root.number_field.generator**j for j, c in enumerate(reversed(quotient))), 0 * quotient[0]
+            )
+            flipped = [2 * c / at_root for c in reversed(quotient)]
             for signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
-                given = self.associate((*signs[:k], 1, *signs[k:]))
-                coefficients = tuple(a - b for a, b in zip(given.coefficients, flipped, strict=True))
-                yield ConjugateAssociate(root, given.signs, coefficients, self.chain)
+                associate = self.associate((*signs[:k], 1, *signs[k:]))
+                coefficients = tuple(a - b for a, b in zip(associate.coefficients, flipped, strict=True))
+                yield ConjugateAssociate(root, associate.signs, coefficients, self.chain)
 
     @cached_property
     def chosen(self) -> AssociatedSystem:
-        """The associated system that `signs` picks."""
+        """The associated system given by `signs`."""
         return self.associate(self.signs)
 
     def __eq__(self, other: object) -> bool:
@@ -217,10 +220,10 @@ class FamilyMember(HtmlDisplay):
 
 
 def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_poly:
-    """The polynomial of degree < m that is s_i modulo the i-th factor to its power, by Chinese remainders.
+    """Return the polynomial of degree < m that is s_i modulo the power of the i-th factor (Chinese remainders).
 
-    Its square is 1 modulo chi, and chi(A) = 0, so B = polynomial(A) has B^2 = I for every skew-Hamiltonian A, also
-    where chi has repeated roots.
+    Its square is 1 modulo chi, and chi(A) = 0, so B = polynomial(A) satisfies B^2 = I for every skew-Hamiltonian A,
+    even if chi has repeated roots.
 
     >>> t = fmpq_poly([0, 1])
     >>> sign_polynomial([Factor(t - 1, 1), Factor(t - 2, 1)], (1, -1))
@@ -232,7 +235,7 @@ def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_pol
     total = fmpq_poly([0])
     for factor, sign in zip(factors, signs, strict=True):
         part = factor.polynomial**factor.multiplicity
-        rest = modulus // part
-        _, inverse, _ = rest.xgcd(part)
-        total += sign * rest * (inverse % part)
+        cofactor = modulus // part
+        _, inverse, _ = cofactor.xgcd(part)
+        total += sign * cofactor * (inverse % part)
     return total % modulus

@@ -37,12 +37,12 @@ class CubicSpace:
 
 
 def default_variables(dim: int) -> tuple[str, ...]:
-    """x1, ..., x{dim}."""
+    """Return the names x1, ..., x{dim}."""
     return tuple(f"x{i + 1}" for i in range(dim))
 
 
 def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicSpace:
-    """The exact space of cubics for a skew-Hamiltonian A, generic or not.
+    """Compute the space of cubics for a skew-Hamiltonian A, generic or not; exact.
 
     >>> space = cubic_space(fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2]))
     >>> space.dimension, space.rank, space.unknowns
@@ -53,8 +53,8 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
     names = variables or default_variables(n)
     context = ring(names)
     exponents = list(monomials(n, 3))
-    place = {_indices(exponent): k for k, exponent in enumerate(exponents)}
-    weight = {key: _symmetry(key) for key in place}
+    position = {_indices(exponent): k for k, exponent in enumerate(exponents)}
+    weight = {key: _symmetry(key) for key in position}
     entries = [(i, k, A[i, k]) for i in range(n) for k in range(n) if A[i, k] != 0]
     by_row: list[list[tuple[int, fmpq]]] = [[] for _ in range(n)]
     for i, k, value in entries:
@@ -69,10 +69,10 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
                 row = [zero] * len(exponents)
                 for k, value in by_row[i]:
                     key = tuple(sorted((k, j, l)))
-                    row[place[key]] += value * weight[key]
+                    row[position[key]] += value * weight[key]
                 for k, value in by_row[j]:
                     key = tuple(sorted((i, k, l)))
-                    row[place[key]] -= value * weight[key]
+                    row[position[key]] -= value * weight[key]
                 flat += row
                 equations += 1
     solutions = nullspace(QQ, fmpq_mat(equations, len(exponents), flat))
@@ -84,12 +84,12 @@ def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicS
 
 
 def belongs(A: fmpq_mat, H: fmpq_mpoly) -> bool:
-    """Whether H is a homogeneous cubic with A (Hess H) = (Hess H) A^T."""
+    """Return whether H is a homogeneous cubic with A (Hess H) = (Hess H) A^T."""
     return is_homogeneous(H, 3) and next(_failures(A, H), None) is None
 
 
 def require_member(A: fmpq_mat, H: fmpq_mpoly) -> None:
-    """Raises HypothesisError, naming an entry that fails, unless H belongs to the cubics of A."""
+    """Raise HypothesisError, with an entry that fails, unless H belongs to the cubics of A."""
     if len(names_of(H)) != A.nrows():
         raise HypothesisError(
             f"A is {A.nrows()} x {A.ncols()} and H has {len(names_of(H))} variables, expected as many as A has rows"
@@ -109,9 +109,9 @@ def require_member(A: fmpq_mat, H: fmpq_mpoly) -> None:
 
 
 def chain(A: fmpq_mat, H: fmpq_mpoly, length: int | None = None) -> tuple[fmpq_mpoly, ...]:
-    """H_0 = H, H_1, ..., with grad H_i = A grad H_{i-1}; m of them unless `length` says otherwise.
+    """Return the chain H_0 = H, H_1, ... with grad H_i = A grad H_{i-1}, by default of length m.
 
-    Raises HypothesisError where H does not belong to the cubics of A, so that no H_1 exists.
+    Raises HypothesisError if H does not belong to the cubics of A, so that no H_1 exists.
     """
     require_member(A, H)
     hamiltonians = [H]
@@ -121,9 +121,9 @@ def chain(A: fmpq_mat, H: fmpq_mpoly, length: int | None = None) -> tuple[fmpq_m
 
 
 def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
-    """The homogeneous cubic with this gradient, by Euler's formula 3 H = x . grad H, checked.
+    """Return the homogeneous cubic with this gradient, by Euler's formula 3 H = x . grad H.
 
-    Raises HypothesisError where the quadratic forms are not a gradient.
+    Raises HypothesisError if the quadratic forms are not a gradient.
     """
     context = field[0].context()
     total = context.constant(0)
@@ -147,7 +147,7 @@ def _failures(A: fmpq_mat, H: fmpq_mpoly) -> Iterator[tuple[int, int, int, fmpq,
 
 
 def third_derivatives(H: fmpq_mpoly) -> list[fmpq_mat]:
-    """The constant matrices T_l = d(Hess H)/dx_l of a homogeneous cubic."""
+    """Return the constant matrices T_l = d(Hess H)/dx_l of a homogeneous cubic."""
     n = len(names_of(H))
     tensors = [[fmpq(0)] * (n * n) for _ in range(n)]
     for exponent, coefficient in H.terms():

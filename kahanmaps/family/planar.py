@@ -78,9 +78,9 @@ class PlanarPart:
 
 @dataclass(frozen=True, eq=False)
 class NormalForm(HtmlDisplay):
-    """x' = J grad H(x) as one planar system over K = Q[t]/chi: x = S z, and H(x) = l(h(X, Y)); see the module.
+    """The normal form of x' = J grad H(x): a planar system over K = Q[t]/chi with x = S z and H(x) = l(h(X, Y)).
 
-    Made by `normal_form`. That it is the system, exactly, is verified at construction.
+    It is constructed by `normal_form`, and verified exactly at construction.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [0, 1, 0, 0,  2, 0, 0, 0,  0, 0, 0, 2,  0, 0, 1, 0])
@@ -164,15 +164,15 @@ class NormalForm(HtmlDisplay):
         return first, second
 
     def step(self, X: Any, Y: Any, eps: Any) -> tuple[fmpq_poly, fmpq_poly]:
-        """The Kahan map at (X, Y). Raises SingularStep where 1 + eps^2 D is not a unit of K."""
+        """Return the image of (X, Y) under the Kahan map. Raises SingularStep if 1 + eps^2 D is not a unit of K."""
         X, Y = self._elements(X, Y)
         epsilon = rational(eps)
-        below = 1 + epsilon * epsilon * self.D(X, Y)
-        common, inverse, _ = below.xgcd(self.chi)
+        denominator = 1 + epsilon * epsilon * self.D(X, Y)
+        common, inverse, _ = denominator.xgcd(self.chi)
         if not common.is_one():
             raise SingularStep(
                 f"1 + eps^2 D and chi have the factor {format_univariate(common)} in common at this point for "
-                f"eps = {format_number(epsilon)}: the Kahan map has no value there",
+                f"eps = {format_number(epsilon)}: the Kahan map is not defined there",
                 (X, Y),
                 epsilon,
             )
@@ -182,14 +182,14 @@ class NormalForm(HtmlDisplay):
 
     @cached_property
     def parts(self) -> tuple[PlanarPart, ...]:
-        """The planar systems at the rational roots of chi, by increasing root; m of them where chi splits over Q."""
+        """The planar systems at the rational roots of chi, by increasing root; m of them if chi splits over Q."""
         u, v = ring(["u", "v"]).gens()
         slope = self.chi.derivative()
-        found = []
+        parts = []
         for root in sorted(-factor[0] / factor[1] for factor, _ in self.chi.factor()[1] if factor.degree() == 1):
             a, b, c, d = (coefficient(root) for coefficient in self.coefficients)
-            found.append(PlanarPart(root, 1 / slope(root), a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3))
-        return tuple(found)
+            parts.append(PlanarPart(root, 1 / slope(root), a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3))
+        return tuple(parts)
 
     @property
     def chi_text(self) -> str:
@@ -207,10 +207,10 @@ class NormalForm(HtmlDisplay):
         return _format_form(self.D_coefficients, _QUADRATIC)
 
     def verify(self) -> None:
-        """Checks exactly that this is the system. Raises AssertionError otherwise: it would be a mistake of ours.
+        """Verify the normal form exactly. Raises AssertionError if it is wrong, which would be an error in kahanmaps.
 
-        Checked are A^T S = S diag(C, C) with the companion matrix C of chi; that S^T J S is the Gram matrix of l(W),
-        which is invertible; and H(S z) = l(h), as symmetric trilinear forms.
+        The conditions are A^T S = S diag(C, C) with the companion matrix C of chi; that S^T J S is the Gram matrix of
+        l(W), which is invertible; and H(S z) = l(h), as symmetric trilinear forms.
         """
         n, m = self.dim, self.m
         if (self.S.nrows(), self.S.ncols(), len(names_of(self.H))) != (n, n, n):
@@ -254,11 +254,11 @@ class NormalForm(HtmlDisplay):
 
 
 def normal_form(member: FamilyMember) -> NormalForm:
-    """The normal form of the system that the signs of the member pick; `H` of the result is K for signs with a minus.
+    """Return the normal form of the associated system given by the signs of the member.
 
-    e1 is a unit vector, or a small combination of some, e2 the shortest of those with W(e1, e2) = 1 that LLL finds; of
-    the 2m choices so made the one with the shortest numbers is taken. Raises HypothesisError where chi has repeated
-    roots.
+    (If a sign is negative, `H` of the result is K.) e1 is a unit vector or a small combination of unit vectors, e2 a
+    short vector with W(e1, e2) = 1 found by LLL; among 2m such choices the one with the shortest numbers is used.
+    Raises HypothesisError if chi has repeated roots.
     """
     if not isinstance(member, FamilyMember):
         raise wrong_kind(member, "a member of the family", "km.load(...).member is one, of a file of kind [family]")
@@ -270,13 +270,13 @@ def normal_form(member: FamilyMember) -> NormalForm:
         )
     H = member.H if all(sign > 0 for sign in member.signs) else member.chosen.K
     modulus, tensors = chi_of(member.A), third_derivatives(H)
-    found: list[tuple[int, fmpq_mat, Quadruple]] = []
+    planes: list[tuple[int, fmpq_mat, Quadruple]] = []
     for e1 in _cyclic_vectors(member.A.transpose()):
         S = _symplectic_basis(member.A.transpose(), e1)
         coefficients = _coefficients(modulus, S, tensors)
         size = sum(map(bits_of, S.entries())) + sum(bits_of(entry) for c in coefficients for entry in c.coeffs())
-        found.append((size, S, coefficients))
-    _, S, coefficients = min(found, key=lambda choice: choice[0])
+        planes.append((size, S, coefficients))
+    _, S, coefficients = min(planes, key=lambda choice: choice[0])
     return NormalForm(member.A, H, S, coefficients)
 
 
@@ -359,7 +359,7 @@ def _unit(n: int, i: int) -> fmpq_mat:
 
 
 def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) -> str:
-    """A form over K as people write it."""
+    """Format a form over K as text."""
     text = ""
     for coefficient, monomial in zip(coefficients, monomials, strict=True):
         if coefficient.is_zero():

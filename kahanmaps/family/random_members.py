@@ -1,9 +1,9 @@
-"""Members of the family drawn at random, reproducible from a seed.
+"""Random members of the family, reproducible from a seed.
 
-In normal form A = diag(W^T, W) with W = diag(eigenvalues), or W the companion matrix of chi, and the
-cubics of A are written down at once: sums of planar cubics in the first case; in the second the t^(m-1)-coefficient
-of a cubic form in X = q_1 + q_2 t + ... and Y over Q[t]/chi. A random symplectic integer matrix then
-hides the normal form. So everything stays small and integral, whatever m is.
+In normal form A = diag(W^T, W) with W = diag(eigenvalues), or W the companion matrix of chi, and the cubics of A are
+known explicitly: sums of planar cubics in the first case; in the second the t^(m-1)-coefficient of a cubic form in
+X = q_1 + q_2 t + ... and Y over Q[t]/chi. The normal form is transformed by a random symplectic integer matrix, so all
+numbers are small integers for every m.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ MAX_M = 16  # beyond, H may be longer than the texts that system files allow
 
 
 def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) -> FamilyMember:
-    """A member whose A has these rational eigenvalues (each twice), hidden by a random symplectic matrix.
+    """Return a random member whose A has these rational eigenvalues (each twice).
 
     `size` bounds the integer coefficients of the planar cubics. Repeated eigenvalues are allowed and give a
-    diagonalisable, non-generic A.
+    diagonalizable, non-generic A.
 
     >>> member = random_member_with_eigenvalues([1, -2], seed=7)
     >>> [str(factor) for factor in member.factors]
@@ -56,7 +56,7 @@ def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: 
 
 
 def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
-    """A member whose A has characteristic polynomial chi(t)^2, chi of degree m, hidden by a random symplectic matrix.
+    """Return a random member whose A has the characteristic polynomial chi(t)^2, with chi of degree m.
 
     `size` bounds the integer coefficients of the cubic form over Q[t]/chi. Where chi has repeated roots A is not
     diagonalisable.
@@ -96,7 +96,7 @@ def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMe
 
 
 def random_member(m: int, seed: int, size: int = 1) -> FamilyMember:
-    """A member with a random integer chi without repeated roots, typically irreducible.
+    """Return a member with a random integer chi without repeated roots, typically irreducible.
 
     >>> random_member(3, seed=7).is_generic
     True
@@ -110,7 +110,7 @@ def random_member(m: int, seed: int, size: int = 1) -> FamilyMember:
 
 
 def parse_chi(text: str) -> fmpq_poly:
-    """A polynomial in t of degree at least 1, for `random_member_with_chi`.
+    """Parse a polynomial in t of degree at least 1, for `random_member_with_chi`.
 
     >>> parse_chi("(t - 1)*(t^2 - 2)")
     x^3 + (-1)*x^2 + (-2)*x + 2
@@ -124,7 +124,7 @@ def parse_chi(text: str) -> fmpq_poly:
 
 
 def random_eigenvalues(m: int, seed: int) -> list[int]:
-    """m distinct nonzero integers of small size, drawn from the seed.
+    """Return m distinct nonzero small integers, determined by the seed.
 
     >>> len(set(random_eigenvalues(5, seed=1)))
     5

@@ -1,4 +1,4 @@
-"""Members of the family that do not say so: a matrix A is looked for, given H and J alone.
+"""Recognition of members of the family: the search for a matrix A, given only H and J.
 
 x' = J grad H(x) with a homogeneous cubic H and a constant invertible skew J belongs to the family through every A with
 
@@ -39,7 +39,7 @@ _T = fmpq_poly([0, 1])
 
 @dataclass(frozen=True, eq=False)
 class FamilyStructure:
-    """A Hamiltonian system that was found to be a member: `member` is the system in the coordinates y with x = T y.
+    """The structure of a Hamiltonian system as a member: `member` is the system in the coordinates y with x = T y.
 
     T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of
     all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `find_family_structure`; that `member` is the system is
@@ -76,28 +76,28 @@ class FamilyStructure:
 
     @property
     def text(self) -> str:
-        """In a sentence: what was found."""
+        """A sentence that describes the structure."""
         factors = self.member.factors
         chi = " ".join(f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors)
         if self.member.m == 1:
-            found = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
+            sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
         else:
             how = "H splits: A"
             if len(factors) == 1:
                 split = factors[0].degree > 1
                 how = "H splits over the splitting field of chi: A" if split else "H does not split: A, not scalar,"
-            found = f"{how} with A Hess(H) = Hess(H) A^T has chi = {chi}"
-        return found if self.is_standard else f"{found}, in coordinates y with x = T y and standard J"
+            sentence = f"{how} with A Hess(H) = Hess(H) A^T has chi = {chi}"
+        return sentence if self.is_standard else f"{sentence}, in coordinates y with x = T y and standard J"
 
 
 def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
-    """A basis of all rational A with A^T J = J A and A Hess(H) = Hess(H) A^T, for an invertible J (default: standard).
+    """Return a basis of all A with A^T J = J A and A Hess(H) = Hess(H) A^T, for an invertible J (default: standard).
 
-    H is a homogeneous cubic. The matrices have integer entries, generate all the integer solutions, and are short: a
-    reduced lattice basis. The identity is among their combinations. Exact.
+    H is a homogeneous cubic. The result is a reduced lattice basis of all integer solutions; the identity lies in its
+    span. Exact.
 
-    Raises InputError where H is not a homogeneous cubic, J not an invertible skew matrix of its size, or the dimension
-    larger than 32.
+    Raises InputError if H is not a homogeneous cubic, J not an invertible skew matrix of the same size, or the
+    dimension larger than 32.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> names = ["x1", "x2", "x3", "x4"]
@@ -122,20 +122,20 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     rng = random.Random(n)
     few = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
     for chosen in (few, conditions):
-        found = _skew_solutions(chosen, n)
-        products = (S * condition for S in found for condition in conditions)
+        solutions = _skew_solutions(chosen, n)
+        products = (S * condition for S in solutions for condition in conditions)
         if all(product == product.transpose() for product in products):
             break
-    return _reduced([inverse * fmpq_mat(S) for S in found])
+    return _reduced([inverse * fmpq_mat(S) for S in solutions])
 
 
 def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
-    """The system as a member of the family, if it is one: with an A that splits H the furthest, of small entries.
+    """Search for a matrix A that makes the system a member of the family, with as many distinct roots as possible.
 
-    H must be a homogeneous cubic and J invertible, in dimension 2m; otherwise, and where only the multiples of I
-    satisfy A Hess(H) = Hess(H) A^T, None. (In dimension 2 the answer is A = I, for every H.) Where chi of A splits
-    over Q its roots are 1, 2, ..., r. The member is exact: FamilyMember verifies it. That no other A has more
-    distinct roots is certain where H depends on all variables, and otherwise what many small combinations showed.
+    Returns None if H is not a homogeneous cubic or J not invertible, and if only the multiples of I satisfy
+    A Hess(H) = Hess(H) A^T. (In dimension 2 the result is A = I, for every H.) If chi of A splits over Q, its roots are
+    1, 2, ..., r. The member is verified exactly. That no other A has more distinct roots is certain if H depends on all
+    variables; otherwise it is only the result of trying many small combinations.
 
     Raises InputError beyond dimension 32.
 
@@ -167,9 +167,9 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
 
 
 def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
-    """H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none. Exact.
+    """Return H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none.
 
-    Other structures J are not searched for.
+    The result is exact. Other structures J are not tried.
 
     >>> print(find_cubic_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "-q^2"])).H)
     1/3*q^3 + 1/2*p^2
@@ -191,7 +191,7 @@ def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
 
 
 def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure | None:
-    """`find_family_structure` of the system, where x' = J grad H with the standard J; None otherwise.
+    """Apply `find_family_structure` to a system x' = J grad H with the standard J; return None for others.
 
     >>> rhs = ["3*x3^2", "x2^2", "-3*x1^2", "-2*x2*x4"]
     >>> print(find_family_structure_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
@@ -202,14 +202,14 @@ def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure |
 
 
 def why_not_member(hamiltonian: CubicHamiltonian | None) -> str:
-    """In a sentence why the system is no member; None stands for one that `find_cubic_hamiltonian` has no H for."""
+    """Return a sentence that says why the system is not a member; None stands for a system without a Hamiltonian."""
     if hamiltonian is None:
         return "x' is not J grad H with J = [[0, I], [-I, 0]]"
     return _reason_against(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
 
 
 def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
-    """An invertible T with J = T [[0, I], [-I, 0]] T^T, so that x' = J grad H is y' = [[0, I], [-I, 0]] grad H(T y).
+    """Return T with J = T [[0, I], [-I, 0]] T^T, so that x' = J grad H becomes y' = [[0, I], [-I, 0]] grad H(T y).
 
     T = I for the standard J. Raises InputError unless J is skew and invertible.
 
@@ -220,17 +220,17 @@ def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
     n = J.nrows()
     if n != J.ncols() or n % 2 or J.transpose() != -J:
         raise InputError("J is not a skew matrix of even size")
-    rest, first, second = J, [], []
+    form, first, second = J, [], []
     for _ in range(n // 2):
-        entries = [(i, j) for i in range(n) for j in range(i + 1, n) if rest[i, j] != 0]
+        entries = [(i, j) for i in range(n) for j in range(i + 1, n) if form[i, j] != 0]
         if not entries:
             raise InputError("J is singular, expected an invertible matrix")
-        i, j = min(entries, key=lambda place: bits_of(rest[place]))
-        pivot = rest[i, j]
-        a, b = (fmpq_mat([[rest[k, column]] for k in range(n)]) for column in (i, j))
+        i, j = min(entries, key=lambda entry: bits_of(form[entry]))
+        pivot = form[i, j]
+        a, b = (fmpq_mat([[form[k, column]] for k in range(n)]) for column in (i, j))
         first.append(b.entries())
         second.append((a / -pivot).entries())
-        rest = rest - (a * b.transpose() - b * a.transpose()) / pivot
+        form = form - (a * b.transpose() - b * a.transpose()) / pivot
     return fmpq_mat([*first, *second]).transpose()
 
 
@@ -247,7 +247,7 @@ class _Part:
 
 
 def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
-    """An element with as many distinct eigenvalues as can be, made of small numbers."""
+    """Return an element with as many distinct eigenvalues as possible and small entries."""
     parts = list(_parts(space, QQ.identity(space[0].nrows())))
     A = fmpq_mat(space[0].nrows(), space[0].nrows())
     # The largest idempotent gets the eigenvalue 1: then A = I + ..., in which it does not occur.
@@ -282,12 +282,12 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
     is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(own, 2))
     flat, turned = (fmpq_mat([M.entries() for M in Ms]) for Ms in (own, [X.transpose() for X in own]))
     target = rank(QQ, flat * turned.transpose()) if is_commutative else 0
-    found: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
+    parts: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
     rng = random.Random(len(own))
     # The basis, then combinations with small coefficients, which grow slowly.
     bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
-    more = (combination_of([rng.randint(-bound, bound) for _ in own], own) for bound in bounds)
-    for tried, X in enumerate(itertools.chain(own, more)):
+    combinations = (combination_of([rng.randint(-bound, bound) for _ in own], own) for bound in bounds)
+    for tried, X in enumerate(itertools.chain(own, combinations)):
         if len(pieces := _projections(X, E)) > 1:
             for piece in pieces:
                 yield from _parts(space, piece)
@@ -298,10 +298,10 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
             power, length = power * value, length + polynomial.degree()
         for Y, minimal in _variants(X, E, polynomial):
             height = sum(map(bits_of, minimal.coeffs()))
-            found.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
-        if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in found) >= target:
+            parts.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
+        if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in parts) >= target:
             break
-    _, X, polynomial = max(found, key=lambda choice: choice[0])
+    _, X, polynomial = max(parts, key=lambda choice: choice[0])
     is_field = polynomial.degree() > 1
     yield _Part(E, X, polynomial) if is_field else _Part(E, _reduced([X + E * polynomial[0]])[0], _T)
 
@@ -311,11 +311,11 @@ def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
     factors = _factors_on(X, E)
     if len(factors) == 1:
         return [E]
-    found = []
+    projections = []
     for which in range(len(factors)):
         signs = [2 * (i == which) - 1 for i in range(len(factors))]
-        found.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
-    return found
+        projections.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
+    return projections
 
 
 def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
@@ -347,25 +347,25 @@ def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple
 
 def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
     """The skew S with S F symmetric for each F of `conditions`: a basis."""
-    place = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
+    position = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
     rows = []
     for condition in conditions:
         columns = condition.transpose().tolist()
-        for i, j in place:
-            row = [fmpz(0)] * len(place)
+        for i, j in position:
+            row = [fmpz(0)] * len(position)
             for k in range(n):  # S[i, k] F[k, j] - S[j, k] F[k, i]
                 if k != i:
-                    row[place[min(i, k), max(i, k)]] += columns[j][k] if i < k else -columns[j][k]
+                    row[position[min(i, k), max(i, k)]] += columns[j][k] if i < k else -columns[j][k]
                 if k != j:
-                    row[place[min(j, k), max(j, k)]] -= columns[i][k] if j < k else -columns[i][k]
+                    row[position[min(j, k), max(j, k)]] -= columns[i][k] if j < k else -columns[i][k]
             rows.append(row)
-    found = []
+    solutions = []
     for vector in nullspace(QQ, fmpq_mat(fmpz_mat(rows))):
         S = fmpz_mat(n, n)
-        for (i, j), value in zip(place, primitive_integers(vector), strict=True):
+        for (i, j), value in zip(position, primitive_integers(vector), strict=True):
             S[i, j], S[j, i] = value, -value
-        found.append(S)
-    return found
+        solutions.append(S)
+    return solutions
 
 
 def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
@@ -390,7 +390,7 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
 
 
 def _reason_against(hamiltonian: CubicHamiltonian) -> str:
-    """Why a system is not of the kind in which A is looked for; empty where it is."""
+    """Return why the search for A does not apply to a system; empty if it does."""
     if hamiltonian.dim % 2:
         return f"the dimension is {hamiltonian.dim}, expected an even one"
     if not hamiltonian.is_homogeneous:

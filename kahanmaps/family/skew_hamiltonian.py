@@ -39,7 +39,7 @@ class Factor:
 
 
 def defects(A: fmpq_mat) -> list[str]:
-    """What keeps A from being skew-Hamiltonian, entry by entry; empty if it is.
+    """Return the conditions that A violates, entry by entry; empty if A is skew-Hamiltonian.
 
     >>> defects(fmpq_mat([[1, 2], [0, 1]]))
     ['entry (1,2) is 2, expected 0: the upper right block must be skew']
@@ -50,7 +50,7 @@ def defects(A: fmpq_mat) -> list[str]:
     m, J = n // 2, standard_structure(n)
     expected = -(J * A.transpose() * J)  # equal to A exactly for A^T J = J A
     skew = "block must be skew"
-    found = []
+    messages = []
     for rule, top, left in (
         ("lower right block must be the transpose of the upper left one", m, m),
         (f"upper right {skew}", 0, m),
@@ -61,31 +61,31 @@ def defects(A: fmpq_mat) -> list[str]:
                 row, column = top + j, left + i
                 entry = fmpq(0) if top != left and i == j else expected[row, column]
                 if A[row, column] != entry:
-                    place = f"entry ({row + 1},{column + 1})"
-                    found.append(f"{place} is {_show(A[row, column])}, expected {_show(entry)}: the {rule}")
-    return found
+                    position = f"entry ({row + 1},{column + 1})"
+                    messages.append(f"{position} is {_show(A[row, column])}, expected {_show(entry)}: the {rule}")
+    return messages
 
 
 def require_skew_hamiltonian(A: fmpq_mat) -> None:
-    """Raises HypothesisError, naming the offending entries, unless A^T J = J A."""
-    found = defects(A)
-    if found:
-        shown = found[:4]
-        if len(found) > len(shown):
-            shown.append(f"and {len(found) - len(shown)} more")
-        raise HypothesisError("A is not skew-Hamiltonian: " + "; ".join(shown))
+    """Raise HypothesisError, with the wrong entries, unless A^T J = J A."""
+    messages = defects(A)
+    if messages:
+        first_messages = messages[:4]
+        if len(messages) > len(first_messages):
+            first_messages.append(f"and {len(messages) - len(first_messages)} more")
+        raise HypothesisError("A is not skew-Hamiltonian: " + "; ".join(first_messages))
 
 
 def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
-    """The irreducible factors of chi, where det(t - A) = chi(t)^2.
+    """Return the irreducible factors of chi, where det(t - A) = chi(t)^2, in the order of the signs.
 
-    In the order that signs refer to: linear factors by increasing root, then by degree and by the coefficients of
-    the monic polynomial, constant term first.
+    Linear factors come first, by increasing root, then factors by degree and by the coefficients of the monic
+    polynomial, constant term first.
     """
     require_skew_hamiltonian(A)
-    _, found = A.charpoly().factor()
+    _, pairs = A.charpoly().factor()
     factors = []
-    for polynomial, multiplicity in found:
+    for polynomial, multiplicity in pairs:
         monic = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
         factors.append(Factor(monic, multiplicity // 2))
 
@@ -96,7 +96,7 @@ def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
 
 
 def chi(A: fmpq_mat) -> fmpq_poly:
-    """The monic polynomial chi of degree m with det(t - A) = chi(t)^2.
+    """Return the monic polynomial chi of degree m with det(t - A) = chi(t)^2.
 
     >>> format_univariate(chi(fmpq_mat([[3, 0], [0, 3]])))
     't - 3'
@@ -108,7 +108,7 @@ def chi(A: fmpq_mat) -> fmpq_poly:
 
 
 def diagnosis(A: fmpq_mat) -> str:
-    """In words: how chi factors over Q, and what that means for A and its associated systems."""
+    """Describe how chi factors over Q, and the consequences for A and its associated systems."""
     factors = factors_of_chi(A)
     repeated = [factor for factor in factors if factor.multiplicity > 1]
     product = " ".join(
@@ -141,7 +141,7 @@ def diagnosis(A: fmpq_mat) -> str:
 
 
 def minimal_degree(A: fmpq_mat) -> int:
-    """The degree of the minimal polynomial: m unless A is derogatory, where I, A, ..., A^(m-1) are dependent.
+    """Return the degree of the minimal polynomial of A: m, or less if A is derogatory.
 
     >>> minimal_degree(fmpq_mat([[3, 0], [0, 3]]))
     1
@@ -150,7 +150,7 @@ def minimal_degree(A: fmpq_mat) -> int:
 
 
 def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:
-    """polynomial(A), by Horner's scheme."""
+    """Return polynomial(A), by Horner's scheme."""
     n = A.nrows()
     identity = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
     value = fmpq_mat(n, n)
@@ -160,7 +160,7 @@ def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:
 
 
 def companion_matrix(chi: fmpq_poly) -> fmpq_mat:
-    """Multiplication by t on Q[t]/chi in the basis 1, t, ..., t^(m-1).
+    """Return the matrix of multiplication by t on Q[t]/chi in the basis 1, t, ..., t^(m-1).
 
     >>> companion_matrix(fmpq_poly([-2, 0, 1]))
     [0, 2]
@@ -172,16 +172,15 @@ def companion_matrix(chi: fmpq_poly) -> fmpq_mat:
 
 
 def two_blocks(first: fmpq_mat, second: fmpq_mat) -> fmpq_mat:
-    """diag(first, second) of two square matrices of the same size."""
+    """Return diag(first, second) for two square matrices of the same size."""
     zeros = [fmpq(0)] * first.nrows()
     return fmpq_mat([[*row, *zeros] for row in first.tolist()] + [[*zeros, *row] for row in second.tolist()])
 
 
 def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
-    """A random integer matrix S with S^T J S = J and small entries: a product of elementary symplectic matrices.
+    """Return a random integer matrix S with S^T J S = J and small entries, a product of elementary symplectic matrices.
 
-    Variables are mixed round by round, but each factor adds only a few entries, so that what is
-    hidden by S keeps small coefficients.
+    Each factor adds only a few entries, so that transformed systems keep small coefficients.
     """
     n = 2 * m
     S = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
@@ -214,12 +213,12 @@ def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
 
 
 def bits_of(number: fmpq) -> int:
-    """The length of a number: 1 for 1, 0 for zero."""
+    """Return the bit length of a number: 1 for 1, 0 for zero."""
     return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
 
 
 def symplectic_inverse(S: fmpq_mat) -> fmpq_mat:
-    """S^{-1} = J^{-1} S^T J for symplectic S."""
+    """Return S^{-1} = J^{-1} S^T J for symplectic S."""
     J = standard_structure(S.nrows())
     return -(J * S.transpose() * J)
 

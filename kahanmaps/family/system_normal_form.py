@@ -1,7 +1,7 @@
-"""The normal form of a system, declared or found: what fast orbits and the n-th iterate are made from.
+"""The normal form of a system, by which fast orbits and the n-th iterate are computed.
 
-A member of the family has a normal form where chi has no repeated root. A system that was not declared a member is
-one all the same if linear algebra finds an A for its Hamiltonian (`recognise`).
+A member of the family has a normal form if chi has no repeated root. A system that was not declared as a member is
+recognized as one if linear algebra finds an A for its Hamiltonian (recognition.py).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class SystemNormalForm:
 
 @dataclass(frozen=True)
 class NoNormalForm:
-    """There is no normal form, with the reason; of a member whose chi has a repeated root `text` and `T` as there."""
+    """The reason why there is no normal form; `text` and `T` are given for a member whose chi has a repeated root."""
 
     reason: str
     text: str = field(default="", compare=False)
@@ -52,7 +52,7 @@ class NoNormalForm:
 def system_normal_form(
     system: QuadraticSystem | Any, hamiltonian: CubicHamiltonian | None = None, member: FamilyMember | None = None
 ) -> SystemNormalForm | NoNormalForm:
-    """The normal form of a system, from what is known of it: a member, its Hamiltonian, or nothing.
+    """Compute the normal form of a system, given its structure as a member or its Hamiltonian, if known.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> system = random_member_with_eigenvalues([1, -2, 3], seed=7).chosen.system
@@ -68,12 +68,14 @@ def system_normal_form(
     declared, T = member is not None, None
     if member is None:
         hamiltonian = hamiltonian or find_cubic_hamiltonian(system)
-        found = None if hamiltonian is None else find_family_structure(hamiltonian)
-        if found is None:
+        structure = None if hamiltonian is None else find_family_structure(hamiltonian)
+        if structure is None:
             return NoNormalForm(why_not_member(hamiltonian))
-        member = found.member
-        T = None if found.is_standard else found.T
-    factors = "*".join(f"({one})" + f"^{one.multiplicity}" * (one.multiplicity > 1) for one in member.factors)
+        member = structure.member
+        T = None if structure.is_standard else structure.T
+    factors = "*".join(
+        f"({factor})" + f"^{factor.multiplicity}" * (factor.multiplicity > 1) for factor in member.factors
+    )
     text = f"{'a' if declared else 'a recognised'} member of the family, chi = {factors}"
     try:
         form = normal_form(member)

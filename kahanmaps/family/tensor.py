@@ -1,4 +1,4 @@
-"""Systems over an algebra K = Q[t]/(chi), written over Q, and systems over Q that are of this kind.
+"""Systems over an algebra K = Q[t]/(chi) as systems over Q, and the search for such a structure.
 
 A quadratic system in n variables over K is one in n m variables over Q, m = deg chi: x = x_0 + x_1 t + ... for every
 variable. Its Kahan map is that over K, and inherits what that has, roots of chi repeated or not: docs/mathematics.md,
@@ -26,12 +26,12 @@ from kahanmaps.family.skew_hamiltonian import companion_matrix, evaluate_at_matr
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system
 
 GENERATOR = "t"
-_LARGEST = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
+_MAX_DIMENSION = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
 _DRAWS = 40
 
 
 def over_algebra(system: QuadraticSystem, chi: fmpq_poly) -> QuadraticSystem:
-    """The system over Q of a system over K = Q[t]/(chi): x stands for x_0 + x_1 t + ....
+    """Return the system over Q of a system over K = Q[t]/(chi), where x stands for x_0 + x_1 t + ....
 
     `system` may have the symbol t in its coefficients, which stands for the generator of K, and no other; chi may have
     repeated roots. Exact. Raises InputError for a constant chi and for other symbols.
@@ -55,14 +55,15 @@ def over_algebra(system: QuadraticSystem, chi: fmpq_poly) -> QuadraticSystem:
 
 
 def split_names(variables: Sequence[str], m: int) -> tuple[str, ...]:
-    """x_0, ..., x_(m-1) for every variable x."""
+    """Return the names x_0, ..., x_(m-1) for every variable x."""
     return tuple(f"{name}_{k}" for name in variables for k in range(m))
 
 
 def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[RationalFunction, ...]:
-    """The m functions over Q that a rational function of the variables and eps is over K, t^0 first.
+    """Return the m components over Q of a rational function of the variables and eps over K, t^0 first.
 
-    If the Kahan map over K conserves it, that over Q conserves them all. Raises BudgetExceeded where they are large.
+    If the Kahan map over K conserves the function, the map over Q conserves all components. Raises BudgetExceeded if
+    they are too large.
 
     >>> x, eps = ring(["x", "eps"]).gens()
     >>> for one in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
@@ -70,20 +71,20 @@ def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[Rat
     x_0^2 + 2*x_1^2
     2*x_0*x_1
     """
-    K, above, below = _quotient(function, chi)
-    found = below.solve(K.matrix(above.nrows(), 1, [above[i, 0] for i in range(above.nrows())]))
-    return tuple(_rational(entry) for entry in found.entries())
+    K, numerator, denominator = _quotient(function, chi)
+    solution = denominator.solve(K.matrix(numerator.nrows(), 1, [numerator[i, 0] for i in range(numerator.nrows())]))
+    return tuple(_rational(entry) for entry in solution.entries())
 
 
 def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFunction:
-    """The norm from K to Q: where dx/phi is invariant over K, dx/N(phi) is over Q.
+    """Return the norm N(phi) from K to Q: if dx/phi is invariant over K, dx/N(phi) is invariant over Q.
 
     >>> x, eps = ring(["x", "eps"]).gens()
     >>> print(inherited_density(RationalFunction(x, x**0), fmpq_poly([-2, 0, 1])).numerator)
     x_0^2 - 2*x_1^2
     """
-    _, above, below = _quotient(function, chi)
-    return _rational(above.det() / below.det())
+    _, numerator, denominator = _quotient(function, chi)
+    return _rational(numerator.det() / denominator.det())
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +115,7 @@ class TensorStructure:
 
     @property
     def text(self) -> str:
-        """In a sentence: what the system is over K."""
+        """A sentence that describes the system over K."""
         what = {1: "a system in one variable", 2: "a planar system"}.get(
             self.rank, f"a system in {self.rank} variables"
         )
@@ -128,10 +129,11 @@ class TensorStructure:
 
 
 def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
-    """The largest algebra K = Q[C] over which this is a system, or None where that is Q, or no single C generates it.
+    """Search for the largest algebra K = Q[C] over which a system is defined.
 
-    All C with C f'(x) = f'(x) C are found by linear algebra over Q, up to dimension 12; where they do not commute with
-    each other (f does not depend on all variables, or is linear), None. Exact.
+    Returns None if it is Q, or no single C generates it. All C with C f'(x) = f'(x) C are computed by linear algebra
+    over Q, up to dimension 12; the result is also None if they do not commute with each other (f does not depend on all
+    variables, or is linear). Exact.
 
     >>> f = over_algebra(QuadraticSystem.from_text(["x", "y"], ["y^2", "x^2"]), fmpq_poly([0, 0, 1]))
     >>> print(tensor_structure(f).text)
@@ -140,26 +142,26 @@ def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
     True
     """
     system = as_system(system)
-    if system.dim > _LARGEST or system.symbols:
+    if system.dim > _MAX_DIMENSION or system.symbols:
         return None
     space = centroid(system)
     if len(space) == 1 or any(B * C != C * B for B, C in itertools.combinations(space, 2)):
         return None
     rng = random.Random(len(space))
     draws = ([rng.randint(-2, 2) for _ in space] for _ in range(_DRAWS))
-    found = []
+    candidates = []
     for C in [*space, *(combination_of(weights, space) for weights in draws)]:
         chi = C.minpoly()
         if chi.degree() == len(space) and _is_free(C, chi):
-            found.append((sum(abs(c).p.bit_length() + c.q.bit_length() for c in chi.coeffs()), C, chi))
-    if not found:
+            candidates.append((sum(abs(c).p.bit_length() + c.q.bit_length() for c in chi.coeffs()), C, chi))
+    if not candidates:
         return None
-    _, C, chi = min(found, key=lambda choice: choice[0])
+    _, C, chi = min(candidates, key=lambda choice: choice[0])
     return TensorStructure(system, C, chi)
 
 
 def centroid(system: QuadraticSystem) -> list[fmpq_mat]:
-    """A basis, short and integral, of all C with C f'(x) = f'(x) C for all x, by exact linear algebra."""
+    """Return a reduced integral basis of all C with C f'(x) = f'(x) C for all x, by exact linear algebra."""
     n = system.dim
     slopes = [system.B, *(fmpq_mat(n, n, [q[j, k] for q in system.Q for j in range(n)]) for k in range(n))]
     rows = []
@@ -178,16 +180,16 @@ def centroid(system: QuadraticSystem) -> list[fmpq_mat]:
 
 
 def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
-    """Whether C f'(x) = f'(x) C as polynomials in x: for B and for each of the constant matrices df'/dx_k."""
+    """Return whether C f'(x) = f'(x) C as polynomials in x, by the linear part B and each constant matrix df'/dx_k."""
     n = f.dim
     slopes = (fmpq_mat(n, n, [q[j, k] for q in f.Q for j in range(n)]) for k in range(n))
     return C * f.B == f.B * C and all(C * S == S * C for S in slopes)
 
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
-    """Whether Q^n is free over Q[C]: each factor p of chi annihilates as much as in a free module, and no more."""
-    copies, rest = divmod(C.nrows(), int(chi.degree()))
-    return rest == 0 and all(
+    """Return whether Q^n is free over Q[C]: each factor p of chi annihilates a space of the right dimension."""
+    copies, remainder = divmod(C.nrows(), int(chi.degree()))
+    return remainder == 0 and all(
         C.nrows() - evaluate_at_matrix(p, C).rank() == copies * p.degree() for p, _ in chi.factor()[1]
     )
 
@@ -195,7 +197,7 @@ def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
 def components(
     polynomial: fmpq_mpoly, variables: Sequence[str], chi: fmpq_poly, names: Sequence[str] = ()
 ) -> list[fmpq_mpoly]:
-    """The coefficients of 1, t, ..., t^(m-1) of a polynomial in x = x_0 + x_1 t + ..., in the ring of `names`.
+    """Return the coefficients of 1, t, ..., t^(m-1) of a polynomial in x = x_0 + x_1 t + ....
 
     Of the polynomial's own variables the first ones are split, into `variables`, and t and those in `names` are kept.
     Without `names` the ring is that of the variables.
@@ -237,6 +239,6 @@ def _quotient(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField
 
 
 def _rational(element: Function) -> RationalFunction:
-    """A quotient in lowest terms."""
+    """Return a quotient in lowest terms."""
     common = element.numerator.gcd(element.denominator)
     return RationalFunction(element.numerator / common, element.denominator / common)

@@ -53,7 +53,7 @@ class AlgebraicMap(MapFamily):
         return self._at_number(self.root.real_approximation())
 
     @property
-    def rows(self) -> Any:  # type: ignore[override]  # nobody writes it
+    def rows(self) -> Any:  # type: ignore[override]  # read only
         raise InputError(self.unsupported_reason)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
@@ -65,7 +65,7 @@ class AlgebraicMap(MapFamily):
 
     @property
     def _name(self) -> str:
-        """What stands for the root: of a map that does not contain it the t of Q[t]/g."""
+        """The name of the root: the symbol of the map, or t if the map does not contain the root."""
         return self.given.symbols[0] if self.given.symbols else "t"
 
     def written(self) -> dict[str, Any]:

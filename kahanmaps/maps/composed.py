@@ -1,7 +1,7 @@
-"""Compositions of maps and of their inverses, which are stepped factor by factor.
+"""Compositions of maps and of their inverses, evaluated factor by factor.
 
-A composition has no value where one of its steps has none, even if its formulas, multiplied out, have one there. They
-are multiplied out only to be written down.
+A composition is not defined where one of its steps is not defined, even if its expanded formulas are. The formulas are
+expanded only for output.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TRIES = 20
 
 @dataclass(frozen=True, eq=False)
 class MapFactor:
-    """A map of a composition, or its inverse; `values` are those of its symbols, functions of the composition's."""
+    """A factor of a composition: a map or its inverse; `values` are the values of its symbols."""
 
     map: MapFamily
     is_inverse: bool
@@ -37,12 +37,12 @@ class MapFactor:
 
     @property
     def subject(self) -> tuple[Any, ...]:
-        """All that determines it."""
+        """The data that determine the factor."""
         return (int(self.is_inverse), *self.map_and_values)
 
     @property
     def map_and_values(self) -> tuple[Any, ...]:
-        """The same without its direction."""
+        """The data that determine the factor, without its direction."""
         return (self.map.subject, self.values)
 
     def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> Map:
@@ -50,14 +50,14 @@ class MapFactor:
         values = [function.value(over, symbols) for function in self.values]
         if any(value is None for value in values):
             if over.characteristic:
-                raise BadPrime(f"modulo {over.characteristic} a parameter has no value", over.characteristic)
-            raise InputError("found a parameter of a part that has no value where the symbols have these")
-        found = self.map.at(eps, over, values)
-        return found.inverse if self.is_inverse else found
+                raise BadPrime(f"modulo {over.characteristic} a parameter has a pole", over.characteristic)
+            raise InputError("a parameter of a part has a pole at these values of the symbols")
+        map_at_eps = self.map.at(eps, over, values)
+        return map_at_eps.inverse if self.is_inverse else map_at_eps
 
 
 class ComposedMap(MapFamily):
-    """The map that takes one step of each part after the other; `composed_map` makes it."""
+    """The composition of several maps; constructed by `composed_map`."""
 
     title = "composition"
 
@@ -79,21 +79,21 @@ class ComposedMap(MapFamily):
         return (self.variables, self.symbols, [part.subject for part in self.parts])
 
     @cached_property
-    def time_steps(self) -> int:  # type: ignore[override]  # nobody writes it
+    def time_steps(self) -> int:  # type: ignore[override]  # read only
         """The sum of those of the letters, where these are one map and its inverse; else there is no one flow."""
         letters = self._letters
-        return sum(steps for _, steps in letters) if all(one == letters[0][0] for one, _ in letters) else 0
+        return sum(steps for _, steps in letters) if all(letter == letters[0][0] for letter, _ in letters) else 0
 
     @property
     def _letters(self) -> list[tuple[Any, int]]:
-        """What each part is, compositions taken apart, and its time steps, with a sign."""
-        found: list[tuple[Any, int]] = []
+        """The elementary factors, with compositions expanded, and the signed number of time steps of each."""
+        all_letters: list[tuple[Any, int]] = []
         for part in self.parts:
-            letters = [(part.map_and_values, part.map.time_steps)]
+            part_letters = [(part.map_and_values, part.map.time_steps)]
             if isinstance(part.map, ComposedMap) and not part.values:
-                letters = part.map._letters
-            found += [(letter, -steps if part.is_inverse else steps) for letter, steps in letters]
-        return found
+                part_letters = part.map._letters
+            all_letters += [(letter, -steps if part.is_inverse else steps) for letter, steps in part_letters]
+        return all_letters
 
     @property
     def digits(self) -> int:
@@ -114,12 +114,12 @@ class ComposedMap(MapFamily):
 
     @property
     def is_small(self) -> bool:
-        """Whether the formulas of the map are short enough to be multiplied out."""
+        """Whether the formulas of the map are short enough to be expanded."""
         return self._multiplied_out is not None
 
     @property
     def multiplied_out(self) -> ImplicitMap:
-        """The same map by its formulas, without its inverse. Raises InputError (TooLarge) where they are long."""
+        """The map by its expanded formulas, without its inverse. Raises InputError (TooLarge) if they are too long."""
         if self._multiplied_out is None:
             raise TooLarge(_too_large(self.parts))
         return self._multiplied_out
@@ -130,13 +130,13 @@ class ComposedMap(MapFamily):
         return self.multiplied_out.image
 
     @property
-    def rows(self) -> Rows:  # type: ignore[override]  # nobody writes it
-        """Those of the map multiplied out. Raises InputError where they are long."""
+    def rows(self) -> Rows:  # type: ignore[override]  # read only
+        """The rows of the expanded map. Raises InputError if the formulas are too long."""
         return self.multiplied_out.rows
 
     @cached_property
     def inverse_rows(self) -> Rows:
-        """Those of the inverses multiplied out. Raises InputError where they are long."""
+        """The rows of the expanded inverse. Raises InputError if the formulas are too long."""
         backward = _reversed(self.parts)
         image = _formulas(self.names, backward)
         if image is None:
@@ -145,7 +145,7 @@ class ComposedMap(MapFamily):
 
     @property
     def equations(self) -> tuple[fmpq_mpoly, ...]:
-        """Those of the map multiplied out. Raises InputError where they are long."""
+        """The equations of the expanded map. Raises InputError if the formulas are too long."""
         return self.multiplied_out.equations
 
     def written(self) -> dict[str, Any]:
@@ -200,23 +200,23 @@ def composed_map(
     >>> conjugate.step(["1/9"]), g.at("1/2").inverse.step(f.at("1/2").step(g.at("1/2").step(["1/9"])))
     ((1/6,), (1/6,))
     """
-    powers = [given if isinstance(given, tuple) else (given, 1) for given in maps]
+    powers = [entry if isinstance(entry, tuple) else (entry, 1) for entry in maps]
     if symbols is None:
-        symbols = tuple(dict.fromkeys(name for one, _ in powers for name in one.symbols))
+        symbols = tuple(dict.fromkeys(name for map_, _ in powers for name in map_.symbols))
     context = ring(symbols)
     own = {name: RationalFunction(x, context.constant(1)) for name, x in zip(symbols, context.gens(), strict=True)}
     given_parts: list[MapFactor] = []
-    for k, (one, power) in enumerate(powers):
-        known = own | dict(values[k]) if values else own
-        missing = next((name for name in one.symbols if name not in known), None)
+    for k, (map_, power) in enumerate(powers):
+        functions = own | dict(values[k]) if values else own
+        missing = next((name for name in map_.symbols if name not in functions), None)
         if missing is not None:
             raise InputError(
-                f"found a map with the symbol {missing}, expected its value, or a composition with that symbol"
+                f"found a map with the symbol {missing}: give its value, or make it a symbol of the composition"
             )
-        given_parts += [MapFactor(one, power < 0, tuple(known[name] for name in one.symbols))] * abs(power)
+        given_parts += [MapFactor(map_, power < 0, tuple(functions[name] for name in map_.symbols))] * abs(power)
     if not given_parts:
         raise InputError("found no map to compose, expected at least one")
-    parts: list[MapFactor] = []  # without those that their neighbours undo
+    parts: list[MapFactor] = []  # after cancellation of neighbours that are inverse to each other
     for part in given_parts:
         if parts and parts[-1].is_inverse != part.is_inverse and parts[-1].map_and_values == part.map_and_values:
             parts.pop()
@@ -226,11 +226,11 @@ def composed_map(
     parts = parts or [*given_parts[:1], *_reversed(given_parts[:1])]
     if any(part.map.dim != first.dim for part in parts):
         dimensions = ", ".join(str(part.map.dim) for part in parts)
-        raise InputError(f"found maps of the dimensions {dimensions}, expected one")
+        raise InputError(f"the maps must have the same dimension: got {dimensions}")
     for part in parts:
         if set(part.map.variables) == set(first.variables) and part.map.variables != first.variables:
             orders = f"{', '.join(first.variables)} and {', '.join(part.map.variables)}"
-            raise InputError(f"found the variables in two orders, {orders}, expected one order")
+            raise InputError(f"the maps must have their variables in the same order: got {orders}")
         if part.is_inverse:
             _ = part.map.at(1, QQ, [QQ.one for _ in part.values]).inverse  # raises InputError where there is none
     variables = first.variables if variables is None else tuple(variables)
@@ -245,7 +245,7 @@ def _reversed(parts: Sequence[MapFactor]) -> list[MapFactor]:
 
 
 def is_involution(map_: MapFamily) -> bool:
-    """Whether Phi(Phi(x)) = x, at random points modulo primes: one of them fails by chance with probability < 2^-40."""
+    """Return whether Phi(Phi(x)) = x at random points modulo primes; the probability of an error is below 2^-40."""
     rng, tried = random.Random(f"involution {derive_seed(0, *map_.subject)}"), 0
     for _ in range(_TRIES):
         field = random_prime_field(rng)
@@ -282,5 +282,5 @@ def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[Rational
 def _too_large(parts: Sequence[MapFactor]) -> str:
     return (
         f"found a composition of {counted(len(parts), 'map')} whose formulas are too large to be multiplied out, "
-        "expected a shorter one: what is asked for is about formulas"
+        "expected a shorter one, since the request needs its formulas"
     )

@@ -1,4 +1,4 @@
-"""What eps is and which time step it makes: all that say so ask here, and here the maps are asked.
+"""The convention for eps and the time step of a map, and the sentences that state it.
 
 A step of a map advances the flow that it approximates by `time_steps` times 2 eps: once for a Kahan map, k times for
 its k-th power. A product of maps of different fields approximates no flow with one time, and has no time step.
@@ -31,18 +31,18 @@ def resolve_eps(eps: Any, time_step: Any) -> Any:
 
 
 def _time_steps(maps: tuple[MapFamily, ...]) -> list[int]:
-    """The different ones of the maps of which a record speaks together, as far as they have any."""
+    """Return the distinct numbers of time steps of the maps, without 0."""
     return sorted({map_.time_steps for map_ in maps if map_.has_eps} - {0}) if maps else [1]
 
 
 def time_step(eps: Any, *maps: MapFamily) -> Any:
-    """The time step at eps, a number or an element of a field; None where the maps have none, or not the same."""
+    """Return the time step at eps, a number or an element of a field; None if the maps have none, or different ones."""
     steps = _time_steps(maps)
     return 2 * steps[0] * eps if len(steps) == 1 else None
 
 
 def convention(*maps: MapFamily) -> str:
-    """The sentence that every record carries, for the maps of which it speaks together."""
+    """Return the sentence about eps for a record about these maps."""
     if maps and not any(map_.has_eps for map_ in maps):
         return NO_EPS
     steps = [f"{2 * steps} eps" for steps in _time_steps(maps)]
@@ -52,14 +52,14 @@ def convention(*maps: MapFamily) -> str:
 
 
 def eps_share(map_: MapFamily) -> str:
-    """The same of one map, the other way round: "eps is half the time step"; empty where it has none."""
+    """Return "eps is half the time step" or the like for a map; empty if it has no time step."""
     if not map_.time_steps:
         return ""
     return f"eps is {'half' if map_.time_steps == 1 else f'{fmpq(1, 2 * map_.time_steps)} of'} the time step"
 
 
 def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
-    """What every record says of eps, None standing for every one: its value, the time step, and what eps is.
+    """Return the entries of a record about eps (None: every eps): its value, the time step and the convention.
 
     The value is None where the maps do not depend on eps.
     """
@@ -72,7 +72,7 @@ def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
 
 
 def eps_words(context: Mapping[str, Any]) -> str:
-    """For which eps a record speaks, with the time step where there is one, to follow the name of the map."""
+    """Return the text for the eps of a record and its time step, to follow the name of the map."""
     meaning = context.get("convention", CONVENTION)
     if meaning == NO_EPS:
         return ""
@@ -83,7 +83,7 @@ def eps_words(context: Mapping[str, Any]) -> str:
 
 
 def eps_told(eps: fmpq | None, *maps: MapFamily) -> str:
-    """The words for an eps and maps.
+    """Return the text for an eps and maps.
 
     >>> eps_told(fmpq(1, 10)), eps_told(None)
     (', eps = 1/10 (time step 2 eps = 1/5)', ', every eps (the time step is 2 eps)')

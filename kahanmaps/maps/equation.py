@@ -1,7 +1,7 @@
-"""The equation of a step over a field: the matrix (M | -r), whose entries are forms of one degree in (X : Z).
+"""The equation of a map over a field: the matrix (M | -r), whose entries are forms of the same degree in (X : Z).
 
-The evaluators start from it: integers over one denominator (integer_steps.py), machine
-numbers (floats/steps.py), curves and forms in projective space (projective.py).
+All evaluators use it: integer points (orbits/integer_steps.py), floating-point numbers (floats/steps.py), curves and
+forms in projective space (projective.py).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from kahanmaps.algebra.minors import Product, kernel_minors
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
 from kahanmaps.errors import InputError
 
-_MOST_TERMS = 400  # of forms that are quicker than minors
+_MAX_TERMS = 400  # up to this number of terms explicit forms are faster than minors
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, Any], ...]
@@ -27,10 +27,10 @@ Terms = tuple[tuple[int, Any], ...]
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """The matrix L = (M | -r) over a field, its entries forms of one degree in (X_1, ..., X_n, Z).
+    """The matrix L = (M | -r) over a field, whose entries are forms of the same degree in (X_1, ..., X_n, Z).
 
-    `exponents` lists monomials of that degree in X_1, ..., X_n, Z; entry (i, j) of L is the sum of c times monomial k
-    over the pairs (k, c) of `terms[i][j]`. In degree 1 the monomials are X_1, ..., X_n, Z in this order.
+    `exponents` lists the monomials of that degree; entry (i, j) of L is the sum of c times monomial k over the pairs
+    (k, c) of `terms[i][j]`. In degree 1 the monomials are X_1, ..., X_n, Z in this order.
     """
 
     over: Field
@@ -39,7 +39,7 @@ class Equation:
 
     @property
     def dim(self) -> int:
-        """n."""
+        """The dimension n."""
         return len(self.terms)
 
     @cached_property
@@ -48,11 +48,11 @@ class Equation:
         return int(sum(self.exponents[0]))
 
     def monomials(self, X: Sequence[Any], times: Product = operator.mul) -> list[Any]:
-        """The values of the monomials at (X_1, ..., X_n, Z), elements of any ring that `times` multiplies."""
+        """Return the monomials at (X_1, ..., X_n, Z), elements of any ring with the multiplication `times`."""
         if self.degree == 1:
             return list(X)
         powers: list[list[Any]] = [[None, entry] for entry in X]
-        found = []
+        monomials = []
         for exponent in self.exponents:
             total = None
             for table, e in zip(powers, exponent, strict=True):
@@ -60,11 +60,11 @@ class Equation:
                     table.append(times(table[-1], table[1]))
                 if e:
                     total = table[e] if total is None else times(total, table[e])
-            found.append(total)
-        return found
+            monomials.append(total)
+        return monomials
 
     def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
-        """L at the point where the monomials have these values."""
+        """Return L at the point where the monomials have these values."""
         return [
             [sum((monomials[k] * c for k, c in entry[1:]), monomials[entry[0][0]] * entry[0][1]) if entry else zero
              for entry in row]
@@ -72,9 +72,9 @@ class Equation:
         ]  # fmt: skip
 
     def image(self, X: Sequence[Any], zero: Any, times: Product = operator.mul) -> list[Any]:
-        """The image of (X_1 : ... : X_n : Z), elements of any ring, perhaps with a factor in common: the kernel of L.
+        """Return the image of (X_1 : ... : X_n : Z) over any ring, perhaps with a common factor: the kernel of L.
 
-        By the forms of a map where they are explicit, else by the minors of L.
+        It is computed by explicit forms if there are short ones, otherwise by the minors of L.
         """
         if self.explicit is None:
             minors = kernel_minors(self.rows(self.monomials(X, times), None), times)
@@ -89,9 +89,9 @@ class Equation:
 
     @cached_property
     def explicit(self) -> Equation | None:
-        """Where the i-th row is Q_i x~_i = P_i: the forms of the map without common factor, as one row.
+        """The forms of an explicit map (rows Q_i x~_i = P_i) without common factor, as an equation with one row.
 
-        None elsewhere, where they are long, and over other fields than QQ and GF(p). Exact.
+        None if the map is not explicit, if the forms are long, and over fields other than QQ and GF(p).
         """
         if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):
             return None
@@ -100,8 +100,8 @@ class Equation:
         rows = self.polynomials()
         if any(row[i].is_zero() for i, row in enumerate(rows)):
             return None
-        below = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
-        forms = [-row[-1] * (below / row[i]) for i, row in enumerate(rows)] + [below]
+        denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
+        forms = [-row[-1] * (denominator / row[i]) for i, row in enumerate(rows)] + [denominator]
         common = reduce(lambda P, Q: P.gcd(Q), forms)
         forms = [form / common for form in forms]
         degree = forms[-1].total_degree()
@@ -109,14 +109,14 @@ class Equation:
             exponents = sorted({tuple(map(int, m)) for form in forms for m in form.monoms()})
         else:
             exponents = [tuple(int(i == k) for i in range(self.dim + 1)) for k in range(self.dim + 1)]
-        if degree < 1 or sum(map(len, forms)) > _MOST_TERMS:
+        if degree < 1 or sum(map(len, forms)) > _MAX_TERMS:
             return None
-        place = {exponent: k for k, exponent in enumerate(exponents)}
-        terms = (tuple((place[tuple(map(int, m))], self.over.convert(c)) for m, c in form.terms()) for form in forms)
+        position = {exponent: k for k, exponent in enumerate(exponents)}
+        terms = (tuple((position[tuple(map(int, m))], self.over.convert(c)) for m, c in form.terms()) for form in forms)
         return Equation(self.over, tuple(exponents), (tuple(terms),))
 
     def polynomials(self) -> list[list[Any]]:
-        """L over QQ or GF(p) with p < 2^63 as a matrix of polynomials in x1, ..., xn, z."""
+        """Return L over QQ or GF(p), p < 2^63, as a matrix of polynomials in x1, ..., xn, z."""
         names = (*(f"x{k}" for k in range(1, len(self.exponents[0]))), "z")
         context: Any
         if isinstance(self.over, PrimeField):
@@ -130,14 +130,14 @@ class Equation:
         ]
 
     def transposed(self) -> Equation:
-        """The equation with x and x~ exchanged (and another sign), that of the inverse map; in degree 1 only."""
+        """Return the equation of the inverse map, with x and x~ exchanged (and the sign changed); in degree 1 only."""
         if self.degree != 1:
             raise InputError(f"found an equation of degree {self.degree} in the point, expected degree 1")
         n = self.dim
         terms = []
         for row in self.terms:
             columns: list[list[tuple[int, Any]]] = [[] for _ in range(n + 1)]
-            with self.over.working():  # or the negative of a ball would have FLINT's default precision
+            with self.over.working():  # otherwise the negative of a ball would have FLINT's default precision
                 for j, entry in enumerate(row):
                     for k, coefficient in entry:
                         columns[k].append((j, -coefficient))
@@ -146,33 +146,33 @@ class Equation:
 
 
 def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
-    """The equation of (M | -r) over a field, at values of what stands behind the variables, eps last.
+    """Return the equation of (M | -r) over a field, at the values `point` of the symbols and eps.
 
-    Raises BadPrime.
+    Raises BadPrime if a coefficient has no reduction.
     """
     rows = list(rows)
     n = len(rows)
     context = ring(names_of(rows[0][-1])[n:])
     by_monomial: list[list[dict[Exponents, Any]]] = []
     for row in rows:
-        found: list[dict[Exponents, Any]] = []
+        tables: list[dict[Exponents, Any]] = []
         for entry in row:
             collected: dict[Exponents, dict[tuple[int, ...], fmpq]] = {}
             for monomial, coefficient in entry.terms():
                 collected.setdefault(tuple(monomial[:n]), {})[tuple(monomial[n:])] = coefficient
             with over.working():
-                found.append({m: evaluate(context.from_dict(c), over, point) for m, c in collected.items()})
-        by_monomial.append(found)
+                tables.append({m: evaluate(context.from_dict(c), over, point) for m, c in collected.items()})
+        by_monomial.append(tables)
     degree = max((sum(m) for row in by_monomial for entry in row for m in entry), default=0)
     if degree <= 1:
         exponents = [tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1)]
     else:
         seen = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
         exponents = [(*m, degree - sum(m)) for m in seen]
-    droppable = over is QQ or over.characteristic > 0  # elsewhere a zero may be uncertain
-    place = {exponent[:n]: k for k, exponent in enumerate(exponents)}
+    droppable = over is QQ or over.characteristic > 0  # balls may only contain 0
+    position = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
-        tuple(tuple((place[m], c) for m, c in entry.items() if not droppable or c != 0) for entry in row)
+        tuple(tuple((position[m], c) for m, c in entry.items() if not droppable or c != 0) for entry in row)
         for row in by_monomial
     )
     return Equation(over, tuple(exponents), terms)

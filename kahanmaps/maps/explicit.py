@@ -27,7 +27,7 @@ def explicit_map(
         inverse: the same for the inverse map, where it is known. That it is the inverse is not tested here.
 
     Returns:
-        The map, exact. Without `inverse` that is found by elimination when it is asked for, if the map is birational.
+        The map, exact. Without `inverse` the inverse is computed by elimination on demand, if the map is birational.
 
     Raises:
         InputError: for another number of functions than of variables, or other names in them.

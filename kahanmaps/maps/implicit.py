@@ -1,14 +1,15 @@
-"""A birational map as data: the equation M(x, eps) x~ = r(x, eps) for the image x~ of a point x.
+"""Birational maps given by an equation M(x, eps) x~ = r(x, eps) for the image x~ of a point x.
 
-M is a matrix and r a vector of polynomials. Kahan's choice is M = I - eps f', r = (I + eps B) x + 2 eps c; a map given
-by rational functions has for M the diagonal of their denominators; discretizations that are linear in the new point
-have it as they stand. Three values say it all, and everything else asks them:
+M is a matrix and r a vector of polynomials. For Kahan's method M = I - eps f' and r = (I + eps B) x + 2 eps c; for a
+map given by rational functions M is the diagonal matrix of their denominators; other discretizations that are linear in
+the new point are of this form as they stand. There are three kinds of objects:
 
-* `MapFamily` is the map over Q, eps and all. A new discretization is a function that returns an `ImplicitMap`.
-* `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is made of factors, most
-  maps of one: a `ElementaryMap`, that has an equation.
-* `Equation` has the coefficients of M and r over that field (equation.py). The evaluators go from factor to factor and
-  start from their equations; the generic one, over any field, is here.
+* `MapFamily` is the map over Q, with eps as a parameter. A new discretization is a function that returns an
+  `ImplicitMap`.
+* `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is a composition of factors
+  (usually one), each an `ElementaryMap` with an equation.
+* `Equation` contains the coefficients of M and r over that field (equation.py), from which the evaluators start; the
+  generic evaluator, over any field, is in this module.
 
 In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix
 L = (M | -r) of forms of one degree. Where that degree is 1, exchanging the two points gives the inverse map.
@@ -43,7 +44,7 @@ from kahanmaps.systems.polynomial import PolynomialField
 
 
 class Map:
-    """Birational maps over a field, one after the other; `eps` is that of all, or None where they differ."""
+    """A composition of birational maps over a field at a fixed eps; `eps` is None if the maps have different ones."""
 
     field: Field
     eps: Any
@@ -56,23 +57,23 @@ class Map:
 
     @cached_property
     def factors(self) -> tuple[ElementaryMap, ...]:
-        """The maps with an equation of which this one takes a step of each, the first one first: evaluators do so."""
-        return tuple(one for part in self.parts for one in part.factors)
+        """The elementary maps of which this one is composed, in the order of application."""
+        return tuple(factor for part in self.parts for factor in part.factors)
 
     @cached_property
     def inverse(self) -> Map:
-        """The inverse map. Raises InputError where it is not known."""
+        """The inverse map. Raises InputError if it is not known."""
         return Map([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
 
     @cached_property
     def flow(self) -> tuple[Any, Any] | None:
-        """The flow that it approximates, where that is one: of which field, and for which time."""
+        """The flow that the map approximates, as (vector field, time); None if there is none."""
         flows = [part.flow for part in self.parts]
-        known = [flow for flow in flows if flow is not None]
-        if len(known) < len(flows) or any(field != known[0][0] for field, _ in known):
+        known_flows = [flow for flow in flows if flow is not None]
+        if len(known_flows) < len(flows) or any(field != known_flows[0][0] for field, _ in known_flows):
             return None
         with self.field.working():
-            return known[0][0], sum((time for _, time in known), self.field.zero)
+            return known_flows[0][0], sum((time for _, time in known_flows), self.field.zero)
 
     def __repr__(self) -> str:
         eps = "different eps" if self.eps is None else f"eps={self.field.format(self.eps)}"
@@ -80,26 +81,26 @@ class Map:
         return f"Map({', '.join(self.variables)}; {eps}{step}, over {self.field})"
 
     def written(self) -> dict[str, Any]:
-        """What it is, as plain data for records: eps is None where it differs, the time step where there is no flow."""
+        """Return the map as plain data; eps is None if factors have different ones, time_step if there is no flow."""
         eps, step = (None if x is None else self.field.format(x) for x in (self.eps, self.flow and self.flow[1]))
         return {"map": repr(self), "eps": eps, "time_step": step}
 
     @property
     def equations(self) -> tuple[Equation, ...]:
-        """Those of the factors."""
-        return tuple(one.equation for one in self.factors)
+        """The equations of the factors."""
+        return tuple(factor.equation for factor in self.factors)
 
     @property
     def is_bilinear(self) -> bool:
-        """Whether all the equations are linear in the old point, as they are in the new one."""
+        """Whether all equations are linear in the old point (they are linear in the new one)."""
         return all(equation.degree == 1 for equation in self.equations)
 
     def denominator_name(self, backward: bool) -> str:
-        """What the matrix M(x) is called, for the map or, seen from it, for its inverse."""
+        """Return the name of the matrix M(x) of the map, or of its inverse."""
         return "M'(x)" if backward else "M(x)"
 
     def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        """The values as a point over the map's field. Raises InputError for a wrong length or inexact numbers."""
+        """Convert values to a point over the field. Raises InputError for a wrong length or inexact numbers."""
         if isinstance(values, str):
             raise InputError(f"found the text {values[:60]!r}, expected a sequence: parse_point reads points from text")
         if not hasattr(values, "__len__"):
@@ -110,22 +111,25 @@ class Map:
         return tuple(self.field.convert(value) for value in values)
 
     def __call__(self, *point: Any) -> Any:
-        """The image of a point, of phi((1, 2)) and phi(1, 2) alike; phi() is phi, for who writes phi.inverse()."""
+        """Return the image of a point, given as phi((1, 2)) or phi(1, 2).
+
+        Calling without arguments returns the map itself, so `phi.inverse()` works.
+        """
         if not point:
             return self
         return self.step(point[0] if len(point) == 1 and hasattr(point[0], "__len__") else point)
 
     def __matmul__(self, other: Map) -> Map:
-        """A step of `other` and then one of this, as one map. Raises InputError for another dimension or field."""
+        """Return the composition: first `other`, then this map. Raises InputError for another dimension or field."""
         if not isinstance(other, Map):
             return NotImplemented
         if (self.field, self.dim) != (other.field, other.dim):
-            raise InputError(f"found maps {self!r} and {other!r}, expected one field and one dimension")
+            raise InputError(f"the maps must have the same field and dimension: got {self!r} and {other!r}")
         eps = self.eps if self.eps == other.eps else None
         return Map([other, self], eps, self.variables)
 
     def __pow__(self, power: int) -> Map:
-        """So many steps as one map, of the inverse for a negative number, the identity for 0."""
+        """Return the power of the map: a composition with itself, of the inverse if negative, the identity for 0."""
         power = integer(power, "the power")
         if power:
             return Map([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
@@ -136,19 +140,19 @@ class Map:
         return ElementaryMap(Equation(self.field, units, tuple(map(tuple, rows))), self.eps, None, self.variables, flow)
 
     def __eq__(self, other: object) -> bool:
-        """Whether the equations of the steps are the same, one after the other."""
+        """Return whether the factors have the same equations in the same order."""
         if not isinstance(other, Map):
             return NotImplemented
         if (self.field, self.dim, self.variables) != (other.field, other.dim, other.variables):
             return False
-        mine, theirs = ([(one.exponents, one.terms) for one in each.equations] for each in (self, other))
+        mine, theirs = ([(equation.exponents, equation.terms) for equation in map_.equations] for map_ in (self, other))
         return mine == theirs
 
     def __hash__(self) -> int:
         return hash((self.dim, self.variables))
 
     def step(self, point: Sequence[Any]) -> tuple[Any, ...]:
-        """The image x~ of a point. Raises SingularStep where det M(x) = 0."""
+        """Return the image x~ of a point. Raises SingularStep if det M(x) = 0."""
         x = self.point(point)
         if self.field is QQ:
             image = self.integer_step(IntegerPoint.from_rationals(x))
@@ -158,68 +162,68 @@ class Map:
         return self.generic_step(x)
 
     def integer_step(self, point: IntegerPoint, max_bits: int | None = None) -> IntegerPoint | None:
-        """The image of an integer point, for maps over QQ; None where the map has no value.
+        """Return the image of an integer point, for maps over QQ; None if the map is not defined there.
 
-        What has more than `max_bits` after a factor goes no further: it is returned as it is.
+        If an intermediate point has more than `max_bits` bits, that point is returned instead.
         """
-        for one in self.factors:
-            image = one.integer_steps.step(point)
+        for factor in self.factors:
+            image = factor.integer_steps.step(point)
             if image is None or (max_bits is not None and image.exceeding(max_bits)):
                 return image
             point = image
         return point
 
     def generic_step(self, x: tuple[Any, ...]) -> tuple[Any, ...]:
-        """The image of a point, by one linear system over the field for each factor, whatever the field is."""
+        """Return the image of a point over any field, by one linear system for each factor."""
         image = x
-        for one in self.factors:
+        for factor in self.factors:
             with self.field.working():
                 try:
-                    image = tuple(solve(*one.linear_system(image)).entries())
+                    image = tuple(solve(*factor.linear_system(image)).entries())
                 except SingularMatrix as error:
                     raise self._singular(x) from error
         return image
 
     def inverse_step(self, point: Sequence[Any]) -> tuple[Any, ...]:
-        """The preimage of a point. Raises SingularStep where the inverse map has no value there."""
+        """Return the preimage of a point. Raises SingularStep if the inverse map is not defined there."""
         return self.inverse.step(point)
 
     def stages(self, point: Sequence[Any]) -> Iterator[tuple[ElementaryMap, tuple[Any, ...]]]:
-        """Every factor with the point that it is applied to. Raises SingularStep."""
+        """Yield each factor with the point that it is applied to. Raises SingularStep."""
         x = self.point(point)
-        for k, one in enumerate(self.factors):
+        for k, factor in enumerate(self.factors):
             x = self.factors[k - 1].step(x) if k else x
-            yield one, x
+            yield factor, x
 
     def determinant(self, point: Sequence[Any]) -> Any:
-        """det M(x), the denominator of the map; of several factors the product at the points on the way."""
-        first, *others = (one.determinant(x) for one, x in self.stages(point))
+        """Return det M(x), the denominator of the map; for several factors the product at the intermediate points."""
+        first, *others = (factor.determinant(x) for factor, x in self.stages(point))
         with self.field.working():
             return reduce(mul, others, first)
 
     def jacobian(self, point: Sequence[Any]) -> Any:
-        """The Jacobi matrix dPhi(x), M(x)^{-1} N(x, x~) for one factor. Raises SingularStep."""
-        slopes = [one.jacobian(x) for one, x in self.stages(point)]
+        """Return the Jacobi matrix dPhi(x), for one factor M(x)^{-1} N(x, x~). Raises SingularStep."""
+        slopes = [factor.jacobian(x) for factor, x in self.stages(point)]
         with self.field.working():
             return reduce(lambda total, slope: slope * total, slopes)
 
     def _singular(self, point: tuple[Any, ...]) -> SingularStep:
-        shown = ",".join(self.field.format(entry) for entry in point)
-        if len(shown) > 200:
-            shown = f"{shown[:100]}...{shown[-80:]}"
+        coordinates = ",".join(self.field.format(entry) for entry in point)
+        if len(coordinates) > 200:
+            coordinates = f"{coordinates[:100]}...{coordinates[-80:]}"
         return SingularStep(
-            f"{det_of(self.denominator_name(False))} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
-            "the map has no value there",
+            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates} "
+            f"for eps = {self.field.format(self.eps)}: the map is not defined there",
             point,
             self.eps,
         )
 
 
 class ElementaryMap(Map):
-    """The map of an equation M(x) x~ = r(x) over a field; `backward` gives the equation of its inverse when asked for.
+    """The map of a single equation M(x) x~ = r(x) over a field.
 
-    Without it the equation is to be of degree 1, so that exchanging the two points gives the inverse. A map that knows
-    a faster way to its matrices (KahanMap) overrides them.
+    `backward` returns the equation of the inverse; if it is None, the equation must have degree 1, so that exchanging
+    the two points gives the inverse. Subclasses with a faster way to compute the matrices (KahanMap) override them.
     """
 
     def __init__(
@@ -240,7 +244,7 @@ class ElementaryMap(Map):
 
     @property
     def flow(self) -> tuple[Any, Any] | None:
-        """The flow that it approximates, where it is known: of which field, and for which time."""
+        """The flow that the map approximates, as (vector field, time); None if it is not known."""
         return self._flow
 
     @property
@@ -250,12 +254,12 @@ class ElementaryMap(Map):
 
     @cached_property
     def inverse(self) -> ElementaryMap:
-        """The inverse map. Raises InputError where it is not known."""
+        """The inverse map. Raises InputError if it is not known."""
         backward = self._equation.transposed() if self._backward is None else self._backward()
         return ElementaryMap(backward, self.eps, lambda: self._equation, self.variables)
 
     def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
-        """M(x), and r(x) as a column."""
+        """Return M(x), and r(x) as a column."""
         n = self.dim
         with self.field.working():
             rows = self._equation.rows(self._equation.monomials([*x, self.field.one]), self.field.zero)
@@ -263,11 +267,11 @@ class ElementaryMap(Map):
         return matrix, self.field.column([-row[-1] for row in rows])
 
     def denominator_matrix(self, point: Sequence[Any]) -> Any:
-        """The matrix M(x)."""
+        """Return the matrix M(x)."""
         return self.linear_system(self.point(point))[0]
 
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
-        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~, with dPhi(x) = M(x)^{-1} N(x, x~)."""
+        """Return N(x, x~) = d(r - M x~)/dx at fixed x~, with which dPhi(x) = M(x)^{-1} N(x, x~)."""
         one, zero, n = self.field.one, self.field.zero, self.dim
         X, after = [*point, one], [*image, one]
         columns = []
@@ -286,14 +290,14 @@ class ElementaryMap(Map):
             return self.field.matrix(n, n, [columns[k][i] for i in range(n) for k in range(n)])
 
     def determinant(self, point: Sequence[Any]) -> Any:
-        """det M(x), the denominator of the map."""
+        """Return det M(x), the denominator of the map."""
         if self.field is QQ:
             return self.integer_steps.determinant(IntegerPoint.from_rationals(self.point(point)))
         with self.field.working():
             return det(self.denominator_matrix(point))
 
     def jacobian(self, point: Sequence[Any]) -> Any:
-        """The Jacobi matrix dPhi(x) = M(x)^{-1} N(x, x~). Raises SingularStep."""
+        """Return the Jacobi matrix dPhi(x) = M(x)^{-1} N(x, x~). Raises SingularStep."""
         x = self.point(point)
         image = self.step(x)
         with self.field.working():
@@ -311,7 +315,7 @@ class ElementaryMap(Map):
 
 
 def det_of(name: str) -> str:
-    """The determinant of a matrix with this name, in words.
+    """Return the text for the determinant of a matrix with this name.
 
     >>> det_of("M(x)"), det_of("I - eps f'(x)")
     ('det M(x)', "det(I - eps f'(x))")
@@ -320,13 +324,13 @@ def det_of(name: str) -> str:
 
 
 class MapFamily(LatexDisplay, ABC):
-    """A birational map over Q in named variables, which may depend on eps and on symbols: numbers without a value."""
+    """A birational map over Q in named variables, which may depend on eps and on symbolic parameters."""
 
     variables: tuple[str, ...]
-    title: str  # what kind of map it is, in a word or two
-    time_steps: int = 1  # of 2 eps each, by which a step advances the flow that it approximates; 0 without one
+    title: str  # the kind of map, in a word or two
+    time_steps: int = 1  # a step approximates the flow for the time `time_steps` * 2 eps; 0 if there is no flow
     denominator_name = "det M"
-    root: Root | None = None  # the algebraic number in the coefficients, where there is one
+    root: Root | None = None  # the algebraic number in the coefficients, if any
 
     @property
     def dim(self) -> int:
@@ -340,7 +344,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What formulas of the map are polynomials in: the variables, the symbols, eps."""
+        """The generators of the polynomial ring of its formulas: the variables, the symbols, eps."""
         return (*self.variables, *self.symbols, "eps")
 
     @property
@@ -350,52 +354,52 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the `names`, where the map is given by them; else None."""
+        """The coordinates of x~ as functions of the `names`, if the map is explicit; otherwise None."""
         return None
 
     @property
     def real_approximation(self) -> MapFamily:
-        """The map with rational coefficients from which floats start. Raises InputError where it is not real."""
+        """The map with rational coefficients that float computations use. Raises InputError if it is not real."""
         return self
 
     @property
     def unsupported_reason(self) -> str:
-        """Empty, or why what needs rational coefficients is not to be had."""
+        """The reason why methods for rational coefficients do not apply; empty if they do."""
         if self.root is None:
             return ""
         return (
-            f"found a parameter that is a {self.root}, expected rational ones: algebraic numbers are for analyze, "
-            "orbit, ensemble, lyapunov, check-commute, check-integrals, check-measure, find-integrals, find-density, "
-            "find-commuting, degrees, heights, cycles, convert and portraits"
+            f"found a parameter that is a {self.root}, expected rational numbers: algebraic numbers are supported by "
+            "analyze, orbit, ensemble, lyapunov, check-commute, check-integrals, check-measure, find-integrals, "
+            "find-density, find-commuting, degrees, heights, cycles, convert and portraits"
         )
 
     @property
     def kind(self) -> str:
-        """What kind of map it is, with an article."""
+        """The kind of map, with an article."""
         return f"{'an' if self.title[0] in 'aeiou' else 'a'} {self.title}"
 
     @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
-        """All that determines the map, as `derive_seed` takes it."""
+        """The data that determine the map, for `derive_seed`."""
 
     @property
     @abstractmethod
     def digits(self) -> int:
-        """About how many decimal digits the longest coefficient has, over one denominator."""
+        """Approximate number of decimal digits of the longest coefficient, over a common denominator."""
 
     @abstractmethod
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """The map over a field, at eps: an exact number, or an element of the field, not zero.
+        """Return the map over a field at eps, a nonzero exact number or element of the field.
 
-        `values` are those of the symbols, elements of the field.
+        `values` are the values of the symbols, elements of the field.
         """
 
     rows: Rows  # of (M | -r), polynomials in the `names`
 
     @property
     def inverse_rows(self) -> Rows:
-        """The rows of the inverse map, found by elimination. Raises InputError where they are not."""
+        """The rows of the inverse map, computed by elimination. Raises InputError if that fails."""
         return inverse_rows(self.rows)
 
     @property
@@ -405,17 +409,17 @@ class MapFamily(LatexDisplay, ABC):
 
     @abstractmethod
     def written(self) -> dict[str, Any]:
-        """The map as text, for records."""
+        """Return the map as text, for records."""
 
 
 @dataclass(frozen=True, eq=False)
 class ImplicitMap(MapFamily):
-    """The map of M(x, eps) x~ = r(x, eps): `rows` are those of (M | -r).
+    """The map of an equation M(x, eps) x~ = r(x, eps), given by the `rows` of (M | -r).
 
-    Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows
-    of the inverse map where they are known; else, where M and r are of degree 1 in the variables, exchanging the points
-    gives it, and elimination elsewhere. `title` says in a word or two what kind of map it is, `time_steps` is 1 where
-    it approximates a flow for the time 2 eps, that of `of_field` in the first of the variables, where that is known.
+    The entries are polynomials over Q in the variables, then symbols (if any), then eps. `backward` are the rows of the
+    inverse map, if known; otherwise it is computed by exchanging the points if M and r have degree 1 in the variables,
+    and by elimination if not. `title` is the kind of map in a word or two. `time_steps` is 1 if a step approximates a
+    flow for the time 2 eps: the flow of `of_field` in the first of the variables, if that is given.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -453,12 +457,12 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def inverse_rows(self) -> Rows:
-        """The rows of the inverse map, those given or found by elimination. Raises InputError where they are not."""
+        """The rows of the inverse map, given or computed by elimination. Raises InputError if that fails."""
         return inverse_rows(self.rows) if self.backward is None else self.backward
 
     @cached_property
     def equations(self) -> tuple[fmpq_mpoly, ...]:
-        """M x~ - r, polynomials in x, the new point with names like x_new, symbols and eps; all of them are 0.
+        """The polynomials M x~ - r in x, in the coordinates of x~ (named x_new, ...), the symbols and eps.
 
         >>> x, eps = ring(["x", "eps"]).gens()
         >>> ImplicitMap(("x",), ((1 - eps*x, -x),), "Riccati").equations
@@ -480,7 +484,7 @@ class ImplicitMap(MapFamily):
 
     @cached_property
     def image(self) -> tuple[RationalFunction, ...] | None:
-        """The coordinates of x~ as functions of the names, where M is diagonal; else None."""
+        """The coordinates of x~ as functions of the names, if M is diagonal; otherwise None."""
         if any(not entry.is_zero() for i, row in enumerate(self.rows) for j, entry in enumerate(row[:-1]) if i != j):
             return None
         return tuple(RationalFunction(-row[-1], row[i]) for i, row in enumerate(self.rows))
@@ -496,25 +500,25 @@ class ImplicitMap(MapFamily):
         return digits_of(entry for row in self.rows for entry in row)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
-        """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
+        """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if it has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
-        for known, at, found in self._last:
-            if known is over and at is element:
-                return found
+        for cached_field, at, map_at_eps in self._last:
+            if cached_field is over and at is element:
+                return map_at_eps
         point = (*values, element)
         equation = equation_of(self.rows, over, point)
         is_needed = self.backward is not None or equation.degree > 1
         backward = (lambda: equation_of(self.inverse_rows, over, point)) if is_needed else None
-        found = ElementaryMap(equation, element, backward, self.variables)
-        self._last[:] = [] if values else [(over, element, found)]  # a map with symbols is not kept
-        return found
+        map_at_eps = ElementaryMap(equation, element, backward, self.variables)
+        self._last[:] = [] if values else [(over, element, map_at_eps)]  # maps with values of symbols are not cached
+        return map_at_eps
 
     def __repr__(self) -> str:
         return f"ImplicitMap({self.title} in {', '.join(self.variables)})"
 
 
 def nonzero_eps(eps: Any, over: Field) -> Any:
-    """eps as an element of the field. Raises InputError where it is 0, BadPrime where only the prime makes it so."""
+    """Convert eps to the field. Raises InputError if it is 0, BadPrime if it is 0 only modulo the prime."""
     element = over.convert(eps)
     if element == 0:
         if isinstance(eps, int | str | Fraction | fmpz | fmpq) and rational(eps) != 0:
@@ -527,11 +531,11 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
 
 
 def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
-    """Empty, or what is wrong with a map that somebody has written down, found at random points modulo primes.
+    """Return what is wrong with a map given by the user, tested at random points modulo primes; empty if nothing is.
 
-    It must have values, and where an inverse map is given too, lead back from them. A point says so by chance with
-    probability below 2^-40 for equations of any size that can be read, and these are three points. With a `root` the
-    only symbol stands for it, and primes are those that have one.
+    The map must be defined and dominant, and an inverse map that is given must be the inverse. A wrong map passes one
+    of the three points with probability below 2^-40. If `root` is given, the only symbol stands for it, and primes are
+    chosen modulo which it has a root.
     """
     rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
     tried = 0
@@ -540,16 +544,16 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
         x = tuple(over.random(rng) for _ in range(map_.dim))
         try:
             values = [over.random(rng) if root is None else root.over(over) for _ in map_.symbols]
-            found = map_.at(over.random(rng), over, values)
-            image = found.step(x)
-            if found.jacobian(x).det() == 0:
-                return "found a map whose image is not the whole space: det dPhi is 0 everywhere"
-            back = x if map_.backward is None else found.inverse.step(image)
+            local = map_.at(over.random(rng), over, values)
+            image = local.step(x)
+            if local.jacobian(x).det() == 0:
+                return "the map is not dominant: det dPhi is identically 0"
+            preimage = x if map_.backward is None else local.inverse.step(image)
         except BadPrime:
             continue
         except SingularStep:
-            return "found a map that has no value at random points: the new point is not determined"
+            return "the map is not defined at random points: the equations do not determine the new point"
         tried += 1
-        if back != x:
-            return "found a map that does not lead back from the images of random points, expected the inverse map"
+        if preimage != x:
+            return "the given inverse is not the inverse of the map: it does not map the images of random points back"
     return "" if map_.backward is not None else why_not_birational(map_.rows)

@@ -1,10 +1,11 @@
-"""The inverse of a map M(x) x~ = r(x) by elimination, or that there is none.
+"""The inverse of a map M(x) x~ = r(x), computed by elimination.
 
-The n equations are polynomials in x and x~ that vanish on the graph of the map. The graph is irreducible, so that each
-of them may be replaced by its one irreducible factor that vanishes there, which a random point of the graph modulo a
-prime tells. Unknowns x_k that occur to the first degree are solved for and put into the other equations; failing that,
-resultants eliminate one. What remains of the last unknown is its minimal polynomial over the field of functions of x~:
-of degree 1 it is a coordinate of the inverse map, of degree d > 1 it says that a point has d or more preimages.
+The n equations are polynomials in x and x~ that vanish on the graph of the map. The graph is irreducible, so each
+polynomial may be replaced by its irreducible factor that vanishes on the graph, which is found by a random point of the
+graph modulo a prime. An unknown x_k that occurs with degree 1 is solved for and substituted into the other equations;
+if there is none, resultants eliminate an unknown. The equation of the last unknown is its minimal polynomial over the
+field of functions of x~: degree 1 gives a coordinate of the inverse map, degree d > 1 means that a generic point of the
+image has at least d preimages.
 """
 
 from __future__ import annotations
@@ -25,32 +26,32 @@ from kahanmaps.errors import BadPrime, InputError, SingularMatrix
 
 Rows = tuple[tuple[fmpq_mpoly, ...], ...]
 Quotient = tuple[Any, Any]  # of polynomials
-Solution = dict[int, Quotient]  # the unknowns, by their places among the variables
+Solution = dict[int, Quotient]  # the unknowns, by their index among the variables
 
-_MOST_TERMS = 3000  # of a polynomial
-_BITS = 30  # of primes: FLINT's Python orders factors by coefficients that have to be C integers
-_LARGEST_RESULTANT = 60_000  # terms of one times terms of the other times the sum of their degrees
+_MAX_TERMS = 3000  # of a polynomial
+_BITS = 30  # of primes: python-flint sorts factors by their coefficients, which must be C integers
+_MAX_RESULTANT = 60_000  # product of the numbers of terms times the sum of the degrees
 
 
 class NotBirational(InputError):
-    """A map of which a point has several preimages in general, or none."""
+    """The map is not birational: a generic point has several preimages, or none."""
 
 
 class TooLarge(InputError):
-    """The polynomials grow beyond what elimination takes on."""
+    """The polynomials exceed the limits of the elimination."""
 
 
 def inverse_rows(rows: Rows) -> Rows:
-    """The rows (M | -r) of the inverse map, M diagonal; exact.
+    """Return the rows (M | -r) of the inverse map, with M diagonal; exact.
 
     Args:
-        rows: those of a map, polynomials in the n variables, then symbols, if there are any, and eps.
+        rows: the rows of the map, polynomials in the n variables, then symbols (if any) and eps.
 
     Returns:
-        As many rows in the same names.
+        The rows of the inverse in the same names.
 
     Raises:
-        InputError: where the map is not birational (NotBirational), or the elimination is too large (TooLarge).
+        InputError: if the map is not birational (NotBirational), or the elimination is too large (TooLarge).
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> one, zero = x**0, 0 * x
@@ -59,7 +60,9 @@ def inverse_rows(rows: Rows) -> Rows:
     ((1, 0, -x^2 + y), (0, 1, -x))
     """
     n, names = len(rows), names_of(rows[0][-1])
-    context = ring((*(f"{name}." for name in names[:n]), *names))  # x, then x~ under the names of x, and the rest
+    context = ring(
+        (*(f"{name}." for name in names[:n]), *names)
+    )  # x, then x~ under the names of x, then symbols and eps
     old = [*context.gens()[:n], *context.gens()[2 * n :]]
     new = [*context.gens()[n : 2 * n], context.constant(1)]
     equations = [
@@ -67,19 +70,19 @@ def inverse_rows(rows: Rows) -> Rows:
         for row in rows
     ]
     field, sample = _graph_point(rows)
-    found = _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
+    solution = _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
     home = ring(names)
-    back = [home.constant(0)] * n + list(home.gens())
+    exchange = [home.constant(0)] * n + list(home.gens())
     inverse = []
     for i in range(n):
-        above, below = (part.compose(*back, ctx=home) for part in found[i])
-        scale = below.leading_coefficient()
-        inverse.append((*(below / scale if i == j else home.constant(0) for j in range(n)), -above / scale))
+        numerator, denominator = (part.compose(*exchange, ctx=home) for part in solution[i])
+        scale = denominator.leading_coefficient()
+        inverse.append((*(denominator / scale if i == j else home.constant(0) for j in range(n)), -numerator / scale))
     return tuple(inverse)
 
 
 def why_not_birational(rows: Rows) -> str:
-    """Why a map is not birational, found modulo primes at random eps and symbols; empty where it is or seems to be."""
+    """Return why a map is not birational, tested modulo primes at random eps and symbols; empty if it seems to be."""
     n, names = len(rows), names_of(rows[0][-1])
     reasons = []
     for seed in range(2):
@@ -93,8 +96,8 @@ def why_not_birational(rows: Rows) -> str:
             for j, entry in enumerate(row):
                 for monomial, coefficient in entry.terms():
                     value = field.convert(coefficient)
-                    for given, exponent in zip(sample[2 * n :], monomial[n:], strict=True):
-                        value = value * given**exponent
+                    for coordinate, exponent in zip(sample[2 * n :], monomial[n:], strict=True):
+                        value = value * coordinate**exponent
                     key = (*monomial[:n], *(int(j == k) for k in range(n)))
                     terms[key] = terms.get(key, field.zero) + value
             equations.append(context.from_dict({key: int(value) for key, value in terms.items() if value != 0}))
@@ -110,81 +113,83 @@ def why_not_birational(rows: Rows) -> str:
 
 
 def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, list[Any]]:
-    """A point (x, x~) of the graph modulo a random prime (of so many bits), followed by values of symbols and eps."""
+    """Return a random point (x, x~) of the graph modulo a random prime, followed by values of the symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
     while True:
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
-        given = [field.random(rng) for _ in names]
+        arguments = [field.random(rng) for _ in names]
         try:
-            values = [evaluate(entry, field, given) for row in rows for entry in row]
+            values = [evaluate(entry, field, arguments) for row in rows for entry in row]
             matrix = field.matrix(n, n, [values[i * (n + 1) + j] for i in range(n) for j in range(n)])
             image = solve(matrix, field.column([-values[i * (n + 1) + n] for i in range(n)])).entries()
         except (BadPrime, SingularMatrix):
             continue
-        return field, [*given[:n], *image, *given[n:]]
+        return field, [*arguments[:n], *image, *arguments[n:]]
 
 
 def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool:
     total = field.zero
     for monomial, coefficient in polynomial.terms():
         value = field.convert(coefficient)
-        for given, exponent in zip(sample, monomial, strict=False):
-            value = value * given**exponent
+        for coordinate, exponent in zip(sample, monomial, strict=False):
+            value = value * coordinate**exponent
         total = total + value
     return bool(total == 0)
 
 
 def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
-    """The unknowns as functions of all else, from polynomials that vanish on the graph."""
+    """Solve for the unknowns as functions of the other variables, from polynomials that vanish on the graph."""
     if not unknowns:
         return {}
-    known: list[Any] = []
+    relations: list[Any] = []
     for polynomial in polynomials:
         if polynomial.is_zero():
             continue
-        if len(polynomial) > _MOST_TERMS:
-            raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
+        if len(polynomial) > _MAX_TERMS:
+            raise TooLarge("the inverse of this map is too large to be computed: give it as well")
         factor = next((factor for factor, _ in polynomial.factor()[1] if on_graph(factor)), None)
         if factor is None:
-            raise TooLarge("the inverse of this map was not found: give it as well")
-        if factor not in known:
-            known.append(factor)
-    if len(known) < len(unknowns) or any(not any(p.degrees()[u] for u in unknowns) for p in known):
-        raise NotBirational("found a map whose image is not the whole space: det dPhi is 0 everywhere")
-    linear = [(len(p), p, u) for p in known for u in unknowns if p.degrees()[u] == 1]
+            raise TooLarge("the elimination found no inverse of this map: give it as well")
+        if factor not in relations:
+            relations.append(factor)
+    if len(relations) < len(unknowns) or any(not any(p.degrees()[u] for u in unknowns) for p in relations):
+        raise NotBirational("the map is not dominant: det dPhi is identically 0")
+    linear = [(len(p), p, u) for p in relations for u in unknowns if p.degrees()[u] == 1]
     if linear:
-        _, chosen, u = min(linear, key=lambda one: (sum(bool(one[1].degrees()[v]) for v in unknowns), one[0]))
-        rest, slope = _coefficients(chosen, u)
-        others = [_substituted(p, u, -rest, slope) for p in known if p is not chosen]
+        _, chosen, u = min(
+            linear, key=lambda candidate: (sum(bool(candidate[1].degrees()[v]) for v in unknowns), candidate[0])
+        )
+        eliminated, slope = _coefficients(chosen, u)
+        others = [_substituted(p, u, -eliminated, slope) for p in relations if p is not chosen]
         solution = _solved(others, [v for v in unknowns if v != u], on_graph)
-        (a, b), (c, d) = (_put_in(part, solution) for part in (-rest, slope))
+        (a, b), (c, d) = (_put_in(part, solution) for part in (-eliminated, slope))
         return solution | {u: _lowest(a * d, b * c)}
     # No equation is linear in an unknown: resultants eliminate one.
     if len(unknowns) == 1:
         raise NotBirational(
-            "found a map that is not birational: in general a point of its image has at least "
-            f"{known[0].degrees()[unknowns[0]]} preimages"
+            "the map is not birational: a generic point of its image has at least "
+            f"{relations[0].degrees()[unknowns[0]]} preimages"
         )
-    u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in known))
-    through = sorted((p for p in known if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
+    u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in relations))
+    through = sorted((p for p in relations if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
     first, name = through[0], str(through[0].context().names()[u])
-    rest = [p for p in known if not p.degrees()[u]]
+    eliminated = [p for p in relations if not p.degrees()[u]]
     for p in through[1:]:
-        if len(first) * len(p) * (first.degrees()[u] + p.degrees()[u]) > _LARGEST_RESULTANT:
-            raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
-        rest.append(first.resultant(p, name))
+        if len(first) * len(p) * (first.degrees()[u] + p.degrees()[u]) > _MAX_RESULTANT:
+            raise TooLarge("the inverse of this map is too large to be computed: give it as well")
+        eliminated.append(first.resultant(p, name))
     others = [v for v in unknowns if v != u]
-    solution = _solved(rest, others, on_graph)
+    solution = _solved(eliminated, others, on_graph)
     common = None
     for p in through:
-        above, _ = _put_in(p, solution)
-        common = above if common is None else common.gcd(above)
+        numerator, _ = _put_in(p, solution)
+        common = numerator if common is None else common.gcd(numerator)
     return solution | _solved([common], [u], on_graph)
 
 
 def _coefficients(polynomial: Any, u: int) -> list[Any]:
-    """The coefficients of the powers of a variable, the lowest first."""
+    """Return the coefficients of the powers of a variable, the lowest first."""
     context = polynomial.context()
     parts: list[dict[tuple[int, ...], Any]] = [{} for _ in range(polynomial.degrees()[u] + 1)]
     for monomial, coefficient in polynomial.terms():
@@ -192,25 +197,25 @@ def _coefficients(polynomial: Any, u: int) -> list[Any]:
     return [context.from_dict(part) for part in parts]
 
 
-def _substituted(polynomial: Any, u: int, above: Any, below: Any) -> Any:
-    """The polynomial with above/below for a variable, times the power of `below` that makes it one again."""
+def _substituted(polynomial: Any, u: int, numerator: Any, denominator: Any) -> Any:
+    """Substitute numerator/denominator for a variable, and clear the denominator."""
     *lower, total = _coefficients(polynomial, u)
-    power = below**0
+    power = denominator**0
     for coefficient in reversed(lower):
-        power = power * below
-        total = total * above + coefficient * power
+        power = power * denominator
+        total = total * numerator + coefficient * power
     return total
 
 
 def _put_in(polynomial: Any, solution: Solution) -> Quotient:
-    """The polynomial with the solution for its unknowns."""
+    """Substitute the solution for the unknowns."""
     denominator = polynomial.context().constant(1)
-    for u, (above, below) in solution.items():
-        denominator = denominator * below ** int(polynomial.degrees()[u])
-        polynomial = _substituted(polynomial, u, above, below)
+    for u, (numerator, denominator_of_unknown) in solution.items():
+        denominator = denominator * denominator_of_unknown ** int(polynomial.degrees()[u])
+        polynomial = _substituted(polynomial, u, numerator, denominator_of_unknown)
     return _lowest(polynomial, denominator)
 
 
-def _lowest(above: Any, below: Any) -> Quotient:
-    common = above.gcd(below)
-    return above / common, below / common
+def _lowest(numerator: Any, denominator: Any) -> Quotient:
+    common = numerator.gcd(denominator)
+    return numerator / common, denominator / common

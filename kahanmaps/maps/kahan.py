@@ -37,27 +37,27 @@ if TYPE_CHECKING:
 
 
 class HasMap(Protocol):
-    """A system file."""
+    """An object with a map, such as a system file."""
 
     @property
     def map(self) -> MapFamily: ...
 
 
-# What `as_map` takes.
+# The arguments of `as_map`.
 SystemLike: TypeAlias = (
     "str | Path | HasMap | QuadraticSystem | MapFamily | CubicHamiltonian | FamilyMember | AssociatedSystem"
 )
 
 
 class KahanMap(LatexDisplay, ElementaryMap):
-    """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
+    """The Kahan map Phi(., eps) of a quadratic system over a field (by default the rationals).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
-    It is put in where it stands in the coefficients of the system as well, as `values`, elements of the field, are for
-    the other symbols. Over QQ and GF(p) everything is exact, over RR(bits) it is enclosed. A system that is given over
-    a field, a `SystemOver`, has a map with any element for eps.
+    It is also substituted for eps in the coefficients of the system, and `values`, elements of the field, for the other
+    symbols. Results are exact over QQ and GF(p), and enclosures over RR(bits). For a system over a field, a
+    `SystemOver`, eps may be any element.
 
-    M and r are computed from the tensor f'', which over most fields is faster than to go by the equation.
+    M and r are computed from the tensor f'', which is faster over most fields than evaluating the equation.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
     >>> phi = KahanMap(system, "1/2")
@@ -75,7 +75,7 @@ class KahanMap(LatexDisplay, ElementaryMap):
         values: Sequence[Any] = (),
         inside: Any = None,
     ) -> None:
-        """`inside` is put in for eps in the coefficients where that is not the step: for inverse maps."""
+        """For an inverse map, `inside` is the value of eps in the coefficients, since the step is -eps."""
         if isinstance(system, SystemOver):
             self.local, self.eps = system, eps
             self._given: tuple[Any, ...] = (system,)
@@ -83,8 +83,8 @@ class KahanMap(LatexDisplay, ElementaryMap):
             self.system, self.values, self.variables = system, tuple(values), system.variables
             self.eps = nonzero_eps(eps, field)
             self._inside = self.eps if inside is None else inside
-            rest = iter(self.values)
-            self.local = system.over(field, [self._inside if x == "eps" else next(rest) for x in system.symbols])
+            remaining = iter(self.values)
+            self.local = system.over(field, [self._inside if x == "eps" else next(remaining) for x in system.symbols])
             self._given = (system, field, self.values, self._inside)
         else:
             raise InputError(
@@ -97,24 +97,24 @@ class KahanMap(LatexDisplay, ElementaryMap):
 
     @cached_property
     def inverse(self) -> KahanMap:
-        """The inverse map, Phi(., -eps) for the same vector field, whatever eps is in its coefficients."""
-        with self.field.working():  # or -eps would be a ball of FLINT's default precision
+        """The inverse map Phi(., -eps) of the same vector field (eps in its coefficients is unchanged)."""
+        with self.field.working():  # otherwise -eps would be a ball of FLINT's default precision
             return KahanMap(self._given[0], -self.eps, *self._given[1:])
 
     def denominator_matrix(self, point: Sequence[Any]) -> Any:
-        """The matrix I - eps f'(x)."""
+        """Return the matrix I - eps f'(x)."""
         x = self.point(point)
         with self.field.working():
             return self._identity - self.local.jacobian(x) * self.eps
 
     def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
-        """I - eps f'(x) and (I + eps B) x + 2 eps c."""
+        """Return M = I - eps f'(x) and r = (I + eps B) x + 2 eps c."""
         column = self.field.column(x)
         side = column + (self.local.B * column + self.local.c * self.field.convert(2)) * self.eps
         return self.denominator_matrix(x), side
 
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
-        """The matrix I + eps f'(x~)."""
+        """Return the matrix I + eps f'(x~)."""
         return self.inverse.denominator_matrix(image)
 
     @cached_property
@@ -124,7 +124,7 @@ class KahanMap(LatexDisplay, ElementaryMap):
 
     @cached_property
     def equation(self) -> Equation:
-        """(I - eps f'(x)) x~ - (I + eps B) x - 2 eps c = 0."""
+        """The equation (I - eps f'(x)) x~ - (I + eps B) x - 2 eps c = 0."""
         field, eps, n = self.field, self.eps, self.dim
         exponents = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
         with field.working():
@@ -133,7 +133,7 @@ class KahanMap(LatexDisplay, ElementaryMap):
             one, zero = field.one, field.zero
             terms = []
             for i in range(n):
-                left = [
+                matrix = [
                     [
                         *enumerate(tensor[(i * n + j) * n : (i * n + j + 1) * n]),
                         (n, -B[i * n + j] + (one if i == j else zero)),
@@ -141,12 +141,12 @@ class KahanMap(LatexDisplay, ElementaryMap):
                     for j in range(n)
                 ]
                 right = [*((j, -B[i * n + j] - (one if i == j else zero)) for j in range(n)), (n, c[i])]
-                terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*left, right)))
+                terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*matrix, right)))
         return Equation(field, exponents, tuple(terms))
 
     @property
     def flow(self) -> tuple[Any, Any] | None:
-        """That of the system, with the values of its symbols, for the time step."""
+        """The flow of the system, with the values of its symbols, for the time step 2 eps."""
         if isinstance(self._given[0], SystemOver):
             return None
         symbols = self._inside if "eps" in self.system.symbols else None, *self.values
@@ -155,9 +155,6 @@ class KahanMap(LatexDisplay, ElementaryMap):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return KahanMap, (self._given[0], self.eps, *self._given[1:])
-
-
-KahanMap = KahanMap  # its name in laboratory/
 
 
 class KahanFamily(MapFamily):
@@ -188,23 +185,23 @@ class KahanFamily(MapFamily):
         return self.system.digits
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> KahanMap:
-        """The map Phi(., eps) over a field. Raises InputError for eps = 0, BadPrime where it has no reduction."""
+        """Return the map Phi(., eps) over a field. Raises InputError for eps = 0, BadPrime if it has no reduction."""
         last = self._last
         if last is None or last.field is not over or last.eps is not eps or last.values != tuple(values):
             self._last = last = KahanMap(self.system, eps, over, values)
         return last
 
     @cached_property
-    def rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:  # type: ignore[override]  # nobody writes it
-        """Those of (I - eps f'(x) | -r), r = (I - eps f'(x)) x + 2 eps f(x), polynomials in the `names`."""
+    def rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:  # type: ignore[override]  # read only
+        """The rows of (I - eps f'(x) | -r) with r = (I - eps f'(x)) x + 2 eps f(x), polynomials in the `names`."""
         context = ring(self.names)
         *x, eps = context.gens()
-        places = [context.gen(self.names.index(name)) for name in names_of(self.system.rhs[0])]
+        variables = [context.gen(self.names.index(name)) for name in names_of(self.system.rhs[0])]
         rows = []
         for i, (slopes, f) in enumerate(zip(self.system.jacobian(self.names), self.system.rhs, strict=True)):
             row = [int(i == j) - eps * slope for j, slope in enumerate(slopes)]
             product = sum((entry * y for entry, y in zip(row, x, strict=False)), context.constant(0))
-            rows.append((*row, -product - 2 * eps * f.compose(*places, ctx=context)))
+            rows.append((*row, -product - 2 * eps * f.compose(*variables, ctx=context)))
         return tuple(rows)
 
     def written(self) -> dict[str, list[str]]:
@@ -218,15 +215,15 @@ class KahanFamily(MapFamily):
 
 
 def as_map(value: SystemLike) -> MapFamily:
-    """Return the map that a value stands for; a system, however it is given, stands for its Kahan map.
+    """Convert a value to a map; a system stands for its Kahan map.
 
-    A map, a system, a system file, a member of the family, a catalogue name, a path, or equations as text. Raises
-    InputError for anything else.
+    The value is a map, a system, a system file, a member of the family, a catalogue name, a path, or equations as text.
+    Raises InputError for anything else.
     """
     if isinstance(value, QuadraticSystem):
         return KahanFamily(value)
     if isinstance(value, MapFamily):
         return value
-    # Names and paths are read on a floor above, which is loaded only where one of them is given.
-    found: MapFamily = import_module("kahanmaps.documents.inline").as_file(value).map
-    return found
+    # Names and paths are read by a higher layer, which is imported only on demand.
+    map_: MapFamily = import_module("kahanmaps.documents.inline").as_file(value).map
+    return map_

@@ -1,4 +1,4 @@
-"""What computes many orbits: numpy, which is always there, or machine code, by numba or its compiler (extra `fast`)."""
+"""The kernels for many orbits: numpy, always available, or machine code by numba or its compiler (extra `fast`)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ KERNELS = ("numpy", "numba")
 
 @cache
 def has_numba() -> bool:
-    """Whether numba is installed (it is not loaded)."""
+    """Return whether numba is installed (without importing it)."""
     return find_spec("numba") is not None
 
 
 @cache
 def has_llvm() -> bool:
-    """Whether the compiler of numba is there, in a version that reads our code: llvmlite 0.45 (numba 0.62) or later."""
+    """Return whether the compiler of numba is installed in a sufficient version: llvmlite 0.45 (numba 0.62)."""
     from importlib.metadata import PackageNotFoundError, version  # takes longer to load than the rest of this file
 
     try:
@@ -27,14 +27,14 @@ def has_llvm() -> bool:
         return False
 
 
-def choose_kernel(wish: str | None, long: bool) -> str:
-    """The wish, or numba where it is installed and `long` says that loading it pays. Raises InputError for another.
+def choose_kernel(requested: str | None, is_long: bool) -> str:
+    """Return the requested kernel, by default numba if it is installed and `is_long`. Raises InputError otherwise.
 
-    >>> choose_kernel("numpy", long=True), choose_kernel(None, long=False)
+    >>> choose_kernel("numpy", is_long=True), choose_kernel(None, is_long=False)
     ('numpy', 'numpy')
     """
-    if wish not in (None, *KERNELS):
-        raise InputError(f"found the kernel {wish!r}, expected {' or '.join(KERNELS)}")
-    if wish == "numba" and not has_numba():
+    if requested not in (None, *KERNELS):
+        raise InputError(f"found the kernel {requested!r}, expected {' or '.join(KERNELS)}")
+    if requested == "numba" and not has_numba():
         raise InputError("the kernel numba needs numba: pip install 'kahanmaps[fast]', or take the kernel numpy")
-    return wish or ("numba" if long and has_numba() else "numpy")
+    return requested or ("numba" if is_long and has_numba() else "numpy")

@@ -1,4 +1,4 @@
-"""Machine code of numba, kept on disk where there is a folder and room for it, so that it is compiled once."""
+"""The disk cache of functions compiled by numba."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numba
 
 
 def compiled(function: Callable[..., Any], **options: Any) -> Any:
-    """The function compiled by numba with these options, from the disk or for it if there is a folder that takes it."""
+    """Compile a function by numba with these options, using the disk cache if a folder is writable."""
     try:
-        found = numba.njit(cache=True, **options)(function)
+        compiled_function = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # "no locator available": no folder that can be written to
         return numba.njit(**options)(function)
-    save = found._cache.save_overload
+    save = compiled_function._cache.save_overload
 
     def save_if_possible(signature: Any, data: Any) -> None:
         with suppress(OSError):  # the disk is full, the folder gone: the code is in memory all the same
             save(signature, data)
 
-    found._cache.save_overload = save_if_possible
-    return found
+    compiled_function._cache.save_overload = save_if_possible
+    return compiled_function

@@ -47,16 +47,16 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     if not 2 <= degree <= MAX_DEGREE:
         raise InputError(f"found the degree {degree}, expected 2 to {MAX_DEGREE}")
     n = len(rhs)
-    names, rest = names_of(rhs[0])[:n], names_of(rhs[0])[n:]
-    found = max((sum(m[:n]) for f in rhs for m in f.monoms()), default=0)
-    if found > degree:
-        raise InputError(f"found right-hand sides of degree {found}, expected at most {degree}")
+    names, parameters = names_of(rhs[0])[:n], names_of(rhs[0])[n:]
+    degree_of_field = max((sum(m[:n]) for f in rhs for m in f.monoms()), default=0)
+    if degree_of_field > degree:
+        raise InputError(f"found right-hand sides of degree {degree_of_field}, expected at most {degree}")
     copies = degree - 1
     variables = (*names, *(f"{name}_{k}" for k in range(1, copies) for name in names))
-    context = ring((*variables, *rest))
-    known = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
+    context = ring((*variables, *parameters))
+    points = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
     step = 2 * copies * context.gens()[-1]
-    last = [_linear_in_one_point(f, known, step, degree) for f in rhs]
+    last = [_linear_in_one_point(f, points, step, degree) for f in rhs]
 
     def unit(column: int, other: Any) -> tuple[fmpq_mpoly, ...]:
         """The row that says that a coordinate of the image is `other`."""
@@ -64,34 +64,34 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
 
     # (x_k, ..., x_{k+d-2}) -> (x_{k+1}, ..., x_{k+d-1}), and for the inverse (x_{k-1}, ..., x_{k+d-3}) with -h.
     zero = [context.constant(0)] * ((copies - 1) * n)
-    forward = [unit(k * n + i, known[k + 1][i]) for k in range(copies - 1) for i in range(n)]
-    backward = [unit((k + 1) * n + i, known[k][i]) for k in range(copies - 1) for i in range(n)]
+    forward = [unit(k * n + i, points[k + 1][i]) for k in range(copies - 1) for i in range(n)]
+    backward = [unit((k + 1) * n + i, points[k][i]) for k in range(copies - 1) for i in range(n)]
     for i, (matrix, right) in enumerate(last):
         unknown = [context.constant(int(i == j)) for j in range(n)]
-        ahead = [one - entry for one, entry in zip(unknown, matrix, strict=True)]
-        behind = [one + entry for one, entry in zip(unknown, matrix, strict=True)]
-        forward.append((*zero, *ahead, -known[0][i] - right))
-        backward.append((*behind, *zero, -known[-1][i] + right))
-    field = PolynomialField(tuple(substitute(f, {rest[-1]: fmpq(0)}) for f in rhs), rest[:-1])
+        new_row = [delta - entry for delta, entry in zip(unknown, matrix, strict=True)]
+        old_row = [delta + entry for delta, entry in zip(unknown, matrix, strict=True)]
+        forward.append((*zero, *new_row, -points[0][i] - right))
+        backward.append((*old_row, *zero, -points[-1][i] + right))
+    field = PolynomialField(tuple(substitute(f, {parameters[-1]: fmpq(0)}) for f in rhs), parameters[:-1])
     return ImplicitMap(variables, tuple(forward), TITLE, time_steps=1, backward=tuple(backward), of_field=field)
 
 
 def _linear_in_one_point(
-    f: fmpq_mpoly, known: Sequence[Sequence[fmpq_mpoly]], step: fmpq_mpoly, degree: int
+    f: fmpq_mpoly, points: Sequence[Sequence[fmpq_mpoly]], step: fmpq_mpoly, degree: int
 ) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
-    """`step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and what is free of y."""
-    n, copies = len(known[0]), len(known)
+    """Return `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term."""
+    n, copies = len(points[0]), len(points)
     one = step * 0 + 1
     linear, free = [step * 0 for _ in range(n)], step * 0
     for monomial, coefficient in f.terms():
         factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
         factors += [None] * (degree - len(factors))
         share = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
-        for places in permutations(factors):
+        for arrangement in permutations(factors):
             product = share
-            for point, j in zip(known, places[:copies], strict=True):
+            for point, j in zip(points, arrangement[:copies], strict=True):
                 product = product * (one if j is None else point[j])
-            j = places[-1]
+            j = arrangement[-1]
             if j is None:
                 free = free + product
             else:

@@ -15,7 +15,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.inverse import TooLarge
 
-_MOST_TERMS = 3_000  # of a form of several factors, before a common one is divided out
+_MAX_TERMS = 3_000  # of a form of several factors, before a common one is divided out
 
 
 class HomogeneousMap(NamedTuple):
@@ -47,17 +47,17 @@ def homogeneous_map(map_over: Map) -> HomogeneousMap:
     [x1*x2 + x1*z, -2*x1^2 - x2^2 + x2*z, 2*x1^2 - x2*z + z^2]
     """
     first, *others = map_over.equations
-    found = _of_equation(first)
+    composed = _of_equation(first)
     for equation in others:
-        next_one = _of_equation(equation)
-        size, degree = equation.dim, found.degree * next_one.degree
-        if comb(degree + size, size) > _MOST_TERMS:
+        factor_map = _of_equation(equation)
+        size, degree = equation.dim, composed.degree * factor_map.degree
+        if comb(degree + size, size) > _MAX_TERMS:
             raise TooLarge(f"the composition of {len(others) + 1} maps is too large for forms on projective space")
-        moved, common = _without_common_factor([form.compose(*found.forms) for form in next_one.forms])
-        factor, denominator = (part.compose(*found.forms) for part in (next_one.factor, next_one.denominator))
-        below = found.factor**equation.image_degree
-        found = HomogeneousMap(moved, below * factor * common, found.denominator * denominator)
-    return found
+        moved, common = _without_common_factor([form.compose(*composed.forms) for form in factor_map.forms])
+        factor, denominator = (part.compose(*composed.forms) for part in (factor_map.factor, factor_map.denominator))
+        outer_factor = composed.factor**equation.image_degree
+        composed = HomogeneousMap(moved, outer_factor * factor * common, composed.denominator * denominator)
+    return composed
 
 
 def _of_equation(equation: Equation) -> HomogeneousMap:

@@ -1,8 +1,8 @@
 """Somos sequences: t(n + 2) t(n - 2) = alpha t(n + 1) t(n - 1) + beta t(n)^2.
 
-On an elliptic curve with a point T, sigma functions of Q + n T are such a sequence, and those of n T the elliptic
-divisibility sequence W with the same alpha and beta (ward-1948, hone-2005). The sections of a line bundle at a point
-that is moved by T are forms in their terms.
+On an elliptic curve with a point T, the sigma function at Q + n T is such a sequence, and at n T the elliptic
+divisibility sequence W with the same alpha and beta (ward-1948, hone-2005). The sections of a line bundle at the points
+Q + n T are forms in their terms.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.integers import divide_exactly, split_by_primes
 
-_DIRECT = 8  # up to here quotients of s(n) are found from s(n) itself, then from those at n/2
+_DIRECT = 8  # up to this n quotients of s(n) are computed from s(n) itself, then from those at n/2
 
 
 def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
-    """W(1) to W(4) and U(1) to U(4) over any field, in the scales where W(2) = H, W(3) = H^3 and U(1) = U(2) = 1.
+    """Return W(1) to W(4) and U(1) to U(4) over any field, scaled such that W(2) = H, W(3) = H^3 and U(1) = U(2) = 1.
 
     y and z are H U(n)^2/(U(n + 1) U(n - 1)) for n = 2 and 3. Raises ZeroDivisionError.
     """
@@ -32,85 +32,89 @@ def first_terms(H: Any, y: Any, z: Any) -> tuple[list[Any], list[Any]]:
     return [one, H, H**3, H * (H**3 * U[4] * U[1] - U[5] * U[0]) / (U[3] * U[2])], U[:4]
 
 
-def around(first: Sequence[Any], most: int, multiples: Sequence[Any] = ()) -> dict[int, Any]:
-    """The terms -most to most of W or, with the first terms of W, of another sequence. Raises ZeroDivisionError."""
+def around(first: Sequence[Any], bound: int, multiples: Sequence[Any] = ()) -> dict[int, Any]:
+    """Return the terms from -bound to bound of W or, given the first terms of W (`multiples`), of another sequence.
+
+    Raises ZeroDivisionError if a term by which the recurrence divides is 0.
+    """
     terms = list(first)
-    while len(terms) < most:
+    while len(terms) < bound:
         terms.append(_next(terms[-4:], (multiples or first)[1]))
-    found = dict(enumerate(terms, start=1))
+    terms_by_index = dict(enumerate(terms, start=1))
     if not multiples:
-        return found | {-n: -term for n, term in found.items()} | {0: 0 * first[0]}
-    before = list(first)[::-1]  # the recurrence is the same backwards
-    while len(before) < most + 5:
-        before.append(_next(before[-4:], multiples[1]))
-    return found | {4 - k: term for k, term in enumerate(before)}
+        return terms_by_index | {-n: -term for n, term in terms_by_index.items()} | {0: 0 * first[0]}
+    backward = list(first)[::-1]  # the recurrence is the same backwards
+    while len(backward) < bound + 5:
+        backward.append(_next(backward[-4:], multiples[1]))
+    return terms_by_index | {4 - k: term for k, term in enumerate(backward)}
 
 
 def _next(terms: Sequence[Any], H: Any) -> Any:
-    """The term after four."""
-    before, a, b, c = terms
-    return (H**2 * c * a - H**3 * b * b) / before
+    """Return the term after four given terms."""
+    previous, a, b, c = terms
+    return (H**2 * c * a - H**3 * b * b) / previous
 
 
 class Integers:
-    """Rational terms as integers prime to the primes of `power`, each times a rational scale."""
+    """Rational terms, written as integers coprime to `power` times a rational scale."""
 
     def __init__(self, power: fmpz) -> None:
         self.power = power
 
     def split(self, value: fmpq) -> tuple[fmpz, fmpq]:
-        """Integer and scale of a value, not zero, that is integral but for the primes. Raises ArithmeticError."""
+        """Return integer and scale of a nonzero value. Raises ArithmeticError for other primes in the denominator."""
         if split_by_primes(value.q, self.power)[0] != 1:
             raise ArithmeticError("a term has a denominator outside the set of primes")
         integer, part = split_by_primes(value.p, self.power)
         return integer, fmpq(part, value.q)
 
     def divisor(self, value: fmpz) -> fmpz:
-        """What `difference` takes for a division by this integer."""
+        """Return the divisor for `difference`; here the integer itself."""
         return value
 
-    def difference(self, s: fmpq, left: fmpz, t: fmpq, right: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
-        """Integer and scale of s left - t right, over the divisor, which divides it but for the primes."""
-        below = s.q.lcm(t.q)
-        total = s.p * (below // s.q) * left - t.p * (below // t.q) * right
+    def difference(self, s: fmpq, first: fmpz, t: fmpq, second: fmpz, divisor: fmpz | None = None) -> tuple[fmpz, fmpq]:
+        """Return integer and scale of (s first - t second)/divisor, which is integral up to the primes of `power`."""
+        denominator = s.q.lcm(t.q)
+        total = s.p * (denominator // s.q) * first - t.p * (denominator // t.q) * second
         if divisor is not None:
             total = divide_exactly([total], divisor)[0]
         value, part = split_by_primes(total, self.power)
-        return value, fmpq(part, below)
+        return value, fmpq(part, denominator)
 
 
 class Terms:
-    """W or another sequence U without the primes of a set: t(n) = s(n) w(n), w(n) integers prime to them, s(n) scales.
+    """W or another sequence U, without the primes of a finite set: t(n) = s(n) w(n) with integers w(n) and scales s(n).
 
-    Outside a finite set of primes terms have no factors but those that the theory gives them: w(n) is as short as it
-    can be. The terms near n are found from those near n/2, of both sequences, with products and divisions by w(1), w(2)
-    alone:
+    The integers w(n) are coprime to the primes of the set. Outside it the terms have no superfluous factors, so w(n) is
+    as short as possible. The terms near n are computed from those near n/2 of both sequences, with divisions by w(1)
+    and w(2) only:
 
         t(i + j) t(i - j) = t(i + 1) t(i - 1) W(j)^2 - t(i)^2 W(j + 1) W(j - 1),      i - j = 1 or 2.
 
-    Of s(n), which would make terms longer, quotients are known that stay short: `part(n)` is s(n + 1) s(n - 1)/s(n)^2,
-    and with the s of W, denoted by S, `ratio(n)` is S(n - 1) s(n + 1)/(S(n) s(n)).
+    The scales s(n) are long, but certain quotients of them stay short: `part(n)` is s(n + 1) s(n - 1)/s(n)^2, and
+    `ratio(n)` is S(n - 1) s(n + 1)/(S(n) s(n)), where S denotes the scales of W.
 
-    `numbers` (Integers, or what does the same over a number field) splits terms. With a number `gamma` all terms whose
-    index 3 divides are without a factor gamma^(1/3): the square above whose index alone 3 divides is multiplied by it.
+    `numbers` (Integers, or its equivalent over a number field) splits terms into integer and scale. If `gamma` is
+    given, all terms with an index divisible by 3 are stored without a factor gamma^(1/3): in the formula above, a
+    square whose index is divisible by 3 is multiplied by gamma, if the index of the other one is not.
     """
 
     def __init__(self, first: Sequence[Any], numbers: Any, multiples: Terms | None = None, gamma: Any = None) -> None:
-        """From t(1) to t(4), and W, for all sequences but itself; W(1) = 1, and W(2) a number of the primes."""
+        """Start from t(1) to t(4); `multiples` is W unless this is W itself. W(1) = 1, W(2) has no other primes."""
         self._W = self if multiples is None else multiples
         self._numbers, self._gamma = numbers, gamma
         self._terms: dict[int, Any] = {}
         self._scales: dict[int, Any] = {}  # s(n)/(s(i) S(j))^2 for n above 4
         self._first: dict[int, Any] = {}  # s(n), as long as it is short
         self._pairs: dict[int, tuple[Any, Any]] = {}
-        self._order = deque[int]()  # in which terms were found, but for the first ones
+        self._order = deque[int]()  # of computation of the terms after the first ones
         self._parts: dict[int, Any] = {}
         self._ratios: dict[int, Any] = {}
         for n, term in enumerate(first, start=1):
             if term == 0:
                 raise ArithmeticError("one of the first terms is 0")
             self._terms[n], self._first[n] = numbers.split(term)
-        # By t(i - j) is divided: by the numbers 1 and W(2) in the scale, otherwise by w, which divides exactly.
+        # The division by t(i - j): for 1 and W(2) in the scale, otherwise by w, which divides exactly.
         is_by_scale = multiples is None or first[0] == first[1] == 1
         self._low = {
             low: (None, first[low - 1]) if is_by_scale else (numbers.divisor(self._terms[low]), self._first[low])
@@ -118,7 +122,7 @@ class Terms:
         }
 
     def integer(self, n: int) -> Any:
-        """w(n), for n >= 1."""
+        """Return w(n), for n >= 1."""
         if n not in self._terms:
             if n < 5:
                 raise ArithmeticError("a term before the first")
@@ -134,49 +138,49 @@ class Terms:
             if n > _DIRECT + 1:
                 self._order.append(n)
             else:
-                known = self._first[i] * self._W._first[j]
-                self._first[n] = self._scales[n] * known * known
+                scale_product = self._first[i] * self._W._first[j]
+                self._first[n] = self._scales[n] * scale_product * scale_product
         return self._terms[n]
 
     def pair(self, n: int) -> tuple[Any, Any]:
-        """w(n)^2 and w(n + 1) w(n - 1), for n >= 2."""
+        """Return w(n)^2 and w(n + 1) w(n - 1), for n >= 2."""
         if n not in self._pairs:
-            here = self.integer(n)
-            self._pairs[n] = here * here, self.integer(n + 1) * self.integer(n - 1)
+            term = self.integer(n)
+            self._pairs[n] = term * term, self.integer(n + 1) * self.integer(n - 1)
         return self._pairs[n]
 
     def part(self, n: int) -> Any:
-        """s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
+        """Return s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
         if n not in self._parts:
-            before, here, ahead = (self._scale(k, n <= _DIRECT) for k in (n - 1, n, n + 1))
-            found = ahead * before / (here * here)
+            at_n_minus_1, at_n, at_n_plus_1 = (self._scale(k, n <= _DIRECT) for k in (n - 1, n, n + 1))
+            part = at_n_plus_1 * at_n_minus_1 / (at_n * at_n)
             if n > _DIRECT:
                 k = n // 2
                 root = self.ratio(k + 1) * self._W.part(k) if n % 2 else 1 / self.ratio(k)
-                found = found * root * root
-            self._parts[n] = found
+                part = part * root * root
+            self._parts[n] = part
         return self._parts[n]
 
     def ratio(self, n: int) -> Any:
-        """S(n - 1) s(n + 1)/(S(n) s(n)), for n >= 2."""
+        """Return S(n - 1) s(n + 1)/(S(n) s(n)), for n >= 2."""
         if self is self._W:
             return self.part(n)
         if n not in self._ratios:
             W = self._W
             is_first = n <= _DIRECT
-            found = W._scale(n - 1, is_first) * self._scale(n + 1, is_first)
-            found = found / (W._scale(n, is_first) * self._scale(n, is_first))
+            ratio = W._scale(n - 1, is_first) * self._scale(n + 1, is_first)
+            ratio = ratio / (W._scale(n, is_first) * self._scale(n, is_first))
             if n > _DIRECT:
                 k = n // 2
                 root = self.ratio(k + 1) * W.part(k) if n % 2 else 1 / W.part(k)
-                found = found * root * root
-            self._ratios[n] = found
+                ratio = ratio * root * root
+            self._ratios[n] = ratio
         return self._ratios[n]
 
     def forget(self, n: int) -> None:
-        """Keep what is long and needed for terms near 2 n + 8 and later ones alone, from n on, beside the first terms.
+        """Discard the terms with index below n that terms near 2 n + 8 and later do not need; keep the first ones.
 
-        Products of numbers above are made again when the time comes, in a fifth of the time that they took.
+        Products that are needed again later are recomputed, in a fifth of the time that they took before.
         """
         while self._order and self._order[0] < n:
             self._terms.pop(self._order.popleft(), None)

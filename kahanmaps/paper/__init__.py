@@ -1,1 +1,1 @@
-"""The paper of Petrera and Suris: every claim a short function, put to the test."""
+"""The paper of Petrera and Suris: every claim as a short function, and their verification."""

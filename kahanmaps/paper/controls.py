@@ -16,7 +16,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 @dataclass(frozen=True)
 class Control:
-    """One way to break a hypothesis: what is broken, and how."""
+    """A negative control: the hypothesis that it violates, and how."""
 
     breaks: str
     function: Callable[[PaperObjects], PaperObjects]
@@ -44,8 +44,8 @@ def broken_f(o: PaperObjects) -> PaperObjects:
 
 
 def broken_B(o: PaperObjects) -> PaperObjects:
-    given = o.associate_matrices and tuple((o.I * o.number(3) - B) * o.number(1, 2) for B in o.associate_matrices)
-    return o.changed(minus=o.number(2), associate_matrices=given)
+    matrices = o.associate_matrices and tuple((o.I * o.number(3) - B) * o.number(1, 2) for B in o.associate_matrices)
+    return o.changed(minus=o.number(2), associate_matrices=matrices)
 
 
 def repeated_root(o: PaperObjects) -> PaperObjects:

@@ -1,4 +1,4 @@
-"""Everything the paper gives a letter, at one point, over one field: what the claims are written in.
+"""The objects that the paper denotes by letters, at one point, over one field; the claims are functions of them.
 
 Letters are the paper's: A, J, H (with its chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated g, K;
 x and eps; x~ is the image of x under the map of f. Numbers are elements of `K`, which may be the rationals, GF(p),
@@ -34,7 +34,7 @@ _IN_K = (
 def remembered(method: Method) -> Method:
     """Remember the values of a method by the identity of its arguments, which are kept, so that it stays theirs.
 
-    The claims ask for the same things again and again.
+    The claims need the same values again and again.
     """
     name = method.__name__
 
@@ -98,14 +98,14 @@ class PaperObjects:
 
     @property
     def m(self) -> int:
-        """Half the dimension."""
+        """Half the dimension, m."""
         return self.n // 2
 
     # ---- numbers, vectors and matrices --------------------------------------------------------------------------
 
-    def number(self, above: int, below: int = 1) -> Any:
+    def number(self, numerator: int, denominator: int = 1) -> Any:
         """The rational number above/below as an element of K."""
-        return self.K.convert(fmpq(above, below))
+        return self.K.convert(fmpq(numerator, denominator))
 
     @cached_property
     def I(self) -> Any:  # noqa: E743 (the paper's letter)
@@ -118,14 +118,14 @@ class PaperObjects:
         return self.vector("x")
 
     def vector(self, name: str) -> Any:
-        """A vector of its own: the point x, another point, a direction."""
+        """Return an independent vector: the point x, another point, a direction."""
         if name not in self._memory:
             self.used.add(name)
             self._memory[name] = self.draw(name)
         return self._memory[name]
 
     def forget(self, kept: tuple[str, ...] = ()) -> None:
-        """Forget what was computed, but for the vectors that were drawn and the values of the methods `kept`."""
+        """Discard all computed values, except the drawn vectors and the values of the methods `kept`."""
         drawn = {
             key: value
             for key, value in self._memory.items()
@@ -136,7 +136,7 @@ class PaperObjects:
         self._memory.update(drawn)
 
     def scalar(self, name: str) -> Any:
-        """A number of its own."""
+        """Return an independent number."""
         return self.vector(name)[0, 0]
 
     @remembered
@@ -151,11 +151,11 @@ class PaperObjects:
     solve, det, trace = staticmethod(solve), staticmethod(det), staticmethod(trace)
 
     def inverse(self, matrix: Any) -> Any:
-        """matrix^{-1}."""
+        """Return matrix^{-1}."""
         return solve(matrix, self.I)
 
     def dot(self, left: Any, right: Any) -> Any:
-        """left^T right, a number."""
+        """Return left^T right, a number."""
         return (left.transpose() * right)[0, 0]
 
     def sum(self, terms: Sequence[Any]) -> Any:
@@ -188,7 +188,7 @@ class PaperObjects:
     # ---- any system and its Kahan map ---------------------------------------------------------------------------
 
     def value(self, f: SystemOver, x: Any) -> Any:
-        """f(x)."""
+        """Return f(x)."""
         return self.K.column(f.value(x.entries()))
 
     @remembered
@@ -203,14 +203,14 @@ class PaperObjects:
 
     @remembered
     def step(self, f: SystemOver, x: Any, times: int = 1) -> Any:
-        """Phi_f(x, eps), or Phi_f(x, times eps)."""
+        """Return Phi_f(x, eps), or Phi_f(x, times eps)."""
         eps = self.step_eps * self.number(times)
         if self.method == "euler":
             return x + self.value(f, x) * (eps * self.number(2))
         return self.K.column(KahanMap(f, eps).step(x.entries()))
 
     def jacobian_of_step(self, f: SystemOver, x: Any) -> Any:
-        """dPhi_f(x, eps)."""
+        """Return dPhi_f(x, eps)."""
         if self.method == "euler":
             return self.I + self.jac(f, x) * (self.step_eps * self.number(2))
         return KahanMap(f, self.step_eps).jacobian(x.entries())
@@ -365,12 +365,12 @@ class PaperObjects:
 
         From the roots by Lagrange's formula 1 + (B_i(lambda_i) - 1) prod (lambda - lambda_j)/(lambda_i - lambda_j).
         """
-        product, below = [self.K.one], self.K.one
+        product, denominator = [self.K.one], self.K.one
         for j in self.each:
             if j != i:
                 product = _times_linear(self.K, product, self.lam[j])
-                below = below * (self.lam[i] - self.lam[j])
-        factor = (self.minus - self.K.one) / below
+                denominator = denominator * (self.lam[i] - self.lam[j])
+        factor = (self.minus - self.K.one) / denominator
         coefficients = [coefficient * factor for coefficient in product]
         coefficients[0] = coefficients[0] + self.K.one
         return coefficients
@@ -409,7 +409,7 @@ class PaperObjects:
             return self.sign_vectors
         if count == 1:
             return ((-1,),)
-        return tuple((1, *rest) for rest in itertools.product((1, -1), repeat=count - 1))[1:]
+        return tuple((1, *other_signs) for other_signs in itertools.product((1, -1), repeat=count - 1))[1:]
 
     @remembered
     def g(self, B: Any) -> SystemOver:
@@ -544,13 +544,13 @@ class PaperObjects:
     @remembered
     def Q(self, i: int, x: Any) -> Any:
         """Q_i = (2 - m + sum 1/s_j - 2/s_i)/(4 eps^2)."""
-        above = self.number(2 - self.m) + self.reciprocals(x) - self.number(2) / self.s(i, x)
-        return above / (self.number(4) * self.eps * self.eps)
+        numerator = self.number(2 - self.m) + self.reciprocals(x) - self.number(2) / self.s(i, x)
+        return numerator / (self.number(4) * self.eps * self.eps)
 
     # ---- variations ---------------------------------------------------------------------------------------------
 
     def lifted(self) -> PaperObjects:
-        """The same objects over the dual numbers K[d]/(d^2)."""
+        """The objects over the dual numbers K[d]/(d^2)."""
         if "lifted" not in self._memory:
             dual = DualField(self.K)
 
@@ -569,7 +569,7 @@ class PaperObjects:
         return lifted
 
     def changed(self, **changes: Any) -> PaperObjects:
-        """Objects with some of the data replaced, and nothing remembered."""
+        """Return objects with some of the data replaced, and an empty cache."""
         kept = {entry.name: getattr(self, entry.name) for entry in fields(PaperObjects)}
         return PaperObjects(**{**kept, "_memory": {}, **changes})
 
@@ -599,11 +599,11 @@ class PaperObjects:
                 base=base and SystemOver(self.K, base.tensor, self.J * X, self.J * linear),
                 draw=self.vector,
             )
-        found: PaperObjects = self._memory["inhomogeneous"]
-        return found
+        objects: PaperObjects = self._memory["inhomogeneous"]
+        return objects
 
     def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
-        """A quadratic system without any structure: f'', B and c are drawn."""
+        """A quadratic system without special structure: f'', B and c are random."""
         n, K = self.n, self.K
         rows: dict[tuple[int, int], Any] = {}
         for j in range(n):
@@ -707,8 +707,8 @@ class PaperObjects:
                 factor = self.number({1: 6, 2: 2, 3: 1}[len({a, b, c})])  # the third derivative of x_a x_b x_c
                 for i in range(n):  # entry (i, k) of A nabla^2 H gains A_ij, entry (k, i) of nabla^2 H A^T as well
                     if i != k:
-                        place = l * len(pairs) + pairs[min(i, k), max(i, k)]
-                        row[place] = row[place] + self.A[i, j] * (factor if i < k else -factor)
+                        column = l * len(pairs) + pairs[min(i, k), max(i, k)]
+                        row[column] = row[column] + self.A[i, j] * (factor if i < k else -factor)
             rows.append(row)
         return rank(K, K.matrix(len(rows), len(rows[0]), [entry for row in rows for entry in row]))
 

@@ -1,4 +1,4 @@
-"""The list of the paper's claims: one short function each, with its place in the paper; and how one is evaluated.
+"""The registry of the paper's claims: one short function each, with its place in the paper; and their evaluation.
 
 A claim is a function that takes the paper's objects (`PaperObjects`: A, J, H, f, B_i, x, eps, ...) and yields pairs
 (left, right) which the paper says are equal. It knows nothing of the numbers it runs on: the same function is
@@ -43,7 +43,7 @@ SECTIONS: dict[int, tuple[str, str]] = {
 
 
 class ClaimKind(StrEnum):
-    """What a claim asserts of its pairs."""
+    """The assertion of a claim about its pairs."""
 
     EQUAL = "equal"  # both sides are equal, everywhere
     DIFFERENT = "different"  # the sides of every pair differ somewhere: one point where all do is a proof
@@ -89,7 +89,7 @@ class Claim:
         return m >= self.least_m and (self.only_m is None or m == self.only_m)
 
     def blocks_for_proof(self, m: int) -> int:
-        """How many blocks a proof in normal form needs."""
+        """The number of blocks that a proof in normal form needs."""
         return 1 if self.blockwise else min(m, 2) if self.pairwise else m
 
     @property
@@ -99,7 +99,7 @@ class Claim:
 
     @property
     def title(self) -> str:
-        """What the claim says, from the first line of its docstring."""
+        """The statement of the claim, from the first line of its docstring."""
         lines = (self.function.__doc__ or self.key).strip().splitlines()
         return lines[0].rstrip(".")
 
@@ -130,10 +130,10 @@ def claim(place: str, label: str, breaks: str = "", **more: Any) -> Callable[[Cl
 
 @cache
 def claims() -> tuple[Claim, ...]:
-    """All claims, in the order of the paper."""
+    """Return all claims, in the order of the paper."""
     for _, name in SECTIONS.values():
         import_module(f"kahanmaps.paper.claims.{name}")
-    return tuple(sorted(_claims.values(), key=lambda found: found.section))
+    return tuple(sorted(_claims.values(), key=lambda claim: claim.section))
 
 
 # ---- evaluating a claim ----------------------------------------------------------------------------------------
@@ -157,7 +157,7 @@ def same(K: Field, left: Any, right: Any) -> bool:
 
 @dataclass(frozen=True)
 class ClaimOutcome:
-    """What a claim came to on certain objects: how many pairs, and the first that is not as claimed."""
+    """The outcome of a claim for given objects: the number of pairs, and the first pair that contradicts it."""
 
     objects: PaperObjects
     pairs: int
@@ -169,7 +169,7 @@ class ClaimOutcome:
 
 
 def evaluate(claim: Claim, o: PaperObjects) -> ClaimOutcome:
-    """Run a claim. May raise SingularStep and the like where something is not defined."""
+    """Evaluate a claim. May raise SingularStep and similar errors where something is not defined."""
     pairs = 0
     with o.K.working():
         for left, right in claim.function(o):
@@ -184,7 +184,7 @@ def outcomes(
     points: Iterable[PaperObjects | None],
     change: Callable[[PaperObjects], PaperObjects] = lambda objects: objects,
 ) -> Iterator[ClaimOutcome]:
-    """What a claim comes to at those of the points, each changed first, at which it is defined."""
+    """Yield the outcomes of a claim at those of the points, after a change, at which it is defined."""
     for objects in points:
         if objects is not None:
             with suppress(*UNDEFINED, LookupError):  # the last one where the roots of chi are needed and not there

@@ -86,8 +86,8 @@ class MemberObjects(PaperObjects):
     def _associate(self, signs: tuple[int, ...]) -> AssociatedSystem:
         if ("associate", signs) not in self._memory:
             self._memory["associate", signs] = self.member.associate(signs)
-        found: AssociatedSystem = self._memory["associate", signs]
-        return found
+        system: AssociatedSystem = self._memory["associate", signs]
+        return system
 
     def H_tilde(self, x: Any) -> Any:
         """H~ from the library."""
@@ -108,24 +108,24 @@ class MemberObjects(PaperObjects):
 
 def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
     """The roots of chi in the order of the signs, where they are rational and distinct."""
-    found = [factor.root for factor in member.factors if factor.root is not None and factor.multiplicity == 1]
-    return tuple(found) if len(found) == len(member.factors) else None
+    roots = [factor.root for factor in member.factors if factor.root is not None and factor.multiplicity == 1]
+    return tuple(roots) if len(roots) == len(member.factors) else None
 
 
 def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | None:
-    """All sign vectors (None), or a sample: the single flips and random ones."""
+    """Return None for all sign vectors, or a sample: the single flips and random ones."""
     if 2 ** (m - 1) <= MAX_SIGN_VECTORS:
         return None
     flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
-    more = [(1, *(rng.choice((1, -1)) for _ in range(m - 1))) for _ in range(4)]
-    return tuple(dict.fromkeys(signs for signs in [*flips, *more] if -1 in signs))
+    random_signs = [(1, *(rng.choice((1, -1)) for _ in range(m - 1))) for _ in range(4)]
+    return tuple(dict.fromkeys(signs for signs in [*flips, *random_signs] if -1 in signs))
 
 
 # ---- points over GF(p) and Q -----------------------------------------------------------------------------------
 
 
 def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
-    """Random vectors of K^n."""
+    """Return random vectors of K^n."""
     return lambda name: K.column([K.random(rng) for _ in range(n)])
 
 
@@ -174,11 +174,11 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
         for i in range(m):
             for j in range(i, m):
                 entries[i, j] = entries[j, i] = K.random(rng)
-        shear, back = ([K.one if i == j else K.zero for i in range(n) for j in range(n)] for _ in range(2))
+        shear, inverse_shear = ([K.one if i == j else K.zero for i in range(n) for j in range(n)] for _ in range(2))
         for (i, j), value in entries.items():
-            place = i * n + m + j if k % 2 == 0 else (m + i) * n + j
-            shear[place], back[place] = value, -value
-        S, S_inverse = S * K.matrix(n, n, shear), K.matrix(n, n, back) * S_inverse
+            position = i * n + m + j if k % 2 == 0 else (m + i) * n + j
+            shear[position], inverse_shear[position] = value, -value
+        S, S_inverse = S * K.matrix(n, n, shear), K.matrix(n, n, inverse_shear) * S_inverse
     A, third = _normal_form(K, roots, cubics)
     # x = S z: A becomes S^{-T} A S^T, and each index of the third derivatives is multiplied by S^{-1}: the last one,
     # which comes first then, three times.
@@ -211,7 +211,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
         *(f"l{i + 1}" for i in range(m)),
         *blockwise,
         "eps",
-        *(name for found in letters.values() for name in found),
+        *(name for symbol_names in letters.values() for name in symbol_names),
     ]
     K = FunctionField(names, budget, reduces=True)
     by_name = dict(zip(names, K.variables, strict=True))
@@ -314,9 +314,9 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
     chi = chi_of(member.A)
     if rational_roots(member) is None:
         # d root is an algebraic integer, d the common denominator of chi; Cauchy bounds the root in every embedding.
-        below = chi.denom()
-        largest = below * (2 + max(abs(chi[k]) for k in range(member.m)))
-        root = K.polynomial(0, float(largest.p.bit_length())) / K.convert(below)
+        denominator = chi.denom()
+        largest = denominator * (2 + max(abs(chi[k]) for k in range(member.m)))
+        root = K.polynomial(0, float(largest.p.bit_length())) / K.convert(denominator)
     else:
         root = K.matrix(1, member.m, [K.convert(abs(r)) for r in rational_roots(member) or ()])[0, 0]
     value = K.variable() if eps is None else K.convert(eps)
@@ -372,10 +372,10 @@ def _given(member: FamilyMember, K: Field) -> dict[str, Any]:
     n = member.dim
     slices = [matrix.entries() for matrix in third_derivatives(member.H)]
     third = fmpq_mat(n * n, n, [slices[l][row] for row in range(n * n) for l in range(n)])
-    given = {"K": K, "A": K.convert_matrix(member.A), "third": K.convert_matrix(third)}
+    values = {"K": K, "A": K.convert_matrix(member.A), "third": K.convert_matrix(third)}
     if not member.is_generic:
-        given["associate_matrices"] = tuple(K.convert_matrix(g.B) for g in list(member.associated())[1:])
-    return given
+        values["associate_matrices"] = tuple(K.convert_matrix(g.B) for g in list(member.associated())[1:])
+    return values
 
 
 def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]) -> tuple[Any, Any]:

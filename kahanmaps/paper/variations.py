@@ -1,4 +1,4 @@
-"""Variations of what the paper assumes: the statements are asked again of other H, other J, other steps, other A.
+"""Variations of the hypotheses of the paper: other H, other J, other steps, other A.
 
 A variation takes the paper's objects and returns others, like a control; but it is not said beforehand that a statement
 fails. `varied=False` of the objects leaves everything as in the paper, which is the control of what fails.
@@ -15,7 +15,7 @@ from kahanmaps.paper.objects import PaperObjects
 
 @dataclass(frozen=True)
 class Variation:
-    """One variation: its title, the least m for which it is one, and the theorem that proves what is not expanded."""
+    """A variation: its title, the least m for which it differs, and the theorem that proves claims not expanded."""
 
     title: str
     function: Callable[[PaperObjects], PaperObjects]

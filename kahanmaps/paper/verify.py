@@ -1,18 +1,18 @@
-"""Putting every claim of the paper to the test, for one member of the family or for the member in general.
+"""Verification of all claims of the paper, for one member of the family or for the generic member.
 
-How a claim is decided, and what the verdict then says:
+The methods of verification:
 
-* *random points*: the claim is evaluated on the member over GF(p), p random of 63 bits, at random x, eps and whatever
-  else it speaks of; p is one at which chi splits, if the claim needs its roots. A failure refutes. Success makes the
-  claim `supported`, with a bound for the error that is derived by running the claim over bounds.
-* *normal form*: the same claim is run over rational functions, for the normal form with indeterminate roots,
-  coefficients, x and eps. This proves it for every member with distinct roots: such a member is, over the splitting
-  field of chi, symplectically similar to a specialization (docs/mathematics.md); its hypotheses are verified exactly.
-* *symbolic*: where the normal form does not apply, the claim is run for this member with indeterminate x and eps.
-* *exact*: claims without x, and those about dimensions and ranks, are evaluated over Q.
+* *random points*: the claim is evaluated for the member over GF(p), p a random prime of 63 bits, at random x, eps and
+  other arguments; if the claim contains the roots of chi, p is a prime modulo which chi splits. A failure refutes the
+  claim. Otherwise the claim is `supported`, with an error bound that is computed by evaluating the claim over bounds.
+* *normal form*: the claim is evaluated over rational functions, for the normal form with indeterminate roots,
+  coefficients, x and eps. This proves it for every member with distinct roots: over the splitting field of chi such a
+  member is symplectically similar to a specialization (docs/mathematics.md); its hypotheses are verified exactly.
+* *symbolic*: if the normal form does not apply, the claim is evaluated for this member with indeterminate x and eps.
+* *exact*: claims without x, and claims about dimensions and ranks, are evaluated over Q.
 
-Beside that, claims about one block at a time are evaluated exactly over Q[t]/chi, where all roots are one, and, if
-asked for, over complex balls.
+In addition, claims about single blocks are evaluated exactly over Q[t]/chi, for all roots at once, and, if requested,
+over complex balls.
 """
 
 from __future__ import annotations
@@ -83,13 +83,13 @@ NOTE_ON_RANDOM_MEMBERS = (
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """What to verify: sections (None: all), the order of the series, bits for complex balls, controls instead."""
+    """The options of `verify`: sections (None: all), order of the series, bits of complex balls, controls instead."""
 
     sections: tuple[int, ...] | None = None
     order: int = 3
     ball_bits: int | None = None
     controls: bool = False
-    beyond: bool = False  # the statements of section 10 that are asked of variations, and no others
+    beyond: bool = False  # the statements of section 10 about variations, and no others
 
     def __post_init__(self) -> None:
         if not 1 <= self.order <= 20:
@@ -112,7 +112,7 @@ def verify(
     eps: Any = None,
     time_step: Any = None,
 ) -> Report:
-    """Every claim of the paper, for a member of the family or for the member in general.
+    """Verify all claims of the paper, for a member of the family or for the generic member.
 
     Args:
         system: a member of the family, with m at most 8; or
@@ -184,7 +184,7 @@ def verify(
 
 
 class Verifier:
-    """How claims are verified: random points over GF(p), a proof, exact points, and controls.
+    """Verifies claims: at random points over GF(p), by a proof, at exact points, and with controls.
 
     For a given member, or (None) for the member in general, with half the dimension `m`.
     """
@@ -196,36 +196,36 @@ class Verifier:
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
 
     def findings(self) -> list[Finding]:
-        """One finding a claim, or one a claim and control and a last one on all controls together."""
+        """Return one finding for each claim; with controls one for each claim and control, and a final one for all."""
         sections = self.options.sections
         made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
         selected = [c for c in made if sections is None or c.section in sections]
-        found: list[Finding] = []
+        findings: list[Finding] = []
         without: list[str] = []
         for k, claim in enumerate(selected):
             self.settings.progress(f"{claim.place} ({k + 1} of {len(selected)})")
             if self.options.controls:
                 controls = self.controls(claim)
-                found += controls
+                findings += controls
                 if self.outside(claim) is None and not any(finding.is_as_expected for finding in controls):
                     without.append(claim.key)
             else:
-                found.append(self.verify_claim(claim))
+                findings.append(self.verify_claim(claim))
             for objects in self._points.values():  # or they would remember the values of all claims
                 if objects is not None:
                     objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
         if self.options.controls:
-            tried = {"claims": len({finding.place["key"] for finding in found})}
-            text = f"{len(found)} controls of {tried['claims']} claims, all refuted at exact points"
-            if without or not found:
+            tried = {"claims": len({finding.place["key"] for finding in findings})}
+            text = f"{len(findings)} controls of {tried['claims']} claims, all refuted at exact points"
+            if without or not findings:
                 text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
-            verdict = Certainty.UNDECIDED if without or not found else Certainty.PROVED
+            verdict = Certainty.UNDECIDED if without or not findings else Certainty.PROVED
             claimed = "every claim fails on some input that breaks one of its hypotheses"
-            found.append(Finding(claimed, verdict, Evidence("controls", text, tried)))
-        return found
+            findings.append(Finding(claimed, verdict, Evidence("controls", text, tried)))
+        return findings
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
-        """The number-th random point over GF(p); with the roots of chi, if need be, or None where they are not had."""
+        """Return the number-th random point over GF(p), with the roots of chi if needed; None if there are none."""
         # In general, and where chi splits over Q, one pool of points serves all claims.
         needs_split = roots and self.member is not None and self.roots is None
         key = (needs_split, number)
@@ -245,10 +245,10 @@ class Verifier:
                     if needs_split:
                         self.settings.progress("looking for a prime at which chi splits")
                         # One prime in m! splits at worst, so that this fails with probability e^-40.
-                        found = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
-                        if found is None:
+                        split_field = specialize.split_prime_field(chi_of(member.A), rng, 40 * math.factorial(self.m))
+                        if split_field is None:
                             return None
-                        K, in_K = found
+                        K, in_K = split_field
                     else:
                         K = random_prime_field(rng)
                         in_K = None if self.roots is None else tuple(K.convert(root) for root in self.roots)
@@ -256,14 +256,14 @@ class Verifier:
         return self._points[key]
 
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
-        """A random point over Q; None in general, and where the roots of chi are needed and not rational."""
+        """Return a random point over Q; None for the generic member, and if roots of chi are needed but irrational."""
         if self.member is None or (roots and self.roots is None):
             return None
         rng = random.Random(f"exact {self._seed} {number}")
         return specialize.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
-        """The objects as bounds."""
+        """The objects with bounds in place of numbers."""
         if self.member is None:
             return specialize.universal_bound_objects(self.m, self.options.order)
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
@@ -275,7 +275,7 @@ class Verifier:
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
 
     def outside(self, claim: Claim) -> str | None:
-        """Why a claim does not apply, if it does not."""
+        """Return why a claim does not apply; empty if it does."""
         if self.member is None or self.member.is_generic:
             return None
         bounds = self.bounds()
@@ -288,7 +288,7 @@ class Verifier:
         return None
 
     def what_is_special(self) -> str:
-        """Why a statement for generic A and H may fail here."""
+        """Return why a statement for generic A and H may fail for this member."""
         if self.member is None:
             return "its A or H is special"
         if not self.member.is_generic:
@@ -314,7 +314,7 @@ class Verifier:
     # one claim
 
     def verify_claim(self, claim: Claim) -> Finding:
-        """The finding on one claim."""
+        """Verify one claim and return its finding."""
         reason = self.outside(claim)
         if reason is not None:
             return self._finding(claim, Certainty.UNDECIDED, Evidence("outside the hypotheses", reason))
@@ -322,12 +322,14 @@ class Verifier:
             return self._verify_existence(claim)
         statement = ClaimAtPoints(self, claim)
         decision = decide(statement, self.settings.seed, self.settings.error_bits)
-        found = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
+        finding = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
         if claim.misprint and decision.verdict is Certainty.SUPPORTED:
             silent = Evidence("special member", f"the misprint does not show for this member: {self.what_is_special()}")
-            return replace(found, verdict=Certainty.UNDECIDED, evidence=silent, also=(found.evidence,), applies=False)
+            return replace(
+                finding, verdict=Certainty.UNDECIDED, evidence=silent, also=(finding.evidence,), applies=False
+            )
         if claim.misprint or decision.verdict is Certainty.REFUTED:
-            return found
+            return finding
         try:
             proof = self.proof(claim, statement.needs, *statement.bound)
             if proof is None and claim.theorem:
@@ -341,13 +343,13 @@ class Verifier:
                 return self._finding(claim, Certainty.PROVED, proof, (decision.evidence, *also))
             if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
                 return self._finding(claim, Certainty.PROVED, proof, also)
-        return replace(found, also=(*found.also, *also))
+        return replace(finding, also=(*finding.also, *also))
 
     def _verify_existence(self, claim: Claim) -> Finding:
-        """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
+        """Decide a claim that two objects differ, or that a rank is attained: one point is a proof."""
         roots, outcome, tried = False, None, 0
         for number in range(_MAX_UNDEFINED):
-            # Large matrices over Q are dear, and where there is a reason for the other side a point over GF(p) will do.
+            # Large matrices over Q are expensive; where the other side has a proof, a point over GF(p) suffices.
             modular = bool(claim.at_most) and self.m > 3
             objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
             if objects is None:
@@ -385,7 +387,7 @@ class Verifier:
         return self._finding(claim, Certainty.REFUTED, evidence, witness=witness_of(outcome))
 
     def proof(self, claim: Claim, needs: set[str], equation: CoefficientSize, poles: int) -> Evidence | None:
-        """A proof, if there is one."""
+        """Return a proof, or None."""
         blocks, order = claim.blocks_for_proof(self.m), self.options.order
         if self.member is None:
             return normal_form_proof(claim.key, blocks, order) if claim.symplectic else None
@@ -429,7 +431,7 @@ class Verifier:
                 if not evaluate(claim, objects).holds:
                     raise Contradiction(f"{claim.place}: {claim.title}: fails over Q[t]/chi, but not over GF(p)")
                 yield Evidence("exact over Q[t]/chi", f"{text}, for all roots at once", {"points": 1})
-            except UNDEFINED:  # a point where the map has no value: no evidence, and none is claimed
+            except UNDEFINED:  # the map is not defined at this point, which gives no evidence
                 pass
         if self.options.ball_bits is not None:
             bits = self.options.ball_bits
@@ -454,24 +456,24 @@ class Verifier:
             yield Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
 
     def notes(self) -> list[str]:
-        """What holds for the whole table."""
+        """Return the notes on the whole table."""
         if self.member is None:
             return [NOTE_ON_RANDOM_MEMBERS]
-        found = [diagnosis(self.member.A)]
+        notes = [diagnosis(self.member.A)]
         if self.member.is_generic and not self.options.controls:
-            found.append(NOTE_ON_PROOFS)
+            notes.append(NOTE_ON_PROOFS)
         if self.options.ball_bits is not None and self.member.is_generic:
             with CC(self.options.ball_bits).working():
                 roots = specialize.complex_roots(self.member, self.options.ball_bits)
                 enclosures = [str(root.str(20)) for root in roots]
-            found.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
-        return found
+            notes.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
+        return notes
 
     def controls(self, claim: Claim) -> list[Finding]:
         """The claim on broken input, one finding for every control that it names: each is expected to be refuted."""
         if claim.misprint:
             return [self.verify_claim(claim)]
-        found = []
+        controls = []
         for name in claim.breaks:
             if self.m < CONTROLS[name].least_m or self.outside(claim) is not None:
                 continue
@@ -485,9 +487,9 @@ class Verifier:
             evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
             place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
-            found.append(replace(finding, control=True, place=place))
+            controls.append(replace(finding, control=True, place=place))
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
-        return [finding for finding in found if finding.is_as_expected] or found
+        return [finding for finding in controls if finding.is_as_expected] or controls
 
     def _broken(self, claim: Claim, name: str) -> ClaimOutcome | None:
         """The claim on input broken by a control, at a point at which it fails; else the last outcome.
@@ -532,7 +534,7 @@ class Verifier:
 
 
 class ClaimAtPoints:
-    """A claim as `decide` takes it: at the points of a verifier."""
+    """A claim at the points of a verifier, in the form that `decide` requires."""
 
     name = "claim"
     no_value = "a denominator seems to vanish identically"
@@ -548,7 +550,7 @@ class ClaimAtPoints:
 
     @property
     def where(self) -> str:
-        """What is assumed of the primes."""
+        """The assumption about the primes."""
         if self.conjugates == 1:
             return ""
         return " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
@@ -570,8 +572,8 @@ class ClaimAtPoints:
                 evidence = Evidence("point over GF(p)", text)
                 # A rational point is better to look at.
                 exact = (self._verifier.exact_point(self._roots, exact_number) for exact_number in range(12))
-                if found := next((found for found in outcomes(self._claim, exact) if not found.holds), None):
-                    outcome = found
+                if failure := next((failure for failure in outcomes(self._claim, exact) if not failure.holds), None):
+                    outcome = failure
                     evidence = Evidence("exact rational point", "fails at a rational point, exactly")
                 yield Trial(decision=Decision(Certainty.REFUTED, evidence, witness_of(outcome)))
             elif not outcome.pairs:
@@ -581,17 +583,17 @@ class ClaimAtPoints:
                 yield Trial(objects.K.characteristic)
 
     def data(self, undefined: int) -> dict[str, Any]:
-        """What evidence says beside the bounds."""
+        """Return the data of the evidence other than the bounds."""
         return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
 
 
 @lru_cache(maxsize=4096)
 def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
-    """The proof of a claim in normal form with so many blocks; None where it grows beyond the budget.
+    """Prove a claim in normal form with this number of blocks; return None if the budget is exceeded.
 
     Raises Contradiction where the two sides are different rational functions.
     """
-    claim = next(found for found in claims() if found.key == key)
+    claim = next(claim_ for claim_ in claims() if claim_.key == key)
     bounds = specialize.universal_bound_objects(blocks, order)
     for _ in claim.function(bounds):  # which notes the letters that are used
         pass

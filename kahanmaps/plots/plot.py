@@ -12,7 +12,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.floats.doubles import start_rows
+from kahanmaps.maps.floats.float_conversion import start_rows
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.orbit import Trajectory
 from kahanmaps.plots.point_functions import point_function

@@ -13,8 +13,8 @@ from kahanmaps.algebra.parsing import is_name, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.display.latex import latex_polynomial
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.doubles import FloatArray, to_float
-from kahanmaps.maps.floats.fast import FLOATS
+from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
+from kahanmaps.maps.floats.float_orbit import FLOATS
 from kahanmaps.plots.figures import label_of, plain
 
 ZERO = fmpq(0)

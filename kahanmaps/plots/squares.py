@@ -20,7 +20,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.recognition import find_cubic_hamiltonian, find_family_structure
-from kahanmaps.maps.floats.doubles import to_floats
+from kahanmaps.maps.floats.float_conversion import to_floats
 from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, as_map
 from kahanmaps.plots.curves.plane_cubics import Floats

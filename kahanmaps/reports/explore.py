@@ -18,7 +18,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.latex import formula
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.maps.floats.doubles import to_float, to_floats
+from kahanmaps.maps.floats.float_conversion import to_float, to_floats
 from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.reports.page import CHARACTERS, Html, Section, system_section
 from kahanmaps.reports.pictures import DEFAULT_EPS

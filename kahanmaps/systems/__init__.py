@@ -1,1 +1,1 @@
-"""The differential equations: quadratic vector fields, cubic Hamiltonians."""
+"""Differential equations: quadratic and polynomial vector fields, cubic Hamiltonians."""

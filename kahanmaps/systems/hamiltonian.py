@@ -21,7 +21,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def standard_structure(dim: int) -> fmpq_mat:
-    """The matrix [[0, I], [-I, 0]] of even size `dim`.
+    """Return the matrix [[0, I], [-I, 0]] of even size `dim`.
 
     >>> standard_structure(2)
     [ 0, 1]
@@ -91,7 +91,7 @@ class CubicHamiltonian(LatexDisplay):
 
     @cached_property
     def centre(self) -> tuple[fmpq, ...] | None:
-        """A point c for which H(c + x) - H(c) is a homogeneous cubic, if there is one.
+        """Return a point c for which H(c + x) - H(c) is a homogeneous cubic, or None.
 
         Hess H(c) = 0 are linear equations. Solutions differ by directions on which the cubic part does not depend, so
         that grad H has the same value at all of them.
@@ -106,7 +106,7 @@ class CubicHamiltonian(LatexDisplay):
         return last[:n]
 
     def about(self, point: Sequence[fmpq]) -> CubicHamiltonian:
-        """The same system in coordinates with this point as origin: H(point + x) - H(point)."""
+        """Return the system in coordinates with this point as origin: H(point + x) - H(point)."""
         context = self.H.context()
         H = self.H.compose(*(x + c for x, c in zip(context.gens(), point, strict=True)), ctx=context)
         return CubicHamiltonian(H - H[(0,) * self.dim], self.J)

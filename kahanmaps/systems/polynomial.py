@@ -1,4 +1,4 @@
-"""Polynomial vector fields x' = f(x) of any degree, exact, with symbols in the coefficients where they are wanted."""
+"""Polynomial vector fields x' = f(x) of any degree, exact, possibly with symbols in the coefficients."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class PolynomialField:
         return sum((p.derivative(i) for i, p in enumerate(self.rhs)), self.rhs[0].context().constant(0))
 
     def derivative(self, function: fmpq_mpoly) -> fmpq_mpoly:
-        """f . grad P, how P changes along solutions; P is in the variables and symbols and, if need be, in eps.
+        """Return f . grad P, the derivative of P along solutions; P may also contain symbols and eps.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x*y", "x")))
@@ -78,5 +78,5 @@ class PolynomialField:
 def _from_text(
     kind: type[PolynomialField], names: tuple[str, ...], texts: Sequence[str], symbols: tuple[str, ...]
 ) -> PolynomialField:
-    """What `pickle` and `copy` make again: polynomials of FLINT go by their text."""
+    """Reconstruct a field from text, for `pickle` and `copy`, which do not support FLINT's polynomials."""
     return kind(tuple(parse_polynomial(text, names) for text in texts), symbols)

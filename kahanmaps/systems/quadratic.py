@@ -1,8 +1,8 @@
-"""Quadratic systems x' = f(x) = Q(x, x) + B x + c, exact, with symbols in the coefficients where they are wanted.
+"""Quadratic systems x' = f(x) = Q(x, x) + B x + c, exact, possibly with symbols in the coefficients.
 
 Source: petrera-suris-2016, eq. (eq: diff eq gen). `QuadraticSystem` is the system over Q, in named variables and
-symbols; `SystemOver` is the same carried into a field, with everything the Kahan map needs: value, Jacobian,
-polarisation. It works from the constant tensor f'' instead of Q = f''/2, so that it makes sense modulo 2 as well.
+symbols; `SystemOver` is the system over another field, with the value, the Jacobian and the polarization that the Kahan
+map needs. It uses the constant tensor f'' instead of Q = f''/2, so that it is also defined modulo 2.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ LONG_COEFFICIENTS = 2_000  # digits, with which equations in them are no longer 
 
 @dataclass(frozen=True, eq=False)
 class QuadraticSystem(PolynomialField, LatexDisplay):
-    """x' = f(x), its right-hand sides of degree at most 2 in the variables.
+    """A quadratic system x' = f(x).
 
-    `rhs` are polynomials over Q in the variables, then in `symbols`: constants without a value, eps possibly among
-    them. Raises InputError where their number is not that of the variables, or a degree exceeds 2.
+    `rhs` are polynomials over Q in the variables, of degree at most 2, and in `symbols`, symbolic constants that may
+    include eps. Raises InputError for a wrong number of right-hand sides, and for a degree above 2.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y - x", "1/2*x^2"])
     >>> system.Q[0]
@@ -58,15 +58,15 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
                 f"found {len(self.rhs)} right-hand sides for the {n} variables {', '.join(names)}, expected {n}"
             )
         for name, polynomial in zip(names, self.rhs, strict=True):
-            found = max((sum(m[:n]) for m in polynomial.monoms()), default=0)
-            if found > 2 and self.symbols:
+            degree = max((sum(m[:n]) for m in polynomial.monoms()), default=0)
+            if degree > 2 and self.symbols:
                 raise InputError(
-                    f"found right-hand sides of degree {found} in the variables with {', '.join(self.symbols)} as "
+                    f"found right-hand sides of degree {degree} in the variables with {', '.join(self.symbols)} as "
                     "symbols, expected at most 2: leave the parameter that makes them cubic a number"
                 )
-            if found > 2:
+            if degree > 2:
                 raise InputError(
-                    f"the right-hand side of {name}' has degree {found}, expected at most 2: "
+                    f"the right-hand side of {name}' has degree {degree}, expected at most 2: "
                     "Kahan's discretization is defined for quadratic systems"
                 )
 
@@ -74,7 +74,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
     def from_text(
         cls, variables: Sequence[str], rhs: Sequence[str], parameters: dict[str, Any] | None = None
     ) -> QuadraticSystem:
-        """The system with these right-hand sides written as text; parameters are exact numbers."""
+        """Parse right-hand sides; parameters are exact numbers."""
         check_names(variables)
         constants = {name: rational(value) for name, value in (parameters or {}).items()}
         return cls(tuple(parse_polynomial(text, variables, constants) for text in rhs))
@@ -109,7 +109,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return tuple(self._numbers.c.entries())
 
     def scaled(self, factor: Any) -> QuadraticSystem:
-        """The system x' = factor f(x). Its Kahan map at eps is that of f at factor eps."""
+        """Return the system x' = factor f(x). Its Kahan map at eps is that of f at factor eps."""
         by = rational(factor)
         return QuadraticSystem(tuple(polynomial * by for polynomial in self.rhs), self.symbols)
 
@@ -118,7 +118,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return QuadraticSystem(linear_combinations(matrix, self.rhs), self.symbols)
 
     def composed(self, matrix: fmpq_mat, shift: Sequence[fmpq]) -> QuadraticSystem:
-        """The system x' = f(P x + q) for P = `matrix` and q = `shift`, without symbols.
+        """Return the system x' = f(P x + q) for P = `matrix` and q = `shift`, without symbols.
 
         >>> print(QuadraticSystem.from_text(["x"], ["x^2"]).composed(fmpq_mat([[2]]), [fmpq(1)]))
         x' = 4*x^2 + 4*x + 1
@@ -128,12 +128,12 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
 
     def renamed(self, variables: Sequence[str]) -> QuadraticSystem:
-        """The same system, without symbols, with other names for its variables."""
+        """Return the system, without symbols, with other names of its variables."""
         context = ring(variables)
         return QuadraticSystem(tuple(p.compose(*context.gens(), ctx=context) for p in self.rhs))
 
     def reordered(self, variables: Sequence[str]) -> QuadraticSystem:
-        """The same system with its variables in another order.
+        """Return the system with its variables in another order.
 
         >>> QuadraticSystem.from_text(["y", "x"], ["x^2", "x*y"]).reordered(["x", "y"]).rhs
         (x*y, x^2)
@@ -146,13 +146,13 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return QuadraticSystem(tuple(self.rhs[i].compose(*images, ctx=context) for i in at), self.symbols)
 
     def at(self, values: Sequence[Any]) -> QuadraticSystem:
-        """The system with numbers for its symbols."""
+        """Return the system with numbers substituted for its symbols."""
         context = ring(self.variables)
         images = [*context.gens(), *(context.constant(value) for value in values)]
         return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
 
     def jacobian(self, names: Sequence[str]) -> list[list[fmpq_mpoly]]:
-        """f'(x) as polynomials in `names`, which contain the variables and the symbols."""
+        """Return f'(x) as polynomials in `names`, which contain the variables and the symbols."""
         context = ring(names)
         images = [context.gen(list(names).index(name)) for name in names_of(self.rhs[0])]
         return [[p.derivative(k).compose(*images, ctx=context) for k in range(self.dim)] for p in self.rhs]
@@ -164,16 +164,16 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         """
         if self.symbols:
             return SystemOver.of(field_of_numbers, self, values)
-        found = self._over.get(field_of_numbers)
-        if found is None:
+        system = self._over.get(field_of_numbers)
+        if system is None:
             if len(self._over) >= 8:  # random primes come and go
                 self._over.clear()
-            found = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
-        return found
+            system = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
+        return system
 
     @cached_property
     def digits(self) -> int:
-        """About how many decimal digits the longest coefficient has, over one denominator."""
+        """Approximate number of decimal digits of the longest coefficient, over a common denominator."""
         return digits_of(self.rhs)
 
     def __str__(self) -> str:
@@ -259,7 +259,7 @@ class SystemOver:
             return [self.field.matrix(n, n, entries[k::n]) for k in range(n)]
 
     def jacobian(self, point: Sequence[Any]) -> Any:
-        """The Jacobi matrix f'(x)."""
+        """Return the Jacobi matrix f'(x)."""
         with self.field.working():
             return self.hessian_times(point) + self.B
 
@@ -270,7 +270,7 @@ class SystemOver:
         return tuple(evaluate(polynomial, self.field, point) for polynomial in self.exact.rhs)
 
     def polarised(self, x: Sequence[Any], y: Sequence[Any]) -> tuple[Any, ...]:
-        """Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's defining equation (not modulo 2)."""
+        """Return Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's defining equation (not modulo 2)."""
         half = self.field.convert(fmpq(1, 2))
         column_x, column_y = self.field.column(x), self.field.column(y)
         with self.field.working():
@@ -280,11 +280,11 @@ class SystemOver:
 
 
 def as_system(value: Any) -> QuadraticSystem:
-    """Return the quadratic system that a value stands for: all that `maps.kahan.as_map` takes, but for other maps."""
+    """Convert a value to a quadratic system; it takes the arguments of `maps.kahan.as_map`, except other maps."""
     if isinstance(value, QuadraticSystem):
         return value
-    found: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
-    return found
+    system: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
+    return system
 
 
 def _indices(monomial: Sequence[int]) -> list[int]:

@@ -245,7 +245,7 @@ def test_an_indeterminate_initial_point_is_reported():
 @pytest.mark.parametrize(
     ("f", "g", "eps", "eps2", "message"),
     [
-        (file_of(LOTKA_VOLTERRA), None, None, None, "one system commutes with itself"),
+        (file_of(LOTKA_VOLTERRA), None, None, None, "every map commutes with itself"),
         (SystemFile.from_member(SPLIT3), None, 1, 2, "a second step needs a second system"),
         (file_of(LOTKA_VOLTERRA), file_of(EULER_TOP, "g"), None, None, "dimension 2 and g 3"),
         (file_of(LOTKA_VOLTERRA), file_of(FORCED_PLANE), None, "1/2", "both --eps and --eps2"),

@@ -53,8 +53,8 @@ def test_whether_a_map_is_one_and_its_inverse_right_is_asked_at_the_root():
     map_ = km.parse_system(explicit("a*x", "a*y/2")).map.at(1)  # 1/a = a/2 for this root
     assert map_.inverse.step(map_.step([3, 5])) == (3, 5)
     for image, inverse, mistake in (
-        ("a*x", "a*y/3", "does not lead back"),
-        ("(a^2 - 2)*x + y^2", "", "image is not the whole space"),
+        ("a*x", "a*y/3", "is not the inverse of the map"),
+        ("(a^2 - 2)*x + y^2", "", "the map is not dominant"),
     ):
         with pytest.raises(InputError, match=mistake):
             km.parse_system(explicit(image, inverse))

@@ -20,8 +20,8 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 @pytest.fixture(autouse=True)
 def early(monkeypatch):
     """Forms are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
-    monkeypatch.setattr(rational_orbit, "_LONG", 20)
-    monkeypatch.setattr(rational_orbit, "_LONG_BY_COORDINATES", 20)
+    monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
+    monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
 
 

@@ -14,7 +14,7 @@ from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.floats.fast import FloatEnsemble
+from kahanmaps.maps.floats.float_orbit import FloatEnsemble
 from kahanmaps.maps.orbits.orbit import orbit
 
 F = load("lotka_volterra").map

@@ -10,7 +10,7 @@ import pytest
 from flint import fmpq, fmpq_mat, nmod
 
 import kahanmaps.maps.orbits.relations.elliptic_search as search
-from kahanmaps.maps.orbits.relations.forms import _of_multiples, forms
+from kahanmaps.maps.orbits.relations.sections import _of_multiples, forms
 from kahanmaps.maps.somos import around, first_terms
 
 P = 2**61 - 1

@@ -28,11 +28,11 @@ small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x:
 @pytest.fixture(autouse=True)
 def early(monkeypatch):
     """Sequences are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
-    monkeypatch.setattr(rational_orbit, "_LONG", 20)
-    monkeypatch.setattr(rational_orbit, "_LONG_BY_COORDINATES", 20)
+    monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
+    monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
     monkeypatch.setattr(rational_orbit, "bilinear_forms", lambda *_: None)
-    monkeypatch.setattr(elliptic, "_BITS_FOR_A_PRIME", 1)
+    monkeypatch.setattr(elliptic, "_BITS_PER_PRIME", 1)
 
 
 # Origin of the degrees: orbits of Kahan's discretization in the plane lie on cubics, those of the Euler top on
@@ -65,7 +65,7 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, stride, degrees)
     assert points == expected
     assert orbit.relations is not None
     search = elliptic._Search(map_over.factors, expected[0], stride)
-    assert search.found() is not None
+    assert search.numbers() is not None
     assert [search.sections[place].degree for place in search.new] == degrees
 
 
@@ -98,7 +98,7 @@ def test_compositions_and_inverses_move_points_of_a_curve_as_well():
 def found(name, stride=None):
     map_over = over(name)
     search = elliptic._Search(map_over.factors, begin(map_over), stride or len(map_over.factors))
-    return map_over, search, search.found()
+    return map_over, search, search.numbers()
 
 
 @pytest.mark.parametrize("name", ["weierstrass", "qrt_asymmetric"])
@@ -177,7 +177,7 @@ def test_points_that_are_not_wanted_are_left_out(name):
     steps = 20 if name.startswith("clebsch") else 90
     expected = single_steps(map_over, begin(map_over), steps)
     at = (3, steps - 7, steps - 6, steps)
-    orbit = rational_orbit.RationalOrbit(map_over, expected[0], wanted=at.__contains__)
+    orbit = rational_orbit.RationalOrbit(map_over, expected[0], is_requested=at.__contains__)
     points = [point for point, _ in zip(orbit, range(steps + 1), strict=False)]
     assert [points[n] for n in at] == [expected[n] for n in at]
     assert all(point in (None, right) for point, right in zip(points, expected, strict=True))
@@ -198,13 +198,13 @@ def test_points_of_an_orbit_are_those_asked_for_in_every_arithmetic(arithmetic, 
 
 def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_out(monkeypatch):
     map_over = over("euler_top")
-    points = [point.step for point in Orbit(map_over, START[:3], 150, max_digits=1000, wanted={150}.__contains__)]
+    points = [point.step for point in Orbit(map_over, START[:3], 150, max_digits=1000, is_requested={150}.__contains__)]
     whole = Orbit(map_over, START[:3], 150, max_digits=1000)
-    orbit = Orbit(map_over, START[:3], 150, max_digits=1000, wanted={150}.__contains__)
+    orbit = Orbit(map_over, START[:3], 150, max_digits=1000, is_requested={150}.__contains__)
     assert len(list(whole)) > len(list(orbit)) == len(points)
     assert (orbit.end, orbit.end.status) == (whole.end, "budget")
     # Modulo 7 there seems to be a pole every few steps: then points are made all the same.
     monkeypatch.setattr(elliptic_steps, "_PRIME", 7)
     expected = single_steps(map_over, begin(map_over), 50)
-    at = [point.value for point in Orbit(map_over, START[:3], 50, wanted={50}.__contains__)]
+    at = [point.value for point in Orbit(map_over, START[:3], 50, is_requested={50}.__contains__)]
     assert at[-1] == expected[-1]

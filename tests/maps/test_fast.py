@@ -19,7 +19,7 @@ from helpers import EULER_TOP
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, to_float
+from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, to_float
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 OSCILLATOR = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
@@ -59,7 +59,7 @@ START = ["1", "1/2", "1/3"]
 
 
 ENDLESS = """
-from kahanmaps.maps.floats.fast import FloatOrbit, stream_orbit
+from kahanmaps.maps.floats.float_orbit import FloatOrbit, stream_orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 top = QuadraticSystem.from_text(["x1", "x2", "x3"], ["x2*x3", "-2*x3*x1", "x1*x2"])
 orbit = FloatOrbit(top, "1/10", ["1", "1/2", "1/3"], None, every=50, kernel="numpy")

@@ -7,8 +7,8 @@ from flint import acb, arb, fmpq_poly
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
-from kahanmaps.maps.floats.blocks import _sine, _Unclear, planar_blocks
-from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function
+from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function
+from kahanmaps.maps.floats.planar_blocks import _sine, _Unclear, planar_blocks
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -17,9 +17,9 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.floats import steps
-from kahanmaps.maps.floats.blocks import planar_blocks
-from kahanmaps.maps.floats.doubles import exact
-from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, to_floats
+from kahanmaps.maps.floats.float_conversion import exact
+from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, to_floats
+from kahanmaps.maps.floats.planar_blocks import planar_blocks
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
@@ -220,7 +220,7 @@ def test_an_overflow_ends_one_orbit_and_leaves_the_others(kernel):
     orbits = FloatEnsemble(system, "1/2", starts, kernel=kernel)
     orbits.advance(30)
     # 3^17 1e300 = 1.3e308 is in the range, 3^18 1e300 is not
-    assert orbits.end(0) == OrbitEnd("overflow", 17, "step 18 leaves the range of machine floats")
+    assert orbits.end(0) == OrbitEnd("overflow", 17, "step 18 leaves the range of floating-point numbers")
     assert (orbits.status[1:] == "completed").all()
     assert np.isnan(orbits.x[0]).all()
     orbits.advance(10)
@@ -244,11 +244,11 @@ def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):
         (np.ones((1, 3)), {"threads": 0}, "found 0 threads"),
         (np.ones((1, 3)), {"sampled": 0}, "sample every 0 steps"),
         (np.ones((1, 3)), {"form": FORMS["a complex pair"]}, "belongs to another system"),
-        (np.ones(3), {}, "one row for each start, with columns x1, x2, x3"),
-        (np.ones((2, 2)), {}, "one row for each start"),
-        (np.ones((0, 3)), {}, "one row for each start"),
-        ([[1, 2]], {}, "one row for each start"),
-        (np.array([[1.0, np.nan, 0.0]]), {}, "no finite number"),
+        (np.ones(3), {}, "one row for each point, with columns x1, x2, x3"),
+        (np.ones((2, 2)), {}, "one row for each point"),
+        (np.ones((0, 3)), {}, "one row for each point"),
+        ([[1, 2]], {}, "one row for each point"),
+        (np.array([[1.0, np.nan, 0.0]]), {}, "a coordinate that is not finite"),
     ],
 )
 def test_wrong_use_is_refused(starts, options, sentence):

@@ -92,7 +92,7 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
     assert (end.status, end.steps) == ("singular", last)
     found = NthIterate(normal_form, "1/2", QQ)
     for n in (last + 1, last + 2, last + 3, 57):
-        with pytest.raises(SingularStep, match=f"no value at step {last}$"):
+        with pytest.raises(SingularStep, match=f"not defined at step {last}$"):
             found.value(start, n)
     for n in (0, last):
         assert coordinates(found.value(start, n)) == points[n]

@@ -189,7 +189,7 @@ def test_iterates_are_points_of_the_orbit(name, field, backward):
     points = [point.text for point in Orbit(phi, start, 27, backward=backward)]
     iterates = Orbit(phi, start, at=[27, 0, 3, 26, 3], normal_form=normal_form, backward=backward)
     assert [(point.step, point.text) for point in iterates] == [(n, points[n]) for n in (0, 3, 26, 27)]
-    assert iterates.end == OrbitEnd("completed", 27, "4 iterates reached directly")
+    assert iterates.end == OrbitEnd("completed", 27, "4 iterates computed directly")
 
 
 def test_an_iterate_in_flight_is_given_up_when_a_signal_asks_for_it():

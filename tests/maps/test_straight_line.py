@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
 
-from kahanmaps.maps.floats.straight_line import Code, StepFindings, solve
+from kahanmaps.maps.floats.straight_line_program import StepChecks, StraightLineProgram, solve
 
 PATTERNS = {
     "one equation": ["*"],
@@ -32,7 +32,7 @@ def to_float(x):
 def code_of(pattern, careful):
     """The solution of M y = r as code of the entries of M that are not 0, row by row, and of r."""
     n = len(pattern)
-    code, asked = Code(sum(row.count("*") for row in pattern) + n), StepFindings(careful)
+    code, asked = StraightLineProgram(sum(row.count("*") for row in pattern) + n), StepChecks(careful)
     entries = iter(code.arguments)
     rows = [[next(entries) if mark == "*" else 0.0 for mark in row] for row in pattern]
     rows = [[*row, right] for row, right in zip(rows, entries, strict=True)]

@@ -44,7 +44,7 @@ def event(system, normal_form, eps, start, steps, digits):
     if walk.is_whole:
         assert (far.status, far.steps) == ("completed", steps)
     elif walk.status == "singular":
-        where = f"step {steps} cannot be reached: the map has no value at step {walk.steps}"
+        where = f"step {steps} cannot be reached: the map is not defined at step {walk.steps}"
         assert far == OrbitEnd("singular", 0, where)
     else:
         assert far.status == walk.status == "budget"

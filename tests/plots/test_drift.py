@@ -13,7 +13,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
-from kahanmaps.maps.floats.fast import FloatOrbit
+from kahanmaps.maps.floats.float_orbit import FloatOrbit
 from kahanmaps.plots.drifts.drift import _Bins, _edges, clipped_from, plot_drift, small_start, survey_drift
 from kahanmaps.plots.drifts.drift_functions import OfTheImage, functions_of, known_functions, requested_functions
 from kahanmaps.plots.style import Style

@@ -16,7 +16,7 @@ from page_helpers import Page
 
 import kahanmaps as km
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.doubles import to_float, to_floats
+from kahanmaps.maps.floats.float_conversion import to_float, to_floats
 from kahanmaps.reports.explore import explore_data
 from kahanmaps.reports.report import report_html
 

@@ -23,32 +23,32 @@ _STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 
 
 
 def command(name: str) -> click.Command:
-    """The command of a check."""
+    """Return the command of a check."""
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
-        swapped = False
+        is_swapped = False
         if check.is_of_pair:
             system, other = opt.in_order(system, other, options)
-            swapped = click.get_current_context().meta.get(_ARGUMENT_IS_FIRST, False)
+            is_swapped = click.get_current_context().meta.get(_ARGUMENT_IS_FIRST, False)
         with Progress(options["quiet"]) as progress:
             if check.is_of_pair:
                 pair, start = opt.load_with_start(options, partial(opt.load_pair, system, other), system, other)
                 settings = opt.settings_from(options, progress, start)
                 file, second = pair
-                if swapped and second is not None:
+                if is_swapped and second is not None:
                     file, second = second, file
                 report = check(file, second, settings, eps2)
             else:
                 file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
                 settings = opt.settings_from(options, progress, start)
-                option, more = check.claim, dict[str, bool]()
+                option, extra = check.claim, dict[str, bool]()
                 if option is not None and option.many:
-                    more["known"] = ("", "known") in claim
+                    extra["known"] = ("", "known") in claim
                     claim = {name: option.read(file, text) for name, text in _named(claim, file)} or None
                 elif option is not None:
                     claim = option.read(file, claim) if claim else None
-                report = check(file, settings, claim, **more)
+                report = check(file, settings, claim, **extra)
         return print_report(report, options["as_json"], options["verbose"], options["quiet"])
 
     run = opt.check_options(run)
@@ -66,13 +66,13 @@ def command(name: str) -> click.Command:
         if check.claim is not None and check.claim.many:
             run = opt.integral_option(check.claim.help, check.claim.flag, "claim")(run)
         elif check.claim is not None:
-            form, of_path = check.claim.metavar, click.Path() if check.claim.metavar == "FILE" else None
-            run = click.option(check.claim.flag, "claim", type=of_path, metavar=form, help=check.claim.help)(run)
+            metavar, of_path = check.claim.metavar, click.Path() if check.claim.metavar == "FILE" else None
+            run = click.option(check.claim.flag, "claim", type=of_path, metavar=metavar, help=check.claim.help)(run)
         run = opt.system_options(run)
     kind = _PairCommand if check.is_of_pair else click.Command
     lines = [line for example in check.examples for line in f"kahanmaps {check.command} {example}".split("\n")]
-    shown = [line if line.startswith("kahanmaps ") else f"    {line}" for line in lines]
-    examples = "\n".join(["\b", *(f"  {line}" for line in shown)])
+    indented = [line if line.startswith("kahanmaps ") else f"    {line}" for line in lines]
+    examples = "\n".join(["\b", *(f"  {line}" for line in indented)])
     help_text = "\n\n".join([check.headline, examples, cleandoc(check.text), _STATUS.format(check.outcome)])
     made: click.Command = click.command(name, cls=kind, help=help_text)(run)
     return made
@@ -81,7 +81,7 @@ def command(name: str) -> click.Command:
 class _PairCommand(click.Command):
     """A command with an argument and an inline system, which are f and g in the order in which they are typed.
 
-    click keeps the order of options, but takes arguments after all of them.
+    click processes arguments after all options, so this order must be determined here.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -94,9 +94,9 @@ class _PairCommand(click.Command):
 
 
 def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tuple[str, str]]:
-    """The claims but for the word known, with their names.
+    """Return the claims with their names, without the word "known".
 
-    An integral of the file keeps its name; others without one are called I1, I2, ..., as far as these are free.
+    An integral of the file keeps its name; claims without a name are called I1, I2, ..., skipping names in use.
     """
     of_file = {**file.integrals, **file.integrals_in_iterates}
     claims = [(name or text if text in of_file else name, text) for name, text in claims]
@@ -104,6 +104,6 @@ def _named(claims: Sequence[tuple[str, str]], file: lib.SystemFile) -> list[tupl
     taken = [name for name, _ in claims if name]
     for name in taken:
         if taken.count(name) > 1:
-            raise click.UsageError(f"found two integrals of the name {name}, expected a name of its own for each")
+            raise click.UsageError(f"found two integrals of the name {name}, expected different names")
     free = (f"I{k}" for k in count(1) if f"I{k}" not in {*taken, *file.integrals})
     return [(name or next(free), text) for name, text in claims]

@@ -11,7 +11,7 @@ from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, sy
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import as_typed, print_stderr
 
-# Those of kahanmaps.languages.convert, which --help does not load.
+# The languages of kahanmaps.languages.convert, which is not imported for --help.
 _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran", "toml")
 
 
@@ -30,15 +30,15 @@ _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia",
     "parts",
     metavar="PARTS",
     multiple=True,
-    help="Of system, map, inverse, jacobian, map-formulas, integrals, density "
-    "(default: system, map, and integrals and density where known).",
+    help="Any of system, map, inverse, jacobian, map-formulas, integrals, density "
+    "(default: system, map, and integrals and density if known).",
 )
 @symbolic_option
-@click.option("--name", default="", metavar="NAME", help="Prefix for the names of all functions.")
-@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
+@click.option("--name", default="", metavar="NAME", help="Prefix of the names of all functions.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @quiet_option
 def command(system: str | None, language: str, output: str | None, quiet: bool, **options: Any) -> None:
-    """Convert SYSTEM, its map and its known invariants to another language.
+    """Convert SYSTEM, its map, integrals and density to code for another program.
 
     \b
       kahanmaps convert euler_top --to pari
@@ -48,8 +48,8 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
       kahanmaps convert weierstrass --to julia --what map-formulas,inverse
       kahanmaps convert --vars x,y --rhs x*y --rhs=-x^2 --to toml -o my.toml
 
-    The output is a complete file; toml is a system file. eps is an argument of the map if it depends on eps: the time
-    step is 2 eps. Numbers are exact except in numpy, c and fortran.
+    The output is a complete program file; toml is a system file. eps, if the map depends on it, is an argument of the
+    map; the time step is 2 eps. Numbers are exact, except in numpy, c and fortran.
     """
     file = load_system(system, {**options, "quiet": quiet})
     if language == "toml":
@@ -59,15 +59,15 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
         return
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
-    # The command that makes the same file again, without the place where it went.
-    words = ["kahanmaps", "convert", *([system] if system is not None else [])]
-    words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
-    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
-    words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
-    words += ["--to", language, *(word for text in options["parts"] for word in ("--what", text))]
-    words += [word for key in ("symbolic", "name") if options[key] for word in (f"--{key}", options[key])]
-    how = {"name": options["name"], "symbols": symbols, "command": as_typed(words)}
-    text = lib.convert(file, language, parts if options["parts"] else None, **how)
+    # The command that reproduces the file, without its -o option.
+    command_words = ["kahanmaps", "convert", *([system] if system is not None else [])]
+    command_words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
+    command_words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
+    command_words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
+    command_words += ["--to", language, *(word for text in options["parts"] for word in ("--what", text))]
+    command_words += [word for key in ("symbolic", "name") if options[key] for word in (f"--{key}", options[key])]
+    options_of_conversion = {"name": options["name"], "symbols": symbols, "command": as_typed(command_words)}
+    text = lib.convert(file, language, parts if options["parts"] else None, **options_of_conversion)
     write_text(text, f"{file.name} for {language}", output, quiet)
 
 

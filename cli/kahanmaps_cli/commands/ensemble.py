@@ -19,11 +19,11 @@ from kahanmaps_cli.screen.render import json_number, print_json, record_of, shor
 from kahanmaps_cli.screen.terminal import print_stdout
 from kahanmaps_cli.signals import interruptible
 
-MAX_STEPS = 10**13  # years
+MAX_STEPS = 10**13  # more would take years
 FAILURES_SHOWN = 20
-_WORTH_COMPILING = 5_000_000  # of numpy's time, below which it is done before code is loaded and compiled
-_LOOKS = 100  # at integrals that were asked for, unless --every says when
-_VALUES = 200_000  # of them at most
+_MIN_COMPILED_WORK = 5_000_000  # below this numpy is done before the code is loaded and compiled
+_SAMPLES = 100  # of the integrals, unless --every is given
+_MAX_VALUES = 200_000  # of the integrals
 
 
 @click.command("ensemble")
@@ -34,16 +34,16 @@ _VALUES = 200_000  # of them at most
 @opt.backward_option
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points to FILE.npy.")
 @click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
-@opt.integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
-@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Method (default: chosen automatically).")
-@click.option(
-    "--kernel", type=click.Choice(("numpy", "numba")), help="Library that iterates: same numbers, other speed."
+@opt.integral_option(
+    "Measure the drift of a function: an expression in the variables and eps, or the name of an integral of the file."
 )
-@click.option("--threads", type=Whole(1), metavar="T", help="Number of threads of numba (default: all processors).")
-@click.option("-v", "--verbose", is_flag=True, help="Print the method on standard error.")
+@click.option("--method", type=click.Choice(("generic", "normal-form")), help="By default chosen automatically.")
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Affects only the speed, not the numbers.")
+@click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
+@click.option("-v", "--verbose", is_flag=True, help="Print the method and its reason on standard error.")
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """Iterate many orbits of the map of SYSTEM at once: how many complete, and how far integrals drift.
+    """Compute many float orbits of the map of SYSTEM: how many complete, and how well integrals are conserved.
 
     \b
       kahanmaps ensemble paper_m2 --random 1000 --box 1/2 --seed 1 \\
@@ -53,9 +53,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
       kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 \\
           --steps 1000 --integral F1
 
-    FILE.npy is an array (records, orbits, dimension) whose row k holds step k K. It grows during the computation and is
-    valid at any time, also after Ctrl-C. Orbits that ended early are NaN. Initial points in text files are exact
-    numbers separated by commas or blanks; # starts a comment, and a first line may name the columns.
+    FILE.npy is an array (records, orbits, dimension): record k holds step k K. It grows during the computation and is
+    valid at all times, also after Ctrl-C. It contains NaN for orbits that ended early. Initial points in text files are
+    exact numbers, separated by commas or blanks; # begins a comment, and the first line may name the columns.
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """
@@ -64,7 +64,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     integrals = lib.functions_along(file, options["integrals"], in_floats=True)
     eps = opt.eps_of(file, options)
     number = lib.rational(1) if eps is None else eps
-    file.map.at(number)  # the demands on eps, in the words of orbit
+    file.map.at(number)  # raises the same errors for eps as the command orbit
     starts = requested_starts(file, options)
     normal_form = normal_form_for(file, options["method"])
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
@@ -75,13 +75,13 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         return lambda x: in_floats([*x, value])
 
     steps, every, output = options["steps"], options["every"], options["output"]
-    is_short = steps * (30 * min(len(starts), 20) + len(starts)) < _WORTH_COMPILING
+    is_short_run = steps * (30 * min(len(starts), 20) + len(starts)) < _MIN_COMPILED_WORK
     ensemble = lib.FloatEnsemble(
         file.map,
         number,
         starts,
         form=form,
-        kernel="numpy" if options["kernel"] is None and is_short else options["kernel"],
+        kernel="numpy" if options["kernel"] is None and is_short_run else options["kernel"],
         backward=options["backward"],
         threads=options["threads"],
         integrals={name: of_point(claimed) for name, claimed in integrals.items()},
@@ -90,43 +90,43 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if verbose and not quiet:
         why = normal_form.reason if isinstance(normal_form, lib.NoNormalForm) else normal_form.text
         print_stderr(f"method {method}: {why}; kernel {ensemble.kernel}")
-    # Integrals are looked at more often than the first and the last point are written.
-    whole = every or max(1, steps)
-    interval = whole
+    # Integrals are sampled also if only the first and the last point are written.
+    record_interval = every or max(1, steps)
+    interval = record_interval
     if integrals and not every:
-        interval = max(1, -(-steps // max(1, min(_LOOKS, _VALUES // len(starts)))))
+        interval = max(1, -(-steps // max(1, min(_SAMPLES, _MAX_VALUES // len(starts)))))
     file_of_points = None if output is None else lib.NpyFile(output, starts.shape, "<f8")
     with interruptible(ensemble.interrupt), Progress(quiet) as progress, file_of_points or nullcontext():
         portions = ensemble.records(steps, interval, progress=lambda k: progress(f"step {k} of {steps}"))
         for k, points in enumerate(portions):
-            if file_of_points is not None and (interval == whole or k == 0):
+            if file_of_points is not None and (interval == record_interval or k == 0):
                 file_of_points.append(points)
-        if file_of_points is not None and interval != whole and ensemble.step == steps:
+        if file_of_points is not None and interval != record_interval and ensemble.step == steps:
             file_of_points.append(ensemble.x[None])
     records = 0 if file_of_points is None else file_of_points.rows
     failed, near = (ensemble.failed_at >= 0).nonzero()[0].tolist(), ensemble.near_singular
     near_orbits, near_at = near.nonzero()[0].tolist(), ensemble.near_singular_at
     first = min(near_orbits, key=lambda k: int(near_at[k]), default=None)
     where = None if first is None else {"orbit": first, "step": int(near_at[first])}
-    # How far each integral moved in the orbit where it moved most, of those that were completed.
-    going = (ensemble.failed_at < 0).nonzero()[0]
-    drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(going)} for drift in ensemble.drift]
-    for one, drift in zip(drifts, ensemble.drift if len(going) else (), strict=False):
-        worst = int(going[drift.largest[going].argmax()])
-        one |= {"largest": lib.json_float(drift.largest[worst]), "orbit": worst}
-        one["initial"] = json_number(drift.initial[worst])
-    found = {
+    # The largest drift of each integral over the completed orbits.
+    completed = (ensemble.failed_at < 0).nonzero()[0]
+    drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(completed)} for drift in ensemble.drift]
+    for record_of_drift, drift in zip(drifts, ensemble.drift if len(completed) else (), strict=False):
+        worst = int(completed[drift.largest[completed].argmax()])
+        record_of_drift |= {"largest": lib.json_float(drift.largest[worst]), "orbit": worst}
+        record_of_drift["initial"] = json_number(drift.initial[worst])
+    results = {
         "orbits": ensemble.n,
         "steps": steps,
         "status": "interrupted" if ensemble.step < steps else "completed",
         "steps_taken": ensemble.step,
-        "counts": {word: int((ensemble.status == word).sum()) for word in ("completed", "overflow", "singular")},
+        "counts": {status: int((ensemble.status == status).sum()) for status in ("completed", "overflow", "singular")},
         "failures": [{"orbit": orbit, **ensemble.end(orbit).to_json()} for orbit in failed[:FAILURES_SHOWN]],
         "near_singular": {"steps": int(near.sum()), "orbits": len(near_orbits), "first": where},
         "drift": drifts,
     }
     if as_json:
-        shape = {"shape": [records, *starts.shape], "every": whole, "axes": ["record", "orbit", "x"]}
+        shape = {"shape": [records, *starts.shape], "every": record_interval, "axes": ["record", "orbit", "x"]}
         direction = "backward" if options["backward"] else "forward"
         record = record_of(
             "ensemble",
@@ -138,28 +138,28 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
             kernel=ensemble.kernel,
             direction=direction,
             **starts_record(options, len(starts)),
-            **found,
+            **results,
             output=output and {"file": output, **shape},
         )
         print_json(record)
     else:
-        _print(file, eps, options["backward"], ensemble.kernel, found)
+        _print(file, eps, options["backward"], ensemble.kernel, results)
     if not quiet and output is not None:
         print_stderr(f"{output}: {counted(records, 'record')} of {counted(ensemble.n, 'orbit')}")
     if not quiet and ensemble.step < steps:
         print_stderr(f"interrupted after step {ensemble.step}")
-    return 130 if ensemble.step < steps else 0 if found["counts"]["completed"] == ensemble.n else 3
+    return 130 if ensemble.step < steps else 0 if results["counts"]["completed"] == ensemble.n else 3
 
 
 def _require_sense(system: str | None, options: dict[str, Any]) -> None:
-    """Options that contradict each other, or themselves."""
+    """Raise UsageError for options that contradict each other or are out of range."""
     steps, every, output = options["steps"], options["every"], options["output"]
     if (options["starts"] is None) == (options["count"] is None):
-        raise click.UsageError("give --starts FILE or --random N, one of the two")
+        raise click.UsageError("give either --starts FILE or --random N")
     if options["starts"] is not None and (options["box"] is not None or options["seed"] is not None):
         raise click.UsageError("--box and --seed are for --random N")
     if options["starts"] == "-" and system == "-":
-        raise click.UsageError("found - twice, and there is one standard input")
+        raise click.UsageError("found - for both SYSTEM and --starts, but there is only one standard input")
     if steps < 0:
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if steps > MAX_STEPS:
@@ -170,24 +170,24 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, found: dict[str, Any]) -> None:
-    """Tab-separated lines, aligned on a terminal."""
+def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results: dict[str, Any]) -> None:
+    """Print tab-separated lines, aligned on a terminal."""
     print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
-    rows = [("orbits", str(found["orbits"])), ("steps", str(found["steps_taken"])), ("kernel", kernel)]
-    rows += [(word, str(number)) for word, number in found["counts"].items()]
-    near = found["near_singular"]
+    rows = [("orbits", str(results["orbits"])), ("steps", str(results["steps_taken"])), ("kernel", kernel)]
+    rows += [(status, str(number)) for status, number in results["counts"].items()]
+    near = results["near_singular"]
     where = f", first in orbit {near['first']['orbit']} at step {near['first']['step']}" if near["first"] else ""
     rows.append(("near-singular", f"{counted(near['steps'], 'step')} in {counted(near['orbits'], 'orbit')}{where}"))
-    for drift in found["drift"]:
+    for drift in results["drift"]:
         text = "no orbit was completed"
         if "largest" in drift:
             initial = drift["initial"]
             start = "+-".join(map(short_float, initial)) + "i" if isinstance(initial, list) else short_float(initial)
             text = f"at most {short_float(drift['largest'])} (orbit {drift['orbit']}, from {start})"
         rows.append(("drift", f"{drift['name']}\t{text}"))
-    rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in found["failures"]]
-    more = found["orbits"] - found["counts"]["completed"] - len(found["failures"])
-    if more:
-        rows.append(("ended early", f"and {counted(more, 'more orbit')}"))
+    rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in results["failures"]]
+    remaining = results["orbits"] - results["counts"]["completed"] - len(results["failures"])
+    if remaining:
+        rows.append(("ended early", f"and {counted(remaining, 'more orbit')}"))
     for name, text in rows:
         print_stdout(f"{name}\t{text}", 15)

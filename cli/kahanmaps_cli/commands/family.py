@@ -20,7 +20,7 @@ from kahanmaps_cli.screen.terminal import formula, print_stdout
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# Which member of the family to draw.
+# The options that determine a random member of the family.
 draw_options: Callable[[F], F] = opt.stack(
     click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
     click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
@@ -54,7 +54,7 @@ def command() -> None:
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE (default: standard output).")
 @opt.quiet_option
 def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
-    """Generate a random member and write it as a system file.
+    """Write a random member as a system file.
 
     \b
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
@@ -81,7 +81,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
 
 def drawn_file(options: dict[str, Any]) -> lib.SystemFile:
-    """The member that the options ask for as a system file; without any of them one with m = 3."""
+    """Return the random member given by the options as a system file; by default m = 3."""
     drawn = {name: options[name] for name in DRAWN}
     if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
         drawn["m"] = 3
@@ -92,7 +92,7 @@ def drawn_file(options: dict[str, Any]) -> lib.SystemFile:
 def draw_member(
     m: int | None, eigenvalues: str | None, generic: bool, chi: str | None, size: int | None, seed: int
 ) -> lib.FamilyMember:
-    """The member that the options ask for."""
+    """Return the random member given by the options."""
     if sum((eigenvalues is not None, generic, chi is not None)) > 1:
         raise click.UsageError("give one of --eigenvalues, --generic and --chi")
     if size is not None and not 1 <= size <= 10**6:
@@ -129,8 +129,8 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
       kahanmaps family show hamiltonian.toml
       kahanmaps family show paper_m3 --json | jq -r '.hamiltonians[1]'
 
-    For a SYSTEM of kind [hamiltonian] or [system] a matrix A is searched for: it is a member if there is an A with
-    A^T J = J A and A Hess(H) = Hess(H) A^T that is not a multiple of I.
+    For a SYSTEM of kind [hamiltonian] or [system] the command searches for a matrix A with A^T J = J A and
+    A Hess(H) = Hess(H) A^T that is not a multiple of I: such an A makes it a member.
     """
     file = opt.load_system(system, options)
     recognised, member = None, file.member
@@ -139,8 +139,8 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         recognised = None if hamiltonian is None else lib.find_family_structure(hamiltonian)
         if recognised is None:
             raise lib.InputError(
-                f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all "
-                f"the same was looked for and not found: {lib.why_not_member(hamiltonian)}"
+                f"{file.name} is of kind [{file.kind}], expected one of kind [family]; the search for a matrix A that "
+                f"makes it a member found none: {lib.why_not_member(hamiltonian)}"
             )
         member = recognised.member
     data: dict[str, Any] = {
@@ -176,7 +176,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         return
     print_stdout(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
     if recognised is not None:
-        print_stdout(f"found, not declared: {recognised.text}")
+        print_stdout(f"found by the search for A: {recognised.text}")
     print_stdout(data["diagnosis"])
     if recognised is not None and not recognised.is_standard:
         print_stdout("x = T y, T =")
@@ -220,36 +220,36 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
       kahanmaps family space --matrix '1,0,0,0; 0,2,0,0; 0,0,1,0; 0,0,0,2'
     """
     if (system is None) == (matrix is None):
-        raise click.UsageError("give a SYSTEM of kind [family], or --matrix ROWS, one of the two")
+        raise click.UsageError("give either a SYSTEM of kind [family] or --matrix ROWS")
     if matrix is not None:
         from flint import fmpq_mat
 
         rows = [list(lib.parse_point(row)) for row in matrix.split(";")]
-        if len(rows) > (most := lib.MAX_DIMENSION) or any(len(row) != len(rows) for row in rows):
+        if len(rows) > (max_dimension := lib.MAX_DIMENSION) or any(len(row) != len(rows) for row in rows):
             shape = f"{counted(len(rows), 'row')} of lengths {sorted({len(row) for row in rows})}"
-            raise InputError(f"found {shape}, expected a square matrix, at most {most} x {most}")
+            raise InputError(f"found {shape}, expected a square matrix, at most {max_dimension} x {max_dimension}")
         A, variables = fmpq_mat(rows), None
     else:
         member = _member(system, parameters)[1]
         A, variables = member.A, member.variables
-    found = lib.cubic_space(A, variables)
+    cubics = lib.cubic_space(A, variables)
     data: dict[str, Any] = {
         **envelope("family space"),
         "A": lib.plain(A),
         "dim": A.nrows(),
-        "dimension": found.dimension,
-        "expected_for_generic_A": found.expected,
-        "unknowns": found.unknowns,
-        "rank": found.rank,
+        "dimension": cubics.dimension,
+        "expected_for_generic_A": cubics.expected,
+        "unknowns": cubics.unknowns,
+        "rank": cubics.rank,
         "diagnosis": lib.diagnosis(A),
-        "basis": [lib.format_polynomial(H) for H in found.basis],
+        "basis": [lib.format_polynomial(H) for H in cubics.basis],
     }
     if as_json:
         print_json(data)
         return
     print_stdout(
-        f"dimension {found.dimension} (generic A: 4m = {found.expected}); "
-        f"the linear system has {found.unknowns} unknowns and rank {found.rank}"
+        f"dimension {cubics.dimension} (generic A: 4m = {cubics.expected}); "
+        f"the linear system has {cubics.unknowns} unknowns and rank {cubics.rank}"
     )
     print_stdout(data["diagnosis"])
     for k, text in enumerate(data["basis"], start=1):
@@ -266,7 +266,7 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
 def associated(
     system: str | None, parameters: tuple[tuple[str, str], ...], write_to: str | None, as_json: bool
 ) -> None:
-    """List all rational associated systems up to sign: signs, B_s as a polynomial in A, K_s with grad K_s = B_s grad H.
+    """List all rational associated systems up to sign: signs, B_s in powers of A, K_s with grad K_s = B_s grad H.
 
     \b
       kahanmaps family associated paper_m3
@@ -274,8 +274,9 @@ def associated(
       kahanmaps check-commute paper_m3_irreducible \\
           associated/paper_m3_irreducible-p-t.toml
 
-    Where a factor g of chi is irreducible of degree 2 or more, also those over Q[t]/g that have the other sign at one
-    root t of it only: systems with t as a parameter, "root of g". Conjugates, and products of them, are all others.
+    If a factor g of chi is irreducible of degree 2 or more, the list also contains those over Q[t]/g that have the
+    other sign only at one root t of g: systems with the parameter t, "root of g". All other associated systems are
+    conjugates of these and products of them.
     """
     file, member = _member(system, parameters)
     written: dict[str, lib.SystemFile] = {}
@@ -298,8 +299,8 @@ def associated(
             "B": lib.plain(associate.B),
             "K": lib.format_polynomial(associate.K),
         }
-        one = lib.FamilyMember(member.A, member.H, associate.signs)
-        rows.append(with_file(row, "", partial(lib.SystemFile.from_member, one)))
+        chosen = lib.FamilyMember(member.A, member.H, associate.signs)
+        rows.append(with_file(row, "", partial(lib.SystemFile.from_member, chosen)))
     roots = list(member.roots.values())
     for other in member.conjugate_associates():
         row = {
@@ -352,9 +353,9 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
       kahanmaps family tensor --vars x,y --rhs 't*x^2' --rhs '-2*x*y' -p t=0 \\
           --algebra 't^2+1'
 
-    A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A
-    parameter t of SYSTEM stands for the generator of K. Integrals and the density that SYSTEM claims become the m
-    integrals and the density that its map over Q inherits.
+    A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A parameter t of
+    SYSTEM stands for the generator of K. Each integral that SYSTEM claims gives m integrals of the map over Q, and its
+    density gives a density.
     """
     output = None if output == "-" else output
     over_algebra, chi = opt.load_system(system, {**options, "quiet": quiet}), lib.parse_chi(algebra)
@@ -375,7 +376,7 @@ def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tup
 
 def _write(file: lib.SystemFile, output: str | None) -> None:
     text = file.to_toml()
-    lib.parse_system(text, f"{file.name}, as it would be written")  # nothing is written that could not be read
+    lib.parse_system(text, f"{file.name}, as it would be written")  # raises InputError if the file could not be read
     if output is None:
         click.echo(text, nl=False)
         return

@@ -28,12 +28,12 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     type=PointText(True),
     required=True,
     metavar="X",
-    help="Initial point, e.g. 1/2,-1/3,0.25, or 1,t with -p 't = root of t^2 + 1'.",
+    help="The initial point, e.g. 1/2,-1/3,0.25, or 1,t with -p 't = root of t^2 + 1'.",
 )
 @opt.eps_options
 @click.option("--steps", type=int, metavar="N", help="Number of steps.")
-@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Compute these iterates only, instead of --steps.")
-@click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Output every K-th iterate.")
+@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
+@click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
 @opt.backward_option
 @click.option(
     "--arithmetic",
@@ -46,38 +46,21 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @click.option(
     "--method",
     type=click.Choice(("generic", "normal-form", "doubling")),
-    help="Method (default: chosen automatically; -v prints which and why).",
+    help="Method of computation; by default chosen automatically (-v prints it and the reason).",
 )
 @click.option(
-    "--accuracy",
-    type=click.IntRange(1, 100_000),
-    metavar="DIGITS",
-    help="Accuracy of ball:auto in digits (default 15).",
+    "--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="Correct digits for ball:auto; default 15."
 )
-@click.option(
-    "--kernel", type=click.Choice(("numpy", "numba")), help="Library that computes float orbits; numba needs [fast]."
-)
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Kernel for float orbits; numba needs [fast].")
 @opt.integral_option(
-    "A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
-    "the word known for all that theorems give (not in floats)."
+    "Add a column with a function: an expression in the variables and eps, the name of an integral of the file, or "
+    "known for all integrals that follow from theorems (not in floats)."
 )
-@click.option(
-    "--max-digits",
-    type=Whole(1),
-    metavar="N",
-    help="Stop an exact orbit when a number exceeds N digits (default 200000).",
-)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(_FORMATS),
-    help="Output format (default: by the extension of FILE, else text).",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output.")
-@click.option(
-    "-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE (default: standard output)."
-)
-@click.option("-v", "--verbose", is_flag=True, help="Print the method on standard error.")
+@click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget (exact arithmetic; default 200000).")
+@click.option("--format", "form", type=click.Choice(_FORMATS), help="Default: by the suffix of FILE, otherwise text.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
+@click.option("-v", "--verbose", is_flag=True, help="Print the method and its reason on standard error.")
 @opt.quiet_option
 def command(system: str | None, output: str | None, verbose: bool, quiet: bool, **options: Any) -> int:
     """Iterate the map of SYSTEM from an initial point; a vector field stands for its Kahan map.
@@ -95,15 +78,15 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
       kahanmaps orbit --vars x,y --image 'y; (3 + y)/x' --start 1,2 --steps 5
 
     SYSTEM is a file, a name of the catalogue, or - for standard input. Numbers are exact: integers, p/q, decimals.
-    The map need not be a Kahan map; --eps is required if it depends on eps. The
-    first Ctrl-C stops after the current step and leaves a valid file; the next ones stop at once.
+    SYSTEM may also be another map than Kahan's; --eps is not needed if the map does not depend on it.
+    Ctrl-C stops after the current step and leaves a valid file; pressed again, it stops at once.
 
-    Members of the commuting family are iterated in their normal form, and --at computes an iterate directly by
-    doublings: modulo P and in balls for step numbers of thirty digits. Poles in between are then skipped, except over
-    Q.
+    For members of the commuting family steps are computed in normal form, and --at computes an iterate directly, by
+    doublings: modulo P and in balls even for steps of thirty digits. Then poles at steps in between are not noticed,
+    except over Q.
 
-    --integral adds a column: an expression, the name of an integral of the file, or the word known for all integrals
-    given by theorems (not in floats).
+    --integral adds a column: an expression, the name of an integral of the file, or known for all integrals that
+    follow from theorems (not in floats).
 
     Exit status: 0 done, 2 usage error, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
@@ -119,7 +102,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     with interruptible(_stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"
         functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
-        walk = lib.orbit(
+        trajectory = lib.orbit(
             map_,
             start,
             eps,
@@ -129,55 +112,58 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
             progress=progress,
             **opt.given(options, "steps", "at", "every", "backward", "arithmetic", "method", "max_digits", "kernel"),
         )
-    walk.integrals = functions
-    said = walk.why
+    trajectory.integrals = functions
+    reason = trajectory.why
     if verbose and not quiet:
-        print_stderr(said)
+        print_stderr(reason)
     on_terminal = output is None and sys.stdout.isatty()
     is_table = on_terminal and form == "text"
-    to: Any = sys.stdout if output is None else output
+    target: Any = sys.stdout if output is None else output
     if is_table:
         from kahanmaps_cli.screen.orbit_table import OrbitTable  # loads the library
 
-        to = OrbitTable(to, file.variables, list(functions))
-    last = walk.header()["steps"]
-    left = TimeLeft(last)
-    unread = False  # by head, say, which has what it wanted, and the orbit may be long
+        target = OrbitTable(target, file.variables, list(functions))
+    last_step = trajectory.header()["steps"]
+    time_left = TimeLeft(last_step)
+    is_unread = False  # the reader of a pipe (such as head) has closed it
 
-    def told(step: int) -> None:
-        nonlocal unread
-        progress(f"step {step} of {last}{left(step) if walk.arithmetic.kind == 'exact' else ''}")
+    def on_step(step: int) -> None:
+        nonlocal is_unread
+        progress(f"step {step} of {last_step}{time_left(step) if trajectory.arithmetic.kind == 'exact' else ''}")
         if output is None and not is_read():
-            unread = True
-            walk.interrupt()
+            is_unread = True
+            trajectory.interrupt()
 
-    with interruptible(walk.interrupt), Progress(quiet or on_terminal) as progress:  # points themselves show it
-        end = walk.write(to, form, file.name, told)
-    if verbose and not quiet and walk.why != said:
-        print_stderr(walk.why)
+    with (
+        interruptible(trajectory.interrupt),
+        Progress(quiet or on_terminal) as progress,
+    ):  # on a terminal the points show the progress
+        end = trajectory.write(target, form, file.name, on_step)
+    if verbose and not quiet and trajectory.why != reason:
+        print_stderr(trajectory.why)
     if output is not None and not quiet:
         print_stderr(f"{output}: {end.text}")
-    elif end.status not in _STATUS and not (quiet or unread or is_table):  # whose last line says it
+    elif end.status not in _STATUS and not (quiet or is_unread or is_table):  # the table ends with this text
         print_stderr(end.text)
-    return 3 if unread else _STATUS.get(end.status, 3)
+    return 3 if is_unread else _STATUS.get(end.status, 3)
 
 
 def _numbers(start: lib.AlgebraicPoint, arithmetic: lib.Arithmetic) -> Any:
-    """The coordinates in the numbers that the orbit is computed in."""
+    """Convert the coordinates to the arithmetic of the orbit."""
     if arithmetic.kind == "float":
         return start.real_approximation()
     if arithmetic == ("ball", 0):
         raise click.UsageError(
-            "found an algebraic start with --arithmetic ball:auto, expected exact, mod:P or ball:BITS"
+            "--arithmetic ball:auto needs a rational initial point: for an algebraic one use exact, mod:P or ball:BITS"
         )
     return start.over(start.root.number_field if arithmetic.kind == "exact" else arithmetic.field)
 
 
 def _require_sense(options: dict[str, Any]) -> None:
-    """Options that contradict each other."""
+    """Raise UsageError for options that contradict each other."""
     steps, at = options["steps"], options["at"]
     if (steps is None) == (at is None):
-        raise click.UsageError("give --steps N or --at N1,N2,..., one of the two")
+        raise click.UsageError("give either --steps N or --at N1,N2,...")
     if steps is not None and steps < 0:
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if at is not None and options["every"] != 1:
@@ -189,29 +175,29 @@ def _require_sense(options: dict[str, Any]) -> None:
 
 
 def _form(options: dict[str, Any], output: str | None) -> str:
-    """The format that was asked for, or that the name of the file says."""
+    """Return the requested format, by default that of the suffix of the file."""
     form: str | None = options["form"]
     if options["as_json"]:
         if form not in (None, "json"):
             raise click.UsageError(f"give --json or --format {form}, not both")
         if output is not None and Path(output).suffix.lower() not in ("", ".json"):
-            raise click.UsageError(f"found --json and the name {output}: give it the ending .json, or leave out --json")
+            raise click.UsageError(f"found --json and the name {output}: use the suffix .json, or leave out --json")
         form = "json"
     form = form or lib.form_of(output or "")
     if form == "npz" and output is None and sys.stdout.isatty():
-        raise click.UsageError("npz is not for a terminal: add -o FILE")
+        raise click.UsageError("npz is a binary format: add -o FILE")
     if form == "npy":
         if options["arithmetic"].kind != "float":
             raise click.UsageError(
-                "npy is for --arithmetic float: take npz, or jsonl, which holds numbers of any length"
+                "npy is for --arithmetic float: use npz, or jsonl, which holds numbers of any length"
             )
         if output is None:
-            raise click.UsageError("npy grows in a file: add -o FILE.npy")
+            raise click.UsageError("npy needs a file: add -o FILE.npy")
         if options["at"] is not None or options["integrals"]:
-            raise click.UsageError("npy holds the points of --steps N --every K: for --at or --integral take npz")
+            raise click.UsageError("npy holds the points of --steps N --every K: for --at or --integral use npz")
     return form
 
 
 def _stop() -> None:
-    """While the way to compute is being chosen there is nothing yet to keep."""
+    """Stop at once: while the method is being chosen there are no points to keep."""
     raise KeyboardInterrupt

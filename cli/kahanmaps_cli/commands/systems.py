@@ -16,13 +16,13 @@ from kahanmaps_cli.screen.terminal import formula, print_entry, print_stdout
 @click.command("systems")
 @click.argument("name", required=False, shell_complete=complete_system)
 @parameter_option
-@click.option("--toml", "as_toml", is_flag=True, help="Print the system file.")
+@click.option("--toml", "as_toml", is_flag=True, help="Print the system file, to copy and edit.")
 @click.option("--latex", "as_latex", is_flag=True, help="Print equations, integrals and density in LaTeX.")
 @json_option
 def command(
     name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: bool, as_latex: bool, as_json: bool
 ) -> None:
-    """List the systems of the catalogue, or show one: its equations and what is known about it, with references.
+    """List the named systems, or show one: its equations, what is known about it, and references.
 
     \b
       kahanmaps systems
@@ -32,7 +32,7 @@ def command(
       kahanmaps systems lagrange_top --latex
     """
     if as_toml + as_latex + as_json > 1:
-        raise click.UsageError("give --toml, --latex or --json, one of the three")
+        raise click.UsageError("give only one of --toml, --latex and --json")
     if name is None:
         if as_toml or as_latex or parameters:
             raise click.UsageError("--toml, --latex and -p need the NAME of a system")
@@ -40,9 +40,9 @@ def command(
             systems = [_summary(lib.load(key)) for key in lib.titles()]
             print_json({**envelope("systems"), "systems": systems})
             return
-        found = lib.titles()
-        width = max(map(len, found))
-        for key, (dim, title) in found.items():
+        titles = lib.titles()
+        width = max(map(len, titles))
+        for key, (dim, title) in titles.items():
             print_entry(f"{key:<{width}}  {dim:>2}  ", title, "bold")
         for family in lib.FAMILIES.values():
             print_entry(f"{family.form:<{width}}   n  ", f"{family.title}, e.g. {family.example}", "bold")
@@ -83,12 +83,12 @@ def _summary(file: Any) -> dict[str, Any]:
 
 
 def _known(file: Any) -> dict[str, Any]:
-    """The structured facts, null where the file has none."""
+    """Return the structured facts; null if the file has none."""
     return {key: file.document.get("catalog", {}).get(key) for key in lib.KEYS}
 
 
 def _latex(file: Any) -> str:
-    """The system or map as displayed formulas."""
+    """Return the system or map as displayed LaTeX formulas."""
     names = [lib.latex_name(name) for name in file.variables]
     if isinstance(file.map, lib.KahanFamily):  # with eps in its coefficients, if it is an adjusted one
         rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
@@ -117,27 +117,31 @@ def _show(file: Any) -> None:
         print_stdout(formula(line))
     if file.hamiltonian is not None:
         print_stdout(f"H = {formula(lib.format_polynomial(file.hamiltonian.H))}")
-    claimed = "" if file.catalog else "claimed "  # what stands in the catalogue has been put to the test
+    claimed = "" if file.catalog else "claimed "  # integrals of the catalogue are verified by tests
     for name, integral in file.integrals.items():
         print_stdout(f"{claimed}integral {name} = {formula(lib.format_factored(integral))}")
     if file.density is not None:
         print_stdout(f"{claimed}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
-    known, lines = _known(file), []
-    if known["verdict"]:
-        lines.append(f"verdict: {known['verdict']}")
-    growth = f"{known['growth']} growth" if known["growth"] else ""
-    if known["dynamical_degree"]:
-        growth += f"{', ' * bool(growth)}by the largest root of {known['dynamical_degree']}"
-    if known["degrees"]:
-        degrees = ", ".join(str(degree) for degree in known["degrees"])
+    facts, lines = _known(file), []
+    if facts["verdict"]:
+        lines.append(f"verdict: {facts['verdict']}")
+    growth = f"{facts['growth']} growth" if facts["growth"] else ""
+    if facts["dynamical_degree"]:
+        growth += f"{', ' * bool(growth)}by the largest root of {facts['dynamical_degree']}"
+    if facts["degrees"]:
+        degrees = ", ".join(str(degree) for degree in facts["degrees"])
         lines.append(f"degrees of the iterates: {degrees}, ...{f' ({growth})' * bool(growth)}")
     elif growth:
         lines.append(f"degrees of the iterates: {growth}")
-    if known["codimension"] is not None:
-        lines.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
-    for found in lib.relations(file.catalog, file.variables):
-        count = "no relation" if not found.dimension else f"{found.dimension} relation{'s' * (found.dimension > 1)}"
-        what = f"polynomials of {found.text}" if found.text.startswith("degree") else found.text
+    if facts["codimension"] is not None:
+        lines.append(f"a generic orbit lies in a variety of codimension {facts['codimension']}")
+    for relation in lib.relations(file.catalog, file.variables):
+        count = (
+            "no relation"
+            if not relation.dimension
+            else f"{relation.dimension} relation{'s' * (relation.dimension > 1)}"
+        )
+        what = f"polynomials of {relation.text}" if relation.text.startswith("degree") else relation.text
         lines.append(f"{count} along an orbit among: {what}")
     if lines:
         print_stdout("for generic parameters and eps:" if file.parameters else "for generic eps:")

@@ -50,16 +50,12 @@ _LEGEND = {
 @draw_options
 @opt.eps_options
 @click.option(
-    "--universal", is_flag=True, help="Check the generic member at random points over GF(p) instead of one member."
+    "--universal", is_flag=True, help="Verify the claims for the generic member, at random points over GF(p)."
 )
 @click.option(
-    "--beyond",
-    is_flag=True,
-    help="Print which statements survive for other H, J, time steps and A, with counterexamples.",
+    "--beyond", is_flag=True, help="Print which statements remain true for other H, J, steps and A; counterexamples."
 )
-@click.option(
-    "--controls", is_flag=True, help="Also check every claim on input that violates one hypothesis, where it must fail."
-)
+@click.option("--controls", is_flag=True, help="Check that every claim fails if one hypothesis is violated.")
 @click.option(
     "--section",
     "sections",
@@ -84,7 +80,7 @@ _LEGEND = {
 @opt.verbose_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Check every statement of the paper of Petrera and Suris for a member of its family.
+    """Verify every statement of the paper of Petrera and Suris for a member of its family.
 
     \b
       kahanmaps verify                        # a random member with m = 3
@@ -94,12 +90,12 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --universal --m 3      # theorems for the generic member
       kahanmaps verify --controls --section 6            # violated hypotheses
       kahanmaps verify --m 2 --json | jq '.claims[0]'
-      kahanmaps verify --beyond             # other H, J, A
+      kahanmaps verify --beyond             # generalizations
 
-    The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi (default: m = 3). Claims are
-    proved by expanding them symbolically, verified exactly, or supported at random points over GF(p) with a bound on
-    the error. Misprints are checked in both forms. m = 1 to 8; beyond m = 6 claims that sum over all eigenvalues
-    are supported only.
+    The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi; by default m = 3. Claims are
+    proved by symbolic expansion, verified exactly, or supported at random points over GF(p) with a bound on the error.
+    Formulas with misprints are listed both as printed and corrected. m is at most 8; for m > 6 claims with sums over
+    all eigenvalues are only supported.
 
     Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 usage error, 3 one is undecided.
     Misprints are expected to be refuted and do not count.
@@ -109,15 +105,15 @@ def command(system: str | None, **options: Any) -> int:
     drawn = {name: options[name] for name in DRAWN}
     given = [name for name, value in drawn.items() if value is not None and value is not False]
     if options["universal"] or options["beyond"]:
-        clash = [f"--{name}" for name in given if name != "m"]
-        clash += ["SYSTEM"] * (system is not None)
-        if clash:
+        conflicting = [f"--{name}" for name in given if name != "m"]
+        conflicting += ["SYSTEM"] * (system is not None)
+        if conflicting:
             flag = "--beyond" if options["beyond"] else "--universal"
-            raise click.UsageError(f"found {flag} and {clash[0]}, expected {flag} with --m only")
+            raise click.UsageError(f"found {flag} and {conflicting[0]}, expected {flag} with --m only")
     elif system is not None and given:
-        raise click.UsageError("give a SYSTEM or options of a random member (--m, --eigenvalues, ...), not both")
+        raise click.UsageError("give either a SYSTEM, or the options of a random member (--m, --eigenvalues, ...)")
     if system is None and options["parameters"]:
-        raise click.UsageError("found -p without SYSTEM, expected a SYSTEM: a random member has no parameters")
+        raise click.UsageError("found -p without SYSTEM: a random member has no parameters")
     with Progress(options["quiet"]) as progress:
         settings = lib.Settings(
             eps=opt.the_eps(options["eps"], options["time_step"], required=False),
@@ -125,19 +121,19 @@ def command(system: str | None, **options: Any) -> int:
             error_bits=options["error_bits"],
             progress=progress,
         )
-        what = lib.VerifyOptions(
+        verify_options = lib.VerifyOptions(
             options["sections"] or None, options["order"], options["ball_bits"], options["controls"], options["beyond"]
         )
         if options["beyond"] and not options["controls"]:
             report = lib.beyond_table(3 if drawn["m"] is None else drawn["m"], settings)
         elif options["universal"] or options["beyond"]:
-            report = lib.verify(None, settings, what, m=3 if drawn["m"] is None else drawn["m"])
+            report = lib.verify(None, settings, verify_options, m=3 if drawn["m"] is None else drawn["m"])
         else:
             if system is not None:
                 file = opt.load_system(system, {"parameters": options["parameters"]})
             else:
                 file = drawn_file(options)
-            report = lib.verify(file, settings, what)
+            report = lib.verify(file, settings, verify_options)
     as_json, verbose = options["as_json"], options["verbose"]
     if report.context.get("beyond") and not as_json:
         print_raw(lib.table(report))
@@ -151,7 +147,7 @@ def command(system: str | None, **options: Any) -> int:
 
 
 def markdown(report: lib.Report) -> str:
-    """The table in Markdown; docs/audit.md is made of it."""
+    """Return the table in Markdown, as in docs/audit.md."""
     lines = [markup.markdown(headline(report))]
     section = None
     for finding in report.findings:
@@ -182,12 +178,12 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
             print_stdout(_LEGEND[method])
-    # On the evidence beside the one that decided.
+    # Further evidence, in addition to the one that gave the verdict.
     also = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
     bounds = [int(str(one.data["error_bound"])[3:]) for one in also if "error_bound" in one.data]
     if bounds:
-        held = f"also: {len(bounds)} claims held at random points over GF(p)"
-        print_stdout(f"{held}, each false with probability below 2^-{min(bounds)}")
+        sentence = f"also: {len(bounds)} claims held at random points over GF(p)"
+        print_stdout(f"{sentence}, each false with probability below 2^-{min(bounds)}")
     methods = Counter(e.method for f in report.findings for e in f.also if "error_bound" not in e.data)
     for method, count in methods.items():
         print_stdout(f"also: {count} claims: {method} (-v)")
@@ -230,9 +226,9 @@ def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool
 
 
 def _how(evidence: lib.Evidence) -> str:
-    word = _HOW.get(evidence.method, evidence.method)
+    method = _HOW.get(evidence.method, evidence.method)
     bound: Any = evidence.data.get("error_bound")
-    return f"{word}, {bound}" if bound else word
+    return f"{method}, {bound}" if bound else method
 
 
 def _count(report: lib.Report) -> str:

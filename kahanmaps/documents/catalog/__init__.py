@@ -1,7 +1,7 @@
 """The catalogue: named systems, one TOML file each in this folder, with equations, known facts and sources.
 
-The folder maps has the same for maps that are not Kahan's; `load` knows both, and names with arguments as lv(7,3),
-which documents/families.py makes.
+The folder maps contains maps other than Kahan's. `load` finds both, and also names with arguments such as lv(7,3),
+which documents/families.py generates.
 
 >>> names()[:3]
 ('clebsch_first_flow', 'dressing_chain_3', 'euler_top')
@@ -16,8 +16,8 @@ x3' = -3/2*x1*x2
 A file is data, in the format of every other system file; its name is that of the system. Each of its facts opens with
 its status: Proved (in the source named; where none is, by the argument given or by tests/documents/test_catalog.py),
 Refuted (at a point), Measured (a finite computation modulo a prime, which is no proof), Classical, or Origin (how the
-file was made). Degrees, growth, verdict and relations stand there for programs as well, see
-`kahanmaps.documents.structured_facts`; tests/laboratory/test_catalog_blind.py finds them again.
+file was made). Degrees, growth, verdict and relations are also given as structured data, see
+`kahanmaps.documents.structured_facts`; tests/laboratory/test_catalog_blind.py computes them again.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _LIST_THEM = "'kahanmaps systems' lists the catalogue"
 
 
 def names() -> tuple[str, ...]:
-    """The names of all systems of the catalogue, in alphabetical order.
+    """Return the names of all systems of the catalogue, in alphabetical order.
 
     >>> "lorenz" in names()
     True
@@ -52,7 +52,7 @@ def names() -> tuple[str, ...]:
 
 
 def map_names() -> tuple[str, ...]:
-    """The names of all maps of the catalogue that are not Kahan's, in alphabetical order.
+    """Return the names of all maps of the catalogue other than Kahan maps, in alphabetical order.
 
     >>> "lyness" in map_names()
     True
@@ -61,12 +61,12 @@ def map_names() -> tuple[str, ...]:
 
 
 def _names_in(folder: Traversable) -> tuple[str, ...]:
-    found = (entry.name for entry in folder.iterdir())
-    return tuple(sorted(name.removesuffix(_ENDING) for name in found if name.endswith(_ENDING)))
+    entries = (entry.name for entry in folder.iterdir())
+    return tuple(sorted(name.removesuffix(_ENDING) for name in entries if name.endswith(_ENDING)))
 
 
 def text_of(name: str) -> bytes:
-    """The file of a system or map of the catalogue. Raises KeyError for other names."""
+    """Return the text of the file of a system or map of the catalogue. Raises KeyError for other names."""
     made = family_member(name)
     if made is not None:
         from kahanmaps.documents.toml_text import to_toml
@@ -81,12 +81,12 @@ def text_of(name: str) -> bytes:
 
 
 def titles() -> dict[str, tuple[int, str]]:
-    """Dimension and title of everything in the catalogue, by name, maps last; no arithmetic is loaded for them.
+    """Return dimension and title of all systems and maps, by name, maps last, without parsing them.
 
     >>> titles()["lorenz"]
     (3, 'Lorenz system')
     """
-    found = {}
+    titles_by_name = {}
     for name in (*names(), *map_names()):
         document = tomllib.loads(text_of(name).decode())
         if "composition" in document:
@@ -94,20 +94,25 @@ def titles() -> dict[str, tuple[int, str]]:
         else:
             variables = document.get("variables") or document["family"]["A"]
         copies = 2 if document.get("system", {}).get("discretization") == "polarised" else 1
-        found[name] = copies * len(variables), document["catalog"]["title"]
-    return found
+        titles_by_name[name] = copies * len(variables), document["catalog"]["title"]
+    return titles_by_name
 
 
 def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **values: Any) -> SystemFile:
-    """The system of that name in the catalogue, or the one in a TOML file.
+    """Load a system from the catalogue or from a TOML file.
 
-    `reference` is a name, or a path: a `Path`, or text that ends in .toml, contains a path separator or names an
-    existing file. Where a name is both, the catalogue wins; write ./name for the file. `parameters` and `values`
-    replace the default values: exact numbers (int, Fraction, text such as "2/3").
+    Args:
+        reference: a name of the catalogue, or a path: a `Path`, or text that ends in .toml, contains a path separator
+            or names an existing file. The catalogue takes precedence; write ./name for a file with the same name.
+        parameters, values: exact numbers (int, Fraction, text such as "2/3") that replace the default values of the
+            parameters.
 
-    Raises InputError for a name or arguments that are not in the catalogue and a file that cannot be read,
-    SystemFileError (an InputError too) for a file with mistakes, for parameters that the system does not have and for
-    inexact values.
+    Returns:
+        The system file.
+
+    Raises:
+        InputError: for a name that is not in the catalogue, and for a file that cannot be read; SystemFileError, a
+            subclass, for a file with mistakes, for unknown parameters and inexact values.
 
     >>> load("henon_heiles", {"c": "-6"}).parameters, load("henon_heiles", c=1).parameters
     ({'c': -6}, {'c': 1})
@@ -145,11 +150,11 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
 def _unknown(name: str) -> InputError:
     if not name or len(name) > 60 or not name.isprintable():  # no name that anybody meant
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
-    wanted = name.lower().replace("-", "_").replace(" ", "_")
-    known = (*names(), *map_names())
-    close = difflib.get_close_matches(wanted, known, 3)
+    normalized = name.lower().replace("-", "_").replace(" ", "_")
+    known_names = (*names(), *map_names())
+    close = difflib.get_close_matches(normalized, known_names, 3)
     # Or names that contain what was written, e.g. "volterra".
-    close += [other for other in known if len(wanted) > 2 and wanted in other and other not in close]
+    close += [other for other in known_names if len(normalized) > 2 and normalized in other and other not in close]
     close = close[:3]
     meant = f", did you mean {' or '.join(close)}?" if close else ":"
     return InputError(

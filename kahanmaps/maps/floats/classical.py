@@ -1,7 +1,7 @@
-"""Classical one-step methods in machine numbers, to compare the Kahan map with: explicit RK4 and implicit midpoint.
+"""Classical one-step methods in floating-point numbers, for comparison: explicit RK4 and implicit midpoint.
 
-Both take the time step h = 2 eps. The midpoint equation y = x + (h/2) f(y), x~ = x + h f(y), is solved by Newton's
-method from y = x until the corrections are round-off; an orbit ends where it does not get there.
+Both use the time step h = 2 eps. The midpoint equation y = x + (h/2) f(y), x~ = x + h f(y), is solved by Newton's
+method from y = x until the corrections are round-off; the orbit ends if Newton's method does not converge.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ import numpy as np
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
-from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHODS = {"rk4": "explicit RK4", "midpoint": "implicit midpoint"}
 _PORTION = 20_000
-_MOST_CORRECTIONS = 50
-_ROUND_OFF = 4e-16  # corrections below it, relative to the point, are the last ones
-_STALLED = 1e-10  # where corrections stop falling below it, they have become round-off
+_MAX_CORRECTIONS = 50
+_ROUND_OFF = 4e-16  # relative size of a correction after which the iteration stops
+_STALLED = 1e-10  # relative size below which a correction that does not decrease is round-off
 
 
 class ClassicalOrbit:
-    """The orbit of `start` under RK4 or the implicit midpoint rule with the time step 2 eps, in double precision.
+    """The orbit of an initial point under RK4 or the implicit midpoint rule, with time step 2 eps, in double precision.
 
-    `method` is "rk4" or "midpoint"; `start` and `eps` are exact. Iterate once over `portions`, then look at `end`.
-    Raises InputError for wrong values.
+    `method` is "rk4" or "midpoint"; `start` and `eps` are exact. Iterate once over `portions`, then read `end`.
+    Raises InputError for invalid values.
 
     >>> orbit = ClassicalOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/20", [1], 10, "midpoint")
     >>> points = np.concatenate([x for _, x in orbit.portions()])
@@ -52,14 +52,14 @@ class ClassicalOrbit:
         self._field = VectorField(system)
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
-        """The step reached, and the points (count, dim) on the way; the start first."""
+        """Yield the step reached and the points (count, dim) since the previous portion; first the initial point."""
         yield 0, self._start[None].copy()
         take = self._rk4 if self.method == "rk4" else self._midpoint
         step, x = 0, self._start
         while step < self.steps:
             out = np.empty((min(_PORTION, self.steps - step), self._dim))
             done = 0
-            with np.errstate(all="ignore"):  # what leaves the range of doubles is a status, not a warning
+            with np.errstate(all="ignore"):  # an overflow is a status, not a warning
                 while done < len(out):
                     image = take(x)
                     if image is None or not np.isfinite(image).all():
@@ -70,7 +70,7 @@ class ClassicalOrbit:
             if done:
                 yield step, out[:done]
             if done < len(out):
-                self.end = OrbitEnd("overflow", step, f"step {step + 1} leaves the range of machine floats")
+                self.end = OrbitEnd("overflow", step, f"step {step + 1} leaves the range of floating-point numbers")
                 if image is None:
                     sentence = f"step {step + 1}: Newton's method finds no solution of the midpoint equation"
                     self.end = OrbitEnd("singular", step, sentence)
@@ -88,11 +88,11 @@ class ClassicalOrbit:
 
     def _midpoint(self, x: FloatArray) -> FloatArray | None:
         f, h = self._field, self._h
-        one = np.eye(self._dim)
+        identity = np.eye(self._dim)
         y, last = x, np.inf
-        for _ in range(_MOST_CORRECTIONS):
+        for _ in range(_MAX_CORRECTIONS):
             try:
-                change = np.linalg.solve(one - 0.5 * h * f.jacobian(y), x - y + 0.5 * h * f(y))
+                change = np.linalg.solve(identity - 0.5 * h * f.jacobian(y), x - y + 0.5 * h * f(y))
             except np.linalg.LinAlgError:
                 return None
             y = y + change
@@ -105,7 +105,7 @@ class ClassicalOrbit:
 
 
 class VectorField:
-    """f and f' in doubles: f_i(x) = z^T S_i z with z = (x, 1) and S_i symmetric.
+    """A quadratic vector field f and f' in doubles: f_i(x) = z^T S_i z with z = (x, 1) and S_i symmetric.
 
     >>> f = VectorField(QuadraticSystem.from_text(["x", "y"], ["x*y + 1", "3*x"]))
     >>> f(np.array([2.0, 5.0])).tolist(), f.jacobian(np.array([2.0, 5.0])).tolist()
@@ -121,14 +121,14 @@ class VectorField:
         self._S[:, n, n] = to_floats(system.c)
 
     def __call__(self, x: FloatArray) -> FloatArray:
-        """The values at points (..., dim)."""
+        """Return the values at points (..., dim)."""
         with np.errstate(all="ignore"):
             z, half = self._half(x)
             value: FloatArray = (half @ z[..., None])[..., 0]
         return value
 
     def jacobian(self, x: FloatArray) -> FloatArray:
-        """f'(x) at one point."""
+        """Return f'(x) at one point."""
         with np.errstate(all="ignore"):
             return 2.0 * self._half(x)[1][:, :-1]
 

@@ -1,8 +1,9 @@
-"""Many float orbits at once.
+"""Ensembles of float orbits, advanced together.
 
-Two methods: "normal form" where a NormalForm of the system is given (blocks.py), "generic" for any map; steps.py says
-what a step is. Two kernels: numpy, always there, and "numba", machine code (the extra `fast`; machine_code.py). Method,
-kernel and start settle the numbers; threads, and the way steps are portioned, only settle how fast they come.
+There are two methods: "normal form" if a NormalForm of the system is given (planar_blocks.py), and "generic" for any
+map; steps.py defines a step. There are two kernels: "numpy", always available, and "numba", machine code (the extra
+`fast`; machine_code.py). The results depend on method, kernel and initial points, but not on the number of threads or
+the size of the portions.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.floats.blocks import PlanarBlocks, planar_blocks, require_same_system
-from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.planar_blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.floats.steps import (
     RUNNING,
     SINGULAR,
@@ -40,20 +41,20 @@ from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SAMPLED = 1000  # steps between samples of the block integrals
-_ALONE = 4  # orbits that machine code takes one by one
-_SHARES = 8  # of the orbits for each thread: other programs run too
-_NUMBERS = 1_000_000  # of a portion that are recorded
+_MAX_SCALAR_ORBITS = 4  # up to this number machine code takes orbits one by one
+_CHUNKS_PER_THREAD = 8  # more than one, since other programs may occupy a core
+_RECORDED_NUMBERS = 1_000_000  # in a portion
 
 Function = Callable[[Sequence[float]], float | None]
 
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """How far an integral has moved, one entry an orbit.
+    """The drift of an integral: how far its value has moved, one entry for each orbit.
 
-    `initial` is the value at the start (complex at a complex root of chi), `largest` the largest distance from it at
-    the points looked at, `last` the distance at the last of them (NaN where the orbit has ended). A value that is no
-    finite number counts as infinitely far.
+    `initial` is the value at the initial point (complex at a complex root of chi), `largest` the largest distance from
+    it at the sampled points, `last` the distance at the last of them (NaN if the orbit has ended). A value that is not
+    finite counts as infinitely far.
     """
 
     name: str
@@ -62,12 +63,12 @@ class Drift:
     last: FloatArray
 
     def of(self, orbit: int) -> Drift:
-        """The same for one orbit, each entry a number."""
+        """Return the drift of one orbit; its entries are numbers."""
         return Drift(self.name, self.initial[orbit], self.largest[orbit], self.last[orbit])
 
 
 def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
-    """Starts (count, dim) drawn uniformly from -size to size, the same ones for the same seed.
+    """Return random initial points (count, dim), uniform between -size and size, determined by the seed.
 
     >>> starts_in_box(2, 1, 1.0, seed=0).tolist()
     [[0.2739233746429086], [-0.4604265724722594]]
@@ -77,14 +78,19 @@ def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
 
 
 class FloatEnsemble:
-    """Orbits of many starts in double precision, advanced together.
+    """The orbits of many initial points in double precision, advanced together.
 
-    `starts` is an array of machine numbers, or a sequence of points with exact entries, one point a row. `eps` is
-    exact, half the time step; `backward` steps by the inverse map. With `form`, the normal form of the system, a step
-    costs a few operations for each pair of coordinates instead of an elimination, and loses fewer digits. `kernel` is
-    "numpy" or "numba" (default: numba if installed), `threads` how many cores numba may use (default: all). `integrals`
-    are functions of a point, watched at recorded points. The block integrals of the normal form are sampled at every
-    multiple of `sampled` steps.
+    Args:
+        system: a map, or a quadratic system, which stands for its Kahan map.
+        eps: an exact number, half the time step.
+        starts: the initial points, one per row: an array of floats, or a sequence of points with exact entries.
+        backward: step by the inverse map.
+        form: the normal form of the system; then a step takes a few operations for each pair of coordinates instead of
+            an elimination, and loses fewer digits.
+        kernel: "numpy" or "numba" (default: numba if installed).
+        threads: the number of cores that numba may use (default: all).
+        integrals: functions of a point, whose drift is measured at recorded points.
+        sampled: the number of steps between samples of the block integrals of the normal form.
 
     >>> import numpy as np
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
@@ -118,14 +124,14 @@ class FloatEnsemble:
         shape = self._starts.shape
         if len(shape) != 2 or shape[1] != self.system.dim or not shape[0]:
             raise InputError(
-                f"found starts of shape {shape}, expected (n, {self.system.dim}): one row for each start, with columns "
-                f"{', '.join(self.system.variables)}"
+                f"found initial points of shape {shape}, expected (n, {self.system.dim}): one row for each point, "
+                f"with columns {', '.join(self.system.variables)}"
             )
         if not np.isfinite(self._starts).all():
-            raise InputError("found a start that is no finite number")
+            raise InputError("found an initial point with a coordinate that is not finite")
         if to_float(epsilon) == 0.0:
-            raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
-        compiled = choose_kernel(kernel, long=True) == "numba" and has_llvm()
+            raise InputError("eps rounds to 0 as a floating-point number: choose a larger eps")
+        compiled = choose_kernel(kernel, is_long=True) == "numba" and has_llvm()
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = self.system.real_approximation
@@ -140,31 +146,31 @@ class FloatEnsemble:
             self._base = self._blocks.integrals(state)
             self._largest = np.zeros(self._base.shape)
         self._factors = (map_over.inverse if backward else map_over).factors
-        self._write_step()
-        self._lanes = BatchState.of(state)
+        self._build_step()
+        self._batch = BatchState.of(state)
         compiled = compiled and self._step.careful_code is not None
         self._threads = (threads or processors()) if compiled else 1
         method = "generic" if form is None else "normal form"
-        #: What computes: "numba normal form, 2 threads".
+        #: Kernel, method and threads, for example "numba normal form, 2 threads".
         self.kernel = f"numba {method}, {counted(self._threads, 'thread')}" if compiled else f"numpy {method}"
         self._compiled = compiled
-        self._watched = [Watched(name, function, self._starts) for name, function in (integrals or {}).items()]
+        self._watched = [WatchedFunction(name, function, self._starts) for name, function in (integrals or {}).items()]
         self._sampled = sampled
         self._interrupted = False
         self.backward = backward
         self.step = 0
 
-    def _write_step(self) -> None:
+    def _build_step(self) -> None:
         self._step = map_step(self._factors) if self._blocks is None else planar_step(self._blocks)
         self._machine_code: Any = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """For `pickle`: the step is written, and compiled, anew."""
+        """Return the state for `pickle`, without the step, which is built and compiled again when loaded."""
         return {name: value for name, value in vars(self).items() if name not in ("_step", "_machine_code")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self._write_step()
+        self._build_step()
 
     @property
     def n(self) -> int:
@@ -173,79 +179,76 @@ class FloatEnsemble:
 
     @property
     def x(self) -> FloatArray:
-        """The present points (n, dim), NaN for orbits that have ended."""
+        """The current points (n, dim); NaN for orbits that have ended."""
         if self.step == 0:
             return self._starts.copy()
-        x: FloatArray = self._points_of(self._lanes.z[None].copy())[0]
-        x[self._lanes.status != RUNNING] = np.nan
+        x: FloatArray = self._points_of(self._batch.z[None].copy())[0]
+        x[self._batch.status != RUNNING] = np.nan
         return x
 
     @property
     def status(self) -> NDArray[Any]:
-        """One word an orbit: "completed" (all its steps so far), "overflow" or "singular"."""
-        words: NDArray[Any] = np.array(STATUS)[self._lanes.status]
-        return words
+        """The status of each orbit: "completed" (all its steps so far), "overflow" or "singular"."""
+        names: NDArray[Any] = np.array(STATUS)[self._batch.status]
+        return names
 
     @property
     def failed_at(self) -> NDArray[np.int64]:
         """The index of the first iterate that does not exist, -1 for orbits that have not ended."""
-        return self._lanes.failed_at.copy()
+        return self._batch.failed_at.copy()
 
     @property
     def near_singular(self) -> NDArray[np.int64]:
-        """How many near-singular steps each orbit has taken (see steps.py)."""
-        return self._lanes.near.copy()
+        """The number of near-singular steps of each orbit (see steps.py)."""
+        return self._batch.near.copy()
 
     @property
     def near_singular_at(self) -> NDArray[np.int64]:
-        """The index of the point from which the first near-singular step was taken, -1 where there was none."""
-        return self._lanes.near_at.copy()
+        """The index of the point before the first near-singular step of each orbit, -1 if there was none."""
+        return self._batch.near_at.copy()
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """Of the block integrals h/(1 + eps^2 D), by root of chi, and of the functions that are watched."""
+        """The drift of the block integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
         drifts = []
         if self._blocks is not None:
-            now = self._blocks.distances(self._lanes.z, self._base)
-            now[:, self._lanes.status != RUNNING] = np.nan
-            largest = np.fmax(self._largest, now)
+            current = self._blocks.distances(self._batch.z, self._base)
+            current[:, self._batch.status != RUNNING] = np.nan
+            largest = np.fmax(self._largest, current)
             for r, label in enumerate(self._blocks.labels):
                 initial: NDArray[Any] = self._base[r].copy() if r >= self._blocks.reals else self._base[r].real.copy()
-                drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], now[r]))
+                drifts.append(Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], current[r]))
         return (*drifts, *(watched.drift for watched in self._watched))
 
     def end(self, orbit: int) -> OrbitEnd:
-        """How one orbit stands, in the words of single orbits."""
-        code, last = int(self._lanes.status[orbit]), int(self._lanes.failed_at[orbit]) - 1
+        """Return how one orbit ended so far."""
+        code, last = int(self._batch.status[orbit]), int(self._batch.failed_at[orbit]) - 1
         if code == RUNNING:
             return OrbitEnd("completed", self.step, counted(self.step, "step"))
         if code == SINGULAR:
-            return OrbitEnd("singular", last, f"{self._matrix} is singular in machine numbers at step {last}")
-        return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of machine floats")
+            return OrbitEnd("singular", last, f"{self._matrix} is singular in floating-point numbers at step {last}")
+        return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of floating-point numbers")
 
     def interrupt(self) -> None:
-        """Ask `advance` or `records` to return after the portion in hand, or after the next one if there is none.
-
-        Safe to call from a signal handler.
-        """
+        """Stop `advance` or `records` after the current (or the next) portion; safe to call from a signal handler."""
         self._interrupted = True
 
     def advance(self, steps: int, *, progress: Callable[[int], None] | None = None) -> None:
-        """Take `steps` steps; `progress` is called with the number of steps taken so far, about ten times a second."""
+        """Take `steps` steps; `progress` is called with the current step about ten times a second."""
         require_steps(steps)
         for _ in self._recorded(steps, 0, progress):
             pass
 
     def records(self, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> Iterator[FloatArray]:
-        """The points at multiples of `every`, the start among them, in portions (count, n, dim); NaN after the end.
+        """Take `steps` steps lazily, and yield the points at multiples of `every` in portions (count, n, dim).
 
-        They are computed as they are asked for, `steps` steps in all.
+        The initial points are included; points after the end of an orbit are NaN.
         """
         require_steps(steps)
         require_every(every)
         if self.step == 0:
             for watched in self._watched:
-                watched.look(self._starts[None])
+                watched.observe(self._starts[None])
             yield self._starts[None].copy()
         else:
             yield np.empty((0, self.n, self.system.dim))
@@ -253,56 +256,56 @@ class FloatEnsemble:
             if len(record):
                 x = self._points_of(record)
                 for watched in self._watched:
-                    watched.look(x)
+                    watched.observe(x)
                 yield x
 
     def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
-        """Take the steps in portions of about a tenth of a second; the states at multiples of `every` (0: none)."""
-        lanes, stop, rows = self._lanes, self.step + steps, self._step.rows
-        # Both seconds an operation are rough, those of arrays grow with the number of orbits only in part.
+        """Take steps in portions of about 0.1 s, and yield the states at multiples of `every` (0: none)."""
+        batch, stop, rows = self._batch, self.step + steps, self._step.rows
+        # Rough estimates of the time per step; for arrays only a part of it grows with the number of orbits.
         if self._compiled:
-            speed = 8e9 if self.n > _ALONE else 1.5e9
+            speed = 8e9 if self.n > _MAX_SCALAR_ORBITS else 1.5e9
             seconds = self.n * self._step.operations / speed / self._threads
         else:
             seconds = self._step.operations * (1e-6 + self.n * 1e-9)
-        piece = max(1, int(0.1 / seconds))
+        portion = max(1, int(0.1 / seconds))
         intervals = [every, 0 if self._blocks is None else self._sampled]
         for interval in filter(None, intervals):
-            piece = min(piece, interval * max(1, _NUMBERS // (self.n * rows)))
+            portion = min(portion, interval * max(1, _RECORDED_NUMBERS // (self.n * rows)))
         if self._compiled and self._machine_code is None and self.step < stop:
             from kahanmaps.maps.floats.machine_code import MachineCode
 
-            width = 1 if self.n <= _ALONE else 32 if rows <= 2 else 16 if rows <= 8 else 8
+            width = 1 if self.n <= _MAX_SCALAR_ORBITS else 32 if rows <= 2 else 16 if rows <= 8 else 8
             self._machine_code = MachineCode(self._step, width)
-        share = self.n if self._threads == 1 else -(-self.n // (self._threads * _SHARES * 64)) * 64
-        lows = range(0, self.n, share)
+        chunk = self.n if self._threads == 1 else -(-self.n // (self._threads * _CHUNKS_PER_THREAD * 64)) * 64
+        chunk_starts = range(0, self.n, chunk)
         while self.step < stop:
-            first, count = self.step, min(piece, stop - self.step)
+            first, count = self.step, min(portion, stop - self.step)
             tables = []
             for interval in intervals:
                 length = (first + count) // interval - first // interval if interval else 0
                 tables.append(RecordTable(interval, np.empty((length, rows, self.n))))
-            wanted = [table for table in tables if len(table.states)]
+            filled = [table for table in tables if len(table.states)]
             if self._compiled:
 
-                def advance(low: int, first: int = first, count: int = count, wanted: Any = wanted) -> None:
-                    self._machine_code.advance(lanes, low, min(self.n, low + share), first, count, wanted)
+                def advance(start: int, first: int = first, count: int = count, filled: Any = filled) -> None:
+                    self._machine_code.advance(batch, start, min(self.n, start + chunk), first, count, filled)
 
-                with ThreadPoolExecutor(self._threads) if len(lows) > 1 else nullcontext() as pool:
-                    list(map(advance, lows) if pool is None else pool.map(advance, lows))
+                with ThreadPoolExecutor(self._threads) if len(chunk_starts) > 1 else nullcontext() as pool:
+                    list(map(advance, chunk_starts) if pool is None else pool.map(advance, chunk_starts))
             else:
-                advance_by_numpy(self._step, lanes, first, count, wanted)
+                advance_by_numpy(self._step, batch, first, count, filled)
             self.step = first + count
             for interval, states in tables:  # states after the end of an orbit become NaN
-                if len(states) and (lanes.status != RUNNING).any():
+                if len(states) and (batch.status != RUNNING).any():
                     at = (first // interval + 1 + np.arange(len(states))) * interval
-                    gone = (lanes.failed_at >= 0) & (at[:, None] >= lanes.failed_at)
-                    states.transpose(0, 2, 1)[gone] = np.nan
+                    after_end = (batch.failed_at >= 0) & (at[:, None] >= batch.failed_at)
+                    states.transpose(0, 2, 1)[after_end] = np.nan
             if self._blocks is not None and len(tables[1].states):
                 states = tables[1].states.transpose(1, 0, 2)
-                seen = self._blocks.distances(states, self._base[:, None])
-                seen[:, np.isnan(states).any(axis=0)] = 0.0
-                np.maximum(self._largest, seen.max(axis=1), out=self._largest)
+                distances = self._blocks.distances(states, self._base[:, None])
+                distances[:, np.isnan(states).any(axis=0)] = 0.0
+                np.maximum(self._largest, distances.max(axis=1), out=self._largest)
             yield tables[0].states
             if progress is not None:
                 progress(self.step)
@@ -311,18 +314,18 @@ class FloatEnsemble:
         self._interrupted = False
 
     def _points_of(self, record: FloatArray) -> FloatArray:
-        """The points x (count, n, dim) of recorded states (count, rows, n)."""
+        """Return the points x (count, n, dim) of recorded states (count, rows, n)."""
         count, _, n = record.shape
         if self._blocks is None:
             return np.ascontiguousarray(record.transpose(0, 2, 1))
-        if n == 1:  # numbers side by side are multiplied fastest
+        if n == 1:  # contiguous numbers are multiplied fastest
             record = np.ascontiguousarray(record[:, :, 0].T)[None]
         x = _product(self._blocks.out, record)
         return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(count, n, self.system.dim)
 
 
-class Watched:
-    """A function of points, and how far it has moved from its value at the starts."""
+class WatchedFunction:
+    """A function of points, and its drift from the values at the initial points."""
 
     def __init__(self, name: str, function: Function, starts: FloatArray) -> None:
         self.name = name
@@ -331,24 +334,24 @@ class Watched:
         self._largest = np.zeros(len(starts))
         self._last = np.zeros(len(starts))
 
-    def look(self, x: FloatArray) -> None:
-        """Take notice of points (count, n, dim); those with NaN are passed over."""
+    def observe(self, x: FloatArray) -> None:
+        """Update the drift by points (count, n, dim); points with NaN are skipped."""
         for points in x:
-            there = ~np.isnan(points).any(axis=1)
-            self._last[~there] = np.nan
-            distance = np.abs(self._values(points[there]) - self._initial[there])
+            is_finite = ~np.isnan(points).any(axis=1)
+            self._last[~is_finite] = np.nan
+            distance = np.abs(self._values(points[is_finite]) - self._initial[is_finite])
             distance[np.isnan(distance)] = np.inf
-            self._last[there] = distance
-            self._largest[there] = np.maximum(self._largest[there], distance)
+            self._last[is_finite] = distance
+            self._largest[is_finite] = np.maximum(self._largest[is_finite], distance)
 
     @property
     def drift(self) -> Drift:
-        """What was seen."""
+        """The drift at the points observed so far."""
         return Drift(self.name, self._initial.copy(), self._largest.copy(), self._last.copy())
 
     def _values(self, points: FloatArray) -> FloatArray:
-        found = (self._function(point) for point in points.tolist())
-        return np.array([np.nan if value is None else value for value in found], dtype=np.float64)
+        values = (self._function(point) for point in points.tolist())
+        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
 def ensemble(
@@ -360,30 +363,34 @@ def ensemble(
     time_step: Any = None,
     **options: Any,
 ) -> FloatEnsemble:
-    """The float orbits of many starts after `steps` steps; the arguments are those of `FloatEnsemble`.
+    """Return the float orbits of many initial points after `steps` steps.
 
-    Raises InputError for a number of steps that is negative, and what `FloatEnsemble` refuses.
+    The arguments are those of `FloatEnsemble`, with `time_step` (2 eps) instead of `eps` if preferred. Raises
+    InputError for a negative number of steps and for invalid arguments.
 
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
     >>> ensemble(top, [[1, 0, 0], [0, "1/2", 0]], "1/10", 100, kernel="numpy").x.tolist()
     [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
     require_steps(steps)
-    found = FloatEnsemble(as_map(system), resolve_eps(eps, time_step), starts, **options)
+    result = FloatEnsemble(as_map(system), resolve_eps(eps, time_step), starts, **options)
     if steps:
-        found.advance(steps)
-    return found
+        result.advance(steps)
+    return result
 
 
 def require_every(every: int) -> None:
-    """Raises InputError unless every >= 1."""
+    """Raise InputError unless every >= 1."""
     if every < 1:
         raise InputError(f"found a record every {every} steps, expected at least 1")
 
 
 def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:
-    """matrix columns (..., rows, n), every sum from left to right: BLAS orders them by the shape of the arrays."""
-    with np.errstate(all="ignore"):  # what leaves the range of doubles is a status, not a warning
+    """Return matrix @ columns (..., rows, n), with sums from left to right.
+
+    BLAS is not used, since its order of summation depends on the shape of the arrays.
+    """
+    with np.errstate(all="ignore"):  # an overflow is a status, not a warning
         total: FloatArray = matrix[:, :1] * columns[..., :1, :]
         for j in range(1, matrix.shape[1]):
             total += matrix[:, j, None] * columns[..., j : j + 1, :]

@@ -1,10 +1,10 @@
 """Lyapunov exponents of float orbits, many at once, by the exact tangent map.
 
-The orbits are taken in portions (ensemble.py). The tangent map dPhi(x) = M(x)^{-1} N(x, x~) (implicit.py), which is
-(I - eps f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, is computed at all points of a portion at once, and multiplied
-along each orbit as long as the product stays well conditioned. A frame of n tangent vectors goes along with the
-products and is made orthonormal again after each; the logarithms of its lengths add up to the exponents. The tangent
-map is the exact derivative of the map, evaluated in double precision: nothing is differenced.
+The orbits are computed in portions (ensemble.py). The tangent map dPhi(x) = M(x)^{-1} N(x, x~) (implicit.py), which is
+(I - eps f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, is computed at all points of a portion at once. Tangent maps are
+multiplied along each orbit as long as the product stays well conditioned; then the product is applied to a frame of n
+tangent vectors, which is made orthonormal again by a QR decomposition. The logarithms of the lengths add up to the
+exponents. The tangent map is the exact derivative, evaluated in double precision, without finite differences.
 Source: benettin-1980 for the method, petrera-suris-2016, eq. (Jac), for the tangent map.
 """
 
@@ -26,29 +26,29 @@ from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps import convention
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.floats.doubles import FloatArray, start_rows, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.floats.float_conversion import FloatArray, start_rows, to_float
 from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.kahan import SystemLike, as_map
 
 MAX_NUMBERS = 20_000_000  # entries of all frames together
-_PORTION = 200_000  # entries of the tangent maps that are computed at once
-_STEPS = 512  # of a portion, at most
-_CONDITION = 16.0  # logarithm of the condition of a product of tangent maps, at most: more would cost digits
-_LARGEST_NORM = 300.0  # logarithm of the norm of a tangent map: squares are taken
-_LITTLE = 10_000  # orbits times steps, below which compiling does not pay
+_PORTION = 200_000  # entries of the tangent maps of a portion
+_MAX_PORTION_STEPS = 512
+_MAX_CONDITION = 16.0  # logarithm of the condition of a product of tangent maps; beyond it digits would be lost
+_MAX_NORM = 300.0  # logarithm of the norm of a tangent map, which is squared
+_MIN_COMPILED_WORK = 10_000  # orbits times steps below which compiling does not pay
 
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov:
-    """The exponents of an ensemble in floating point, largest first.
+    """The Lyapunov exponents of an ensemble in floating-point numbers, largest first.
 
-    `unit` is the time of a step: 2 eps, and 1 for a map without a time step, whose exponents are per step. `exponents`
-    (orbits, dim) are per unit of time, over all counted steps of the orbits that completed them; `half`, the same over
-    the first half of the steps, shows how far they have converged. `log_volume` is the mean of log |det dPhi| per unit
-    of time, computed apart, which the exponents add up to. `ended` counts the orbits that left the range of floats or
-    met a pole; they are in no average. `steps` are those counted, after `transient` steps that were not; fewer than
-    requested if `stopped` by a time limit.
+    `unit` is the time of a step: 2 eps, or 1 for a map without a time step, whose exponents are per step. `exponents`
+    (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them; `half` are the
+    exponents over the first half of the steps, which show how far they have converged. `log_volume` is the mean of
+    log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. `ended` is the
+    number of orbits that overflowed or reached a pole; they are excluded. `steps` is the number of counted steps, after
+    `transient` uncounted ones; fewer than requested if `stopped` by a time limit.
     """
 
     unit: float
@@ -62,7 +62,7 @@ class Lyapunov:
     stopped: bool
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return all_fields(self)
 
     def __str__(self) -> str:
@@ -74,7 +74,7 @@ class Lyapunov:
 
     @property
     def mean(self) -> FloatArray:
-        """The mean of each exponent over the orbits, per unit of time; NaN where no orbit was completed."""
+        """The mean of each exponent over the orbits, per unit of time; NaN if no orbit was completed."""
         return _over_orbits(np.mean, self.exponents)
 
     @property
@@ -89,20 +89,20 @@ class Lyapunov:
 
     @property
     def change(self) -> FloatArray:
-        """How far the mean exponents of the first half of the steps are from those of all."""
+        """The distance between the mean exponents over the first half of the steps and those over all steps."""
         return np.abs(_over_orbits(np.mean, self.half) - self.mean)
 
     @property
     def residual(self) -> float:
-        """The largest distance of a sum of exponents from log |det dPhi|: rounding, if all is well; NaN of no orbit."""
+        """The largest difference of the sum of exponents and log |det dPhi|, normally round-off; NaN without orbits."""
         return (
             float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max()) if len(self.exponents) else float("nan")
         )
 
 
 def _over_orbits(function: Any, values: FloatArray) -> FloatArray:
-    found: FloatArray = function(values, axis=0) if len(values) else np.full(values.shape[1], np.nan)
-    return found
+    statistics: FloatArray = function(values, axis=0) if len(values) else np.full(values.shape[1], np.nan)
+    return statistics
 
 
 def lyapunov_exponents(
@@ -115,12 +115,25 @@ def lyapunov_exponents(
     transient: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Lyapunov:
-    """The Lyapunov exponents of the float orbits of a map from `starts`, an array (orbits, dim) of floats, or one.
+    """Compute the Lyapunov exponents of float orbits of a map.
 
-    A system stands for its Kahan map. `eps` is exact, half the time step where there is one, of either sign; `steps`
-    steps are counted after `transient` steps; a TimeLimit ends them with what is known. Double precision: the numbers
-    carry rounding and, in chaos, only their statistics mean anything. Returns a Lyapunov; raises InputError for eps =
-    0, no steps and starts of a wrong shape.
+    The method is that of Benettin et al. with the exact tangent map. In double precision chaotic orbits are not
+    accurate, only their statistics are.
+
+    Args:
+        system: the map; a quadratic system stands for its Kahan map.
+        starts: the initial points, an array (orbits, dim) of floats, or a single point.
+        eps: an exact number of either sign, half the time step if there is one; `time_step` (2 eps) instead of it.
+        steps: the number of counted steps, at least 2.
+        transient: the number of uncounted steps before them.
+        progress: called with a message for each portion.
+
+    Returns:
+        The exponents (Lyapunov); if a TimeLimit is raised, over the steps completed before.
+
+    Raises:
+        InputError: for eps = 0, fewer than 2 steps, and initial points of a wrong shape.
+
     Source: benettin-1980.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -137,7 +150,7 @@ def lyapunov_exponents(
     size = to_float(eps)
     if size == 0.0:
         raise InputError(
-            "found eps = 0 in machine numbers, expected another number: the Kahan map is the identity there"
+            "eps rounds to 0 as a floating-point number, expected another number: the map is the identity at eps = 0"
         )
     if steps < 2 or transient < 0:
         raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
@@ -145,39 +158,39 @@ def lyapunov_exponents(
     map_ = as_map(system).real_approximation
     n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():
-        raise InputError(f"found starts of the shape {x.shape}, expected rows of {n} finite numbers, at least one")
+        raise InputError(f"found initial points of shape {x.shape}, expected rows of {n} finite numbers, at least one")
     if len(x) * n * n > MAX_NUMBERS:
-        raise InputError(f"found {len(x)} starts, expected at most {MAX_NUMBERS // (n * n)} in dimension {n}")
-    orbits = FloatEnsemble(map_, eps, x, kernel="numpy" if len(x) * steps < _LITTLE else None, threads=1)
+        raise InputError(f"found {len(x)} initial points, expected at most {MAX_NUMBERS // (n * n)} in dimension {n}")
+    orbits = FloatEnsemble(map_, eps, x, kernel="numpy" if len(x) * steps < _MIN_COMPILED_WORK else None, threads=1)
     equations = map_.at(rational(eps)).equations
     frames = np.broadcast_to(np.eye(n), (len(x), n, n))
     sums, half, volumes, alive = np.zeros((len(x), n)), np.zeros((len(x), n)), np.zeros(len(x)), np.ones(len(x), bool)
     marks = [transient, transient + steps // 2, transient + steps]
-    known = 0, sums, half, volumes, alive  # after the last complete portion
+    checkpoint = 0, sums, half, volumes, alive  # after the last complete portion
     with suppress(TimeLimit):
         while orbits.step < marks[-1] and alive.any():
             progress(f"step {orbits.step} of {marks[-1]}")
             mark = next(mark for mark in marks if mark > orbits.step)
-            count = min(mark - orbits.step, _STEPS, max(1, _PORTION // (len(x) * n * n)))
-            before = orbits.x[None]
+            count = min(mark - orbits.step, _MAX_PORTION_STEPS, max(1, _PORTION // (len(x) * n * n)))
+            previous = orbits.x[None]
             after = np.concatenate(list(orbits.records(count, 1)))[-count:]
             alive &= ~np.isnan(after).any(axis=(0, 2))
-            points = np.concatenate([before, after])[:, alive]
+            points = np.concatenate([previous, after])[:, alive]
             with np.errstate(all="ignore"):
                 maps, logs = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
                 maps, logs = maps.reshape(count, -1, n, n), logs.reshape(count, -1)
                 norms = np.log(np.linalg.norm(maps, axis=(2, 3)))
-            sound = np.isfinite(logs).all(axis=0) & (norms < _LARGEST_NORM).all(axis=0)
+            sound = np.isfinite(logs).all(axis=0) & (norms < _MAX_NORM).all(axis=0)
             alive[alive] = sound
             maps, logs, norms, Q = maps[:, sound], logs[:, sound], norms[:, sound], frames[alive]
             volumes[alive] += logs.sum(axis=0)
-            # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, that of a product at most the product.
+            # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|; conditions are submultiplicative.
             conditions = np.maximum(
-                np.log(2.0) + n * (norms - np.log(n) / 2) - logs, norms * _CONDITION / _LARGEST_NORM
+                np.log(2.0) + n * (norms - np.log(n) / 2) - logs, norms * _MAX_CONDITION / _MAX_NORM
             )
             first, total = 0, 0.0
             for k, condition in enumerate([*conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
-                if k and total + condition > _CONDITION:
+                if k and total + condition > _MAX_CONDITION:
                     Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first:k], Q))
                     sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
                     first, total = k, 0.0
@@ -188,8 +201,8 @@ def lyapunov_exponents(
                 sums[:], volumes[:] = 0.0, 0.0
             elif orbits.step == marks[1]:
                 half = sums.copy()
-            known = orbits.step, sums.copy(), half, volumes.copy(), alive.copy()
-    done, sums, half, volumes, alive = known
+            checkpoint = orbits.step, sums.copy(), half, volumes.copy(), alive.copy()
+    done, sums, half, volumes, alive = checkpoint
     counted = max(0, done - transient)
     ended = len(x) - int(alive.sum())
     alive &= counted > 0
@@ -210,9 +223,9 @@ def lyapunov_exponents(
 
 
 def _tangent_maps(equations: Sequence[Equation], x: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """dPhi at points x (count, n), whose images are `last`, and log |det dPhi|.
+    """Return dPhi and log |det dPhi| at points x (count, n), whose images are `last`.
 
-    It is the product over the factors of M(x)^{-1} N(x, x~), N = -(d/dx)(M x~ - r) at fixed x~.
+    dPhi is the product over the factors of M(x)^{-1} N(x, x~), where N = -(d/dx)(M x~ - r) at fixed x~.
     """
     x, image, total = x.T, last.T, None
     volume = np.zeros(len(last))

@@ -1,13 +1,13 @@
-"""Straight-line steps as machine code: LLVM compiles them, through llvmlite, which comes with numba (the extra `fast`).
+"""Machine code of straight-line programs, compiled by LLVM through llvmlite, which comes with numba (extra `fast`).
 
-The code of a step (straight_line.py) is written down as LLVM's intermediate language for vectors of orbits, with a loop
-over the steps around it, and compiled in a fraction of a second. (Numba would take 10 to 20 seconds for the same loop,
-most of them in its own analysis of Python code, and would have to keep the machine code on disk.) The loop takes a
-vector of orbits, or a single one, through all the steps in registers. After each step it looks once at whether the fast
-step was right in all orbits of the vector; if not, those concerned take the careful step instead, and what they met is
-noted. Without fast-math flags nothing is contracted or reordered: numbers are those of numpy.
+The program of a step (straight_line_program.py) is translated to LLVM's intermediate representation for vectors of
+orbits, inside a loop over the steps, and compiled in a fraction of a second. (Numba would take 10 to 20 seconds for the
+same loop, most of them for its analysis of Python code, and would need a cache on disk.) The loop advances a vector of
+orbits, or a single orbit, through all steps in registers. After each step it checks whether the fast step was valid in
+all orbits of the vector; the others take the careful step instead, and their status is recorded. Without fast-math
+flags no operation is contracted or reordered, so the results are those of numpy.
 
-Machine code is called through ctypes, which releases the interpreter lock: threads can work on ranges of orbits.
+Machine code is called through ctypes, which releases the interpreter lock, so threads can work on ranges of orbits.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from typing import Any
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
 
 from kahanmaps.maps.floats.steps import OVERFLOW, SINGULAR, BatchState, FloatStep, RecordTable
-from kahanmaps.maps.floats.straight_line import Code, Value
+from kahanmaps.maps.floats.straight_line_program import StraightLineProgram, Value
 
-_FORMS = {  # of operations: $v is the type of a vector of numbers, $m of truth values, $s its name in functions
+_INSTRUCTIONS = {  # $v is the type of a vector of numbers, $m of truth values, $s the suffix of vector functions
     **{name: f"f{name} $v {{0}}, {{1}}" for name in ("add", "sub", "mul", "div")},
     **{name: f"fcmp {word} $v {{0}}, {{1}}" for name, word in {"gt": "ogt", "le": "ole", "eq": "oeq"}.items()},
     **{name: f"{name} $m {{0}}, {{1}}" for name in ("and", "or")},
@@ -35,8 +35,8 @@ _FORMS = {  # of operations: $v is the type of a vector of numbers, $m of truth 
 }
 _NEVER = 1 << 62
 
-# The loops over vectors of orbits and over steps. Orbits of a vector beyond the last one count as ended. Two tables may
-# be filled, each after so many steps (`until`), and then again and again (`every`).
+# The loops over vectors of orbits and over steps. The last vector is padded with orbits that count as ended. Up to two
+# tables are filled, each first after `until` steps, then after every `every` steps.
 _LOOPS = Template("""
 declare $v @llvm.fabs.$s($v)
 declare i1 @llvm.vector.reduce.and.v${width}i1($m)
@@ -139,11 +139,11 @@ end:
 
 
 class MachineCode:
-    """A step as machine code for vectors of `width` orbits, which takes ranges of orbits through steps."""
+    """The machine code of a step for vectors of `width` orbits."""
 
     def __init__(self, step: FloatStep, width: int) -> None:
         if step.fast_code is None or step.careful_code is None:
-            raise ValueError("a step that is not written out has no machine code")
+            raise ValueError("machine code requires a fast and a careful straight-line program")
         rows = range(step.rows)
 
         def splat(kind: str, value: Any) -> str:
@@ -154,8 +154,8 @@ class MachineCode:
                 return splat("i1", int(x))
             return splat("double", f"0x{struct.unpack('<Q', struct.pack('<d', float(x)))[0]:016X}")
 
-        def body(code: Code, prefix: str) -> tuple[str, list[str]]:
-            """The operations, and the names of the outputs."""
+        def body(code: StraightLineProgram, prefix: str) -> tuple[str, list[str]]:
+            """Return the instructions of a program, and the names of its outputs."""
 
             def name(x: Any) -> str:
                 if not isinstance(x, Value):
@@ -168,23 +168,23 @@ class MachineCode:
                 if operation in ("max", "min"):
                     lines.append(f"%{prefix}{k}.c = fcmp {'ogt' if operation == 'max' else 'olt'} $v {x[0]}, {x[1]}")
                     x, operation = [f"%{prefix}{k}.c", *x], "select"
-                lines.append(f"%{prefix}{k} = {_FORMS[operation].format(*x)}")
+                lines.append(f"%{prefix}{k} = {_INSTRUCTIONS[operation].format(*x)}")
             return "\n".join(lines), [name(x) for x in code.outputs]
 
         def of_rows(*lines: str) -> str:
-            """Lines for each row, with its number, and the names of its image by the fast and the careful step."""
-            return "\n".join(line.format(i=i, fast=image[i], careful=again[i]) for i in rows for line in lines)
+            """Repeat lines for each row, with its number and the names of its image in the fast and careful step."""
+            return "\n".join(line.format(i=i, fast=image[i], careful=recomputed[i]) for i in rows for line in lines)
 
-        def stored(name: str, table: str, place: str, value: str) -> str:
+        def stored(name: str, table: str, index: str, value: str) -> str:
             return of_rows(
                 f"%{name}{{i}}.r = mul i64 %n, {{i}}",
-                f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {place}",
+                f"%{name}{{i}}.o = add i64 %{name}{{i}}.r, {index}",
                 f"%{name}{{i}}.p = getelementptr double, ptr {table}, i64 %{name}{{i}}.o",
                 f"call void @llvm.masked.store.$s.p0($v {value}, ptr %{name}{{i}}.p, i32 8, $m %there)",
             )
 
         fast, (*image, good) = body(step.fast_code, "f")
-        careful, (*again, near, singular, overflow) = body(step.careful_code, "c")
+        careful, (*recomputed, near, singular, overflow) = body(step.careful_code, "c")
         parts = {
             "load": f"%record = mul i64 %n, {step.rows}\n"
             + of_rows(
@@ -207,29 +207,29 @@ class MachineCode:
             + "\n"
             + stored("u", "%z", "%at", "%r{i}"),
         }
-        words = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
-        words |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
-        words |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
-        words |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
-        words |= {"singular": singular, "overflow": overflow}
-        text = Template(_LOOPS.safe_substitute(parts)).substitute(words)
+        llvm_types = {"v": f"<{width} x double>", "m": f"<{width} x i1>", "w": f"<{width} x i64>", "s": f"v{width}f64"}
+        llvm_types |= {"true": splat("i1", 1), "ones": splat("i64", 1), "width": str(width), "good": good, "near": near}
+        llvm_types |= {"codes_singular": splat("i64", SINGULAR), "codes_overflow": splat("i64", OVERFLOW)}
+        llvm_types |= {"numbers": "<" + ", ".join(f"i64 {k}" for k in range(width)) + ">"}
+        llvm_types |= {"singular": singular, "overflow": overflow}
+        text = Template(_LOOPS.safe_substitute(parts)).substitute(llvm_types)
         self._engine, self._call = _compiled(text)
 
     def advance(
-        self, lanes: BatchState, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]
+        self, batch: BatchState, low: int, high: int, first: int, steps: int, tables: Sequence[RecordTable]
     ) -> None:
-        """Take the orbits low, ..., high - 1 `steps` steps from the index `first`; there are at most two tables."""
+        """Advance the orbits low, ..., high - 1 by `steps` steps from the index `first`; at most two tables."""
         records: list[Any] = []
-        for every, states in tables:
-            records += [states.ctypes.data, every, every - first % every]
+        for interval, states in tables:
+            records += [states.ctypes.data, interval, interval - first % interval]
         records += [None, _NEVER, _NEVER] * (2 - len(tables))
-        arrays = (array.ctypes.data for array in lanes)
-        self._call(*arrays, lanes.z.shape[1], low, high, first, steps, *records)
+        arrays = (array.ctypes.data for array in batch)
+        self._call(*arrays, batch.z.shape[1], low, high, first, steps, *records)
 
 
 @lru_cache(maxsize=32)
 def _compiled(text: str) -> tuple[Any, Any]:
-    """The engine that holds the machine code of a module, and its function `advance`."""
+    """Compile a module; return the engine that holds the machine code, and the function `advance`."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()
@@ -237,7 +237,7 @@ def _compiled(text: str) -> tuple[Any, Any]:
     module = llvm.parse_assembly(text)
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
-    engine = llvm.create_mcjit_compiler(module, machine)  # to which the machine belongs from now on
+    engine = llvm.create_mcjit_compiler(module, machine)  # which takes ownership of the target machine
     engine.finalize_object()
     kinds = [ctypes.c_void_p] * 5 + [ctypes.c_int64] * 5 + [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64] * 2
     return engine, ctypes.CFUNCTYPE(None, *kinds)(engine.get_function_address("advance"))

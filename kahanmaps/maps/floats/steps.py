@@ -1,13 +1,13 @@
-"""What a step in floating-point numbers is: written out for a map or for a normal form, or, of large maps, in arrays.
+"""Steps of maps in floating-point numbers: straight-line programs, or for large maps numpy arrays.
 
-A step takes the rows of a state to those of its image. For a map they are its coordinates, and the step solves
-M(x) x~ = r(x), M(x) being I - eps f'(x) for Kahan maps; for a normal form they are the coordinates of its planar blocks
-(blocks.py), where the same equation falls apart into blocks of two rows. A step is *near-singular* if a pivot is small
-(straight_line.py); such steps are counted, and the orbit goes on. It ends *singular* where a pivot is 0, and as an
-*overflow* where a number on the way or a coordinate of the image is not finite.
+A step maps the rows of a state to those of its image. For a map they are its coordinates, and the step solves
+M(x) x~ = r(x), where M(x) = I - eps f'(x) for Kahan maps; for a normal form they are the coordinates of its planar
+blocks (planar_blocks.py), and the same equation decomposes into blocks of two rows. A step is *near-singular* if a
+pivot is small (straight_line_program.py); such steps are counted, and the orbit continues. An orbit ends as *singular*
+if a pivot is 0, and as *overflow* if an intermediate number or a coordinate of the image is not finite.
 
-A result names its kernel; with the same one it comes out the same, to the last bit: one orbit or many, one thread or
-two, in one piece or in portions.
+With the same kernel results are reproducible to the last bit, whatever the number of orbits and threads and the size
+of the portions.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.blocks import PlanarBlocks
-from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.maps.floats.straight_line import (
+from kahanmaps.maps.floats.float_conversion import FloatArray
+from kahanmaps.maps.floats.planar_blocks import PlanarBlocks
+from kahanmaps.maps.floats.straight_line_program import (
     LARGEST,
     MAX_OPERATIONS,
     NEAR,
-    Code,
     ComplexPair,
-    StepFindings,
+    StepChecks,
+    StraightLineProgram,
     TooManyOperations,
     extreme,
     solve,
@@ -41,19 +41,19 @@ from kahanmaps.maps.kahan import KahanMap
 IntArray = NDArray[np.int64]
 
 RUNNING, OVERFLOW, SINGULAR = 0, 1, 2
-STATUS = ("completed", "overflow", "singular")  # by code; the words of OrbitEnd
+STATUS = ("completed", "overflow", "singular")  # by code; the values of OrbitEnd.status
 
 
-Write = Callable[[Sequence[Any], StepFindings], Sequence[Any]]
+Write = Callable[[Sequence[Any], StepChecks], Sequence[Any]]
 
 
 class FloatStep:
-    """A step of states with so many rows: `write` gives the image of a state, and asks `Findings` about the numbers.
+    """A step of states with the given number of rows: `write` writes the image of a state, and the checks.
 
-    `careful` takes the rows of a state, arrays, to those of its image and three more, which tell in which orbits the
-    step is near-singular, singular, or an overflow. `fast` has one more, which tells in which orbits it is right. Where
-    the fast step has too many operations to be written out it is left out, where the careful one has too many
-    (eliminations with exchanges keep few zeros), `in_arrays` takes its place; without both there is no machine code.
+    `careful` maps the rows of a state (arrays) to those of its image and three more, which tell in which orbits the
+    step is near-singular, singular, or an overflow. `fast` has one more row, which tells in which orbits it is valid.
+    If the fast program has too many operations, there is none; if the careful one has too many (row exchanges fill in
+    zeros), `in_arrays` takes its place. Machine code requires both programs.
     """
 
     def __init__(self, rows: int, write: Write, in_arrays: Callable[..., tuple[Any, ...]] | None = None) -> None:
@@ -65,40 +65,40 @@ class FloatStep:
             self.fast_on_floats, self.fast = self.fast_code.function(float), self.fast_code.function(np.ndarray)
 
     @cached_property
-    def careful_code(self) -> Code | None:
-        """Written when it is needed, which is seldom."""
+    def careful_code(self) -> StraightLineProgram | None:
+        """The program of the careful step, written on demand, since it is rarely needed."""
         return None if self.fast_code is None else self._code(careful=True)
 
     @cached_property
     def careful(self) -> Callable[..., tuple[Any, ...]]:
-        """The image, and what happened."""
-        found = self._in_arrays if self.careful_code is None else self.careful_code.function(np.ndarray)
-        if found is None:
+        """The careful step on arrays."""
+        function = self._in_arrays if self.careful_code is None else self.careful_code.function(np.ndarray)
+        if function is None:
             raise AssertionError("a step has no careful version")
-        return found
+        return function
 
     @cached_property
     def careful_on_floats(self) -> Callable[..., tuple[Any, ...]]:
-        """The same of a single state, if it is written out."""
+        """The careful step on floats, if there is a program for it."""
         return self.careful if self.careful_code is None else self.careful_code.function(float)
 
-    def _code(self, careful: bool) -> Code | None:
+    def _code(self, careful: bool) -> StraightLineProgram | None:
         limit = None if self._in_arrays is None else 2 * MAX_OPERATIONS if careful else MAX_OPERATIONS
-        code, asked = Code(self.rows, limit), StepFindings(careful)
+        code, checks = StraightLineProgram(self.rows, limit), StepChecks(careful)
         try:
-            image = self._write(code.arguments, asked)
+            image = self._write(code.arguments, checks)
             for x in image:
-                asked.number(x)
-            code.outputs = [*image, *asked.outputs()]
+                checks.number(x)
+            code.outputs = [*image, *checks.outputs()]
         except TooManyOperations:
             return None
         return code
 
 
 def planar_step(blocks: PlanarBlocks) -> FloatStep:
-    """A step of a normal form."""
+    """Return the step of a normal form, block by block."""
 
-    def write(z: Sequence[Any], asked: StepFindings) -> list[Any]:
+    def write(z: Sequence[Any], checks: StepChecks) -> list[Any]:
         image: list[Any] = []
         for r, coefficients in enumerate(blocks.coefficients):
             at, real = len(image), r < blocks.reals
@@ -109,7 +109,7 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
                 U, V = ComplexPair(z[at], z[at + 1]), ComplexPair(z[at + 2], z[at + 3])
                 a, b, c, d = (ComplexPair(x.real, x.imag) for x in coefficients.tolist())
             A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
-            for x in solve_two([[1.0 - B, -C, U], [A, 1.0 + B, V]], asked):
+            for x in solve_two([[1.0 - B, -C, U], [A, 1.0 + B, V]], checks):
                 image += [x] if real else [x.x, x.y]
         return image
 
@@ -117,22 +117,22 @@ def planar_step(blocks: PlanarBlocks) -> FloatStep:
 
 
 def map_step(factors: Sequence[ElementaryMap]) -> FloatStep:
-    """A step of each of the maps, one after the other. Raises InputError where a number is out of range."""
-    equations = [float_equation(one) for one in factors]
+    """Return the step of a composition of maps. Raises InputError if a coefficient is out of range."""
+    equations = [float_equation(factor) for factor in factors]
 
-    def write(x: Sequence[Any], asked: StepFindings) -> Sequence[Any]:
+    def write(x: Sequence[Any], checks: StepChecks) -> Sequence[Any]:
         for equation in equations:
-            x = equation.image(x, asked)
+            x = equation.image(x, checks)
         return x
 
     return FloatStep(factors[0].dim, write, partial(_step_in_arrays, equations))
 
 
 class FloatEquation(NamedTuple):
-    """The equation M(x) x~ = r(x) in doubles, with the terms that are there; r is the last column of (M | r).
+    """The equation M(x) x~ = r(x) in doubles, in sparse form; r is the last column of (M | r).
 
-    Entry (i, j) is the sum of c y[k] over the pairs (k, c) of `terms[i][j]`, and `constants[i][j]`; y is x and behind
-    it y[a] y[b] for every pair (a, b) of `products`.
+    Entry (i, j) is `constants[i][j]` plus the sum of c y[k] over the pairs (k, c) of `terms[i][j]`. The vector y
+    consists of x, followed by y[a] y[b] for every pair (a, b) of `products`.
     """
 
     constants: list[list[float]]
@@ -140,14 +140,14 @@ class FloatEquation(NamedTuple):
     products: list[tuple[int, int]]
 
     def monomials(self, x: Sequence[Any]) -> list[Any]:
-        """The values y at x."""
+        """Return the vector y at x."""
         y = list(x)
         for a, b in self.products:
             y.append(y[a] * y[b])
         return y
 
-    def image(self, x: Sequence[Any], asked: StepFindings) -> list[Any]:
-        """The image of x."""
+    def image(self, x: Sequence[Any], checks: StepChecks) -> list[Any]:
+        """Write the image of x."""
         y, n = self.monomials(x), len(self.constants)
         rows = []
         for constants, entries in zip(self.constants, self.terms, strict=True):
@@ -159,17 +159,17 @@ class FloatEquation(NamedTuple):
             size: Any = 0.0
             for k in sorted({k for entries in self.terms for terms in entries[:n] for k, _ in terms}):
                 size = extreme("max", size, abs(y[k]))
-            most = max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[:n])
-            return size * most + max(1.0, max(abs(x) for constants in self.constants for x in constants[:n]))
+            largest_sum = max(sum(abs(c) for _, c in terms) for entries in self.terms for terms in entries[:n])
+            return size * largest_sum + max(1.0, max(abs(x) for constants in self.constants for x in constants[:n]))
 
-        return solve(rows, bound, asked)
+        return solve(rows, bound, checks)
 
 
 def float_equation(map_over: ElementaryMap) -> FloatEquation:
-    """The equation of a step of a map over QQ, each number rounded once. Raises InputError where one is out of range.
+    """Return the equation of a map over QQ in doubles, each number rounded once.
 
-    A row of a Kahan map is of the size of 1 where eps is small, that of another map is divided by its largest
-    coefficient in M: near-singular steps are told by the size of pivots.
+    Near-singular steps are detected by the size of pivots, so each row is divided by its largest coefficient in M,
+    except for Kahan maps, whose rows have size 1 for small eps. Raises InputError if a number is out of range.
     """
     equation = map_over.equation
     n = equation.dim
@@ -177,7 +177,7 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
     products: list[tuple[int, int]] = []
 
     def place(exponent: tuple[int, ...]) -> int:
-        """Where the value of a monomial stands in y."""
+        """Return the index in y of a monomial."""
         if exponent not in index:
             last = max(k for k, e in enumerate(exponent) if e)
             smaller = place((*exponent[:last], exponent[last] - 1, *exponent[last + 1 :]))
@@ -191,28 +191,28 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
         scale = fmpq(1) if isinstance(map_over, KahanMap) else 1 / largest
         constants, terms = [0.0] * (n + 1), []
         for j, entry in enumerate(row):
-            found = []
+            entries = []
             for k, coefficient in entry:
                 number = coefficient * scale if j < n else -coefficient * scale
                 try:
                     value = int(number.p) / int(number.q)
                 except OverflowError as error:
                     raise InputError(
-                        "eps times a coefficient leaves the range of machine floats: use exact arithmetic"
+                        "eps times a coefficient leaves the range of floating-point numbers: use exact arithmetic"
                     ) from error
                 exponent = equation.exponents[k][:n]
                 if any(exponent):
-                    found.append((place(exponent), value))
+                    entries.append((place(exponent), value))
                 else:
                     constants[j] = value
-            terms.append(sorted(found))
+            terms.append(sorted(entries))
         all_constants.append(constants)
         all_terms.append(terms)
     return FloatEquation(all_constants, all_terms, products)
 
 
 def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple[Any, ...]:
-    """A careful step with partial pivoting in whole arrays, for maps of many variables."""
+    """Take a careful step with partial pivoting in numpy arrays, for maps of many variables."""
     near, singular, finite = (np.full(x[0].shape, truth) for truth in (False, False, True))
     image: Any = np.array(x)
     for equation in equations:
@@ -233,32 +233,32 @@ def _step_in_arrays(equations: Sequence[FloatEquation], *x: FloatArray) -> tuple
 
 
 def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
-    """Gaussian elimination with partial pivoting in many matrices (n, n + count + ..., lanes) at once, in place.
+    """Gaussian elimination with partial pivoting for a batch of matrices (n, n + count + ..., batch), in place.
 
-    The solutions stand in the `count` columns of the right-hand sides then; columns behind them are exchanged with
-    their rows. Returns the absolute values (n, lanes) of the pivots.
+    The `count` columns after the first n are right-hand sides and are replaced by the solutions; further columns are
+    only permuted with the rows. Returns the absolute values (n, batch) of the pivots.
     """
-    lanes, end = np.arange(M.shape[2]), n + count
-    pivots = np.empty((n, len(lanes)))
+    columns, last_column = np.arange(M.shape[2]), n + count
+    pivots = np.empty((n, len(columns)))
     for p in range(n):
-        best = p + np.abs(M[p:, p]).argmax(axis=0)
-        if (best != p).any():
+        pivot_rows = p + np.abs(M[p:, p]).argmax(axis=0)
+        if (pivot_rows != p).any():
             rows = M.transpose(0, 2, 1)
-            rows[p], rows[best, lanes] = rows[best, lanes], rows[p].copy()
+            rows[p], rows[pivot_rows, columns] = rows[pivot_rows, columns], rows[p].copy()
         pivots[p] = np.abs(M[p, p])
-        M[p + 1 :, p:end] -= (M[p + 1 :, p] / M[p, p])[:, None] * M[p, p:end]
+        M[p + 1 :, p:last_column] -= (M[p + 1 :, p] / M[p, p])[:, None] * M[p, p:last_column]
     for p in range(n - 1, -1, -1):
-        M[p, n:end] /= M[p, p]
-        M[:p, n:end] -= M[:p, p, None] * M[p, n:end]
+        M[p, n:last_column] /= M[p, p]
+        M[:p, n:last_column] -= M[:p, p, None] * M[p, n:last_column]
     return pivots
 
 
 class BatchState(NamedTuple):
-    """The states of n orbits side by side, one a column, and what happened to each.
+    """The states of a batch of n orbits, one per column, and the status of each.
 
     `z` has the shape (rows, n). `failed_at` is the index of the first iterate that does not exist, `near` the number of
-    near-singular steps, `near_at` the index of the point at the first one (-1: none). The column of an orbit that has
-    ended is 0.
+    near-singular steps, `near_at` the index of the point at the first of them (-1: none). The column of an orbit that
+    has ended is 0.
     """
 
     z: FloatArray
@@ -269,13 +269,13 @@ class BatchState(NamedTuple):
 
     @classmethod
     def of(cls, z: FloatArray) -> BatchState:
-        """Lanes that are about to start."""
+        """Return a batch of running orbits with these initial states."""
         n = z.shape[1]
         counts = [np.full(n, start, dtype=np.int64) for start in (RUNNING, -1, 0, -1)]
         return cls(np.ascontiguousarray(z), *counts)
 
     def note(self, which: IntArray, index: int, near: Any, singular: Any, overflow: Any) -> Any:
-        """Take down what a careful step of some running orbits from the index met; which of them have ended."""
+        """Record the result of a careful step from `index` of the orbits `which`; return which of them have ended."""
         near, singular, overflow = (np.broadcast_to(x, which.shape) for x in (near, singular, overflow))
         ended = singular | overflow
         self.status[which[ended]] = np.where(singular[ended], SINGULAR, OVERFLOW)
@@ -287,27 +287,27 @@ class BatchState(NamedTuple):
 
 
 class RecordTable(NamedTuple):
-    """Where states go: those at multiples of `every` to the rows of an array (records, rows, n), from the first on."""
+    """An array (records, rows, n) for the states at multiples of `every`."""
 
     every: int
     states: FloatArray
 
 
-_FEW = 16  # orbits, up to which Python's own floats are faster than arrays
-_GROUP = 4096  # orbits that are taken together, so that arrays stay in the processor's cache
+_MAX_SINGLE_ORBITS = 16  # up to this number of orbits Python floats are faster than arrays
+_GROUP = 4096  # orbits processed together, so that the arrays fit into the processor's cache
 
 
-def advance_by_numpy(step: FloatStep, lanes: BatchState, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
-    """Take all orbits `steps` steps from the index `first`: in arrays, or a few one by one in Python's own floats."""
-    n = lanes.z.shape[1]
-    single = n <= _FEW and step.fast_code is not None
+def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int, tables: Sequence[RecordTable]) -> None:
+    """Advance all orbits by `steps` steps from the index `first`: in arrays, or a few of them in Python floats."""
+    n = batch.z.shape[1]
+    single = n <= _MAX_SINGLE_ORBITS and step.fast_code is not None
     width = 1 if single else _GROUP
     with np.errstate(all="ignore"):
-        for low in range(0, n, width):
-            part = slice(low, min(n, low + width))
-            dead = lanes.status[part] != RUNNING
+        for start in range(0, n, width):
+            part = slice(start, min(n, start + width))
+            has_ended = batch.status[part] != RUNNING
             path: list[list[Any]] = [[] for _ in tables]
-            x: Any = lanes.z[:, low].tolist() if single else list(lanes.z[:, part])
+            x: Any = batch.z[:, start].tolist() if single else list(batch.z[:, part])
             for index in range(first, first + steps):
                 try:
                     if step.fast_code is None:
@@ -319,30 +319,30 @@ def advance_by_numpy(step: FloatStep, lanes: BatchState, first: int, steps: int,
                             good = not (near or singular or overflow)
                     else:
                         *image, good = step.fast(*x)
-                except ZeroDivisionError:  # where arrays get an infinity
+                except ZeroDivisionError:  # arrays would contain an infinity here
                     image, good = x, False
-                if good is not True and not np.all(good | dead):
-                    again = np.flatnonzero(~(good | dead))
-                    before, after = (
-                        np.array([np.broadcast_to(row, dead.shape) for row in state]) for state in (x, image)
+                if good is not True and not np.all(good | has_ended):
+                    repeat = np.flatnonzero(~(good | has_ended))
+                    points_before, points_after = (
+                        np.array([np.broadcast_to(row, has_ended.shape) for row in state]) for state in (x, image)
                     )
-                    *careful, near, singular, overflow = step.careful(*before[:, again])
-                    ended = lanes.note(low + again, index, near, singular, overflow)
-                    for row, values in zip(after, careful, strict=True):
-                        row[again] = np.where(ended, 0.0, values)
-                    dead[again] |= ended
-                    image = after[:, 0].tolist() if single else list(after)
+                    *careful, near, singular, overflow = step.careful(*points_before[:, repeat])
+                    ended = batch.note(start + repeat, index, near, singular, overflow)
+                    for row, values in zip(points_after, careful, strict=True):
+                        row[repeat] = np.where(ended, 0.0, values)
+                    has_ended[repeat] |= ended
+                    image = points_after[:, 0].tolist() if single else list(points_after)
                 x = image
-                for kept, (every, states) in zip(path, tables, strict=True):
-                    if (index + 1) % every == 0 and single:
-                        kept.append(x)
-                    elif (index + 1) % every == 0:
-                        for row, values in zip(states[(index + 1) // every - first // every - 1], x, strict=True):
+                for buffer, (interval, states) in zip(path, tables, strict=True):
+                    if (index + 1) % interval == 0 and single:
+                        buffer.append(x)
+                    elif (index + 1) % interval == 0:
+                        for row, values in zip(states[(index + 1) // interval - first // interval - 1], x, strict=True):
                             row[part] = values
-                if single and dead[0]:
+                if single and has_ended[0]:
                     break
-            for kept, (_, states) in zip(path, tables, strict=True):
-                if kept:
-                    states[: len(kept), :, low] = kept
-            for row, values in zip(lanes.z, x, strict=True):
-                row[part] = np.where(dead, 0.0, values)
+            for buffer, (_, states) in zip(path, tables, strict=True):
+                if buffer:
+                    states[: len(buffer), :, start] = buffer
+            for row, values in zip(batch.z, x, strict=True):
+                row[part] = np.where(has_ended, 0.0, values)

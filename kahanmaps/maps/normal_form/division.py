@@ -1,4 +1,4 @@
-"""On which levels all orbits are periodic: the division polynomials of the translation T, in gamma.
+"""Division polynomials of the translation T in gamma: the levels on which all orbits are periodic.
 
 On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
 gamma = 1 - disc(h) level^2 (docs/mathematics.md, "A translation, and tau functions"). So it has period N on the smooth
@@ -22,7 +22,7 @@ _GAMMA = fmpz_poly([0, 1])
 
 @dataclass(frozen=True)
 class PeriodicLevels:
-    """psi_N, its part that belongs to the exact period N, and the rational gamma with that period.
+    """The levels with period N: psi_N, its factor for the exact period N, and the rational gamma with that period.
 
     `psi` is without the factor gamma^(1/3) that it has where 3 divides N.
     """
@@ -41,12 +41,12 @@ class PeriodicLevels:
     @cached_property
     def primitive(self) -> fmpz_poly:
         """psi_N without the factors that it shares with psi_d for a proper divisor d of N, its content taken out."""
-        found, table = self.psi, division_polynomials(self.period)
+        polynomial, table = self.psi, division_polynomials(self.period)
         for d in range(1, self.period):
             if self.period % d == 0:
-                while (common := found.gcd(table[d])).degree() > 0:
-                    found = found / common
-        return found / found.content()
+                while (common := polynomial.gcd(table[d])).degree() > 0:
+                    polynomial = polynomial / common
+        return polynomial / polynomial.content()
 
     @cached_property
     def gammas(self) -> tuple[fmpq, ...]:
@@ -68,7 +68,7 @@ class PeriodicLevels:
 
 
 def division_polynomials(largest: int) -> list[fmpz_poly]:
-    """psi_0, ..., psi_N in gamma, without the factor gamma^(1/3) of those whose index 3 divides.
+    """Return psi_0, ..., psi_N in gamma, without the factor gamma^(1/3) of those with an index divisible by 3.
 
     >>> division_polynomials(6)[5:]
     [(-27)*x + 32, (-162)*x + 168]
@@ -93,5 +93,5 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
 
 
 def text_in_gamma(polynomial: fmpz_poly) -> str:
-    """A polynomial in gamma as text."""
+    """Format a polynomial in gamma."""
     return format_univariate(fmpq_poly(polynomial)).replace("t", "gamma")

@@ -1,8 +1,8 @@
-"""The n-th iterate of a Kahan map directly, without the iterates before it, for members of the family.
+"""The n-th iterate of a Kahan map, computed directly, for members of the family.
 
-In every plane of the normal form the map is a translation on a plane cubic, so n takes about log2(n) doublings: over
-Q in integers (`tau`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
-passed over, except over Q, where none goes unnoticed.
+In every plane of the normal form the map is a translation on a plane cubic, so the n-th iterate takes about log2(n)
+doublings: over Q in integers (`tau`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles at
+earlier steps are detected over Q only.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class NthIterate:
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
 
-        Raises SingularStep where the map has no value, over Q at any step, elsewhere at one of the first few or the
+        Raises SingularStep where the map is not defined: over Q at any step, elsewhere at one of the first few or the
         last; PrecisionLost for balls that are too wide; OverBudget, over Q, where an orbit that is stepped has numbers
         of more than `max_bits` bits before it is there, and before it meets a pole.
         """
@@ -63,15 +63,15 @@ class NthIterate:
             return self._rational[1].value(n)
         with self.field.working():
             x = [self.field.convert(entry) for entry in start]
-            found = []
+            triples = []
             for plane, triple in zip(self.splitting.planes, self.splitting.triples(x), strict=True):
-                found.append(self._in_plane(plane.block, triple, n))
-                if self.field.is_zero(found[-1][2]):
-                    raise SingularStep(f"the map has a pole: its iterate {n} has no value at the start")
-            return self.splitting.point(found)
+                triples.append(self._in_plane(plane.block, triple, n))
+                if self.field.is_zero(triples[-1][2]):
+                    raise SingularStep(f"the map has a pole: its iterate {n} is not defined at the initial point")
+            return self.splitting.point(triples)
 
     def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
-        """P_n over a field other than Q."""
+        """Return P_n over a field other than Q."""
         from kahanmaps.maps.normal_form import translation
 
         if block.is_zero or (start[0] == 0 and start[1] == 0):
@@ -98,7 +98,7 @@ class NthIterate:
 
 
 def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any]) -> str:
-    """Empty, or why the orbit of a rational start is special in a plane, which balls cannot decide.
+    """Return why the orbit of a rational initial point is special in a plane, which balls cannot decide; or "".
 
     Special are planes in which the start is at rest, or on a singular level cubic (delta is 0 or 1).
     """
@@ -106,11 +106,11 @@ def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any])
 
     splitting = Splitting(normal_form.form, QQ, eps, normal_form.T)
     for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
-        above, below = plane.block.level((U, V, W))
+        numerator, denominator = plane.block.level((U, V, W))
         if plane.block.is_zero or (U == 0 and V == 0):
             return f"the start is at rest in the plane {plane.name}"
-        if below == 0 or above == 0 or plane.block.discriminant == 0:
+        if denominator == 0 or numerator == 0 or plane.block.discriminant == 0:
             return f"the start is on a singular level in the plane {plane.name}"
-        if plane.block.discriminant * above * above == below * below:
+        if plane.block.discriminant * numerator * numerator == denominator * denominator:
             return f"the start is on three lines in the plane {plane.name}"
     return ""

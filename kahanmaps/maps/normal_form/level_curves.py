@@ -1,7 +1,7 @@
-"""The level cubics of a plane as groups: the order of the translation Psi, and whether a point is an image of another.
+"""The level cubics of a plane as groups: the order of the translation Psi, and whether two points lie on one orbit.
 
-Elements are FLINT's, of a field of q elements of characteristic at least 5 (or of a number field, where only single
-sums are wanted); the levels are smooth. See planar_block.py for the cubic E, its Jacobian and T.
+The field has q elements and characteristic at least 5 (number fields are used only for single sums); the levels are
+smooth. See planar_block.py for the cubic E, its Jacobian and T.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from kahanmaps.maps.normal_form.schoof import by_doublings, trace_modulo
 
 AffinePoint = tuple[Any, Any]
 
-_LARGEST_DIGIT = 2000
+_MAX_DIGIT = 2000
 _RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm, with about 2^17 steps
 
 
@@ -55,8 +55,8 @@ class Jacobian:
 
     def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
         """n P for n >= 0."""
-        found: AffinePoint | None = by_doublings(self.add, None, n, P)
-        return found
+        multiple: AffinePoint | None = by_doublings(self.add, None, n, P)
+        return multiple
 
 
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
@@ -101,16 +101,16 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
         index.setdefault(point[0], (unit * j, point[1]))
         point = curve.add(point, step)
     stride = (2 * babies + 1) * unit
-    leap, up = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
-    back, down = curve.negative(leap), up
+    leap, upward = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
+    backward, downward = curve.negative(leap), upward
     for i in range(radius * unit // stride + 3):
-        for k, point in ((middle + i * stride, up), (middle - i * stride, down)):
+        for k, point in ((middle + i * stride, upward), (middle - i * stride, downward)):
             if point is None:
                 return abs(k)
             if point[0] in index:
                 j, y = index[point[0]]  # k T = +-j T
                 return abs(k - j if point[1] == y else k + j)
-        up, down = curve.add(up, leap), curve.add(down, back)
+        upward, downward = curve.add(upward, leap), curve.add(downward, backward)
     raise AssertionError("no multiple of T in the Hasse interval is zero: it would be a mistake of ours")
 
 
@@ -120,8 +120,8 @@ class LevelCubic:
     The sum of points comes from chords and tangents, with no normal form. Its points are triples, not normalised.
     """
 
-    def __init__(self, block: PlanarBlock, above: Any, below: Any, zero: Triple) -> None:
-        self.block, self.above, self.below, self.zero = block, above, below, zero
+    def __init__(self, block: PlanarBlock, numerator: Any, denominator: Any, zero: Triple) -> None:
+        self.block, self.above, self.below, self.zero = block, numerator, denominator, zero
         self._opposite = self.third(zero, zero)
 
     def gradient(self, P: Triple) -> Triple:
@@ -157,15 +157,15 @@ class LevelCubic:
 
     def multiple(self, n: int, P: Triple) -> Triple:
         """n P for n >= 0."""
-        found: Triple = by_doublings(self.add, self.zero, n, P)
-        return found
+        multiple: Triple = by_doublings(self.add, self.zero, n, P)
+        return multiple
 
     def is_zero(self, P: Triple) -> bool:
-        """Whether P is the zero of the group."""
+        """Return whether P is the zero of the group."""
         return same_point(P, self.zero)
 
     def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
-        """Whether P is among the multiples of T, which has this order; None: not known.
+        """Return whether P is a multiple of T, which has this order; None if it is not known.
 
         It is none if order P is not zero. Otherwise, for every prime l that divides both the order and the index of
         the multiples of T, the parts of P and T of l-power order are compared by one logarithm; the others agree.
@@ -182,7 +182,7 @@ class LevelCubic:
             prime, power = int(factor), int(factor) ** int(exponent)
             if points // order % prime != 0:
                 continue
-            if prime > _LARGEST_DIGIT:
+            if prime > _MAX_DIGIT:
                 unknown = True
                 continue
             # The logarithm of the part of P for that of T, whose order is `power`, digit by digit (Pohlig and Hellman).
@@ -190,8 +190,8 @@ class LevelCubic:
             top, unit = self.multiple(power // prime, base), 1
             while unit < power:
                 # The part is unit (...) and what has been taken off, so far.
-                rest, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
-                while not same_point(rest, step):
+                cofactor, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
+                while not same_point(cofactor, step):
                     digit, step = digit + 1, self.add(step, top)
                     if digit == prime:
                         return False

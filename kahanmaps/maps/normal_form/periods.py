@@ -41,7 +41,7 @@ _AGREEMENTS = 8
 
 
 class PeriodKind(StrEnum):
-    """What the level cubic of a plane is, and so how its period is found (p is not 2 or 3)."""
+    """The type of the level cubic of a plane, which determines how its period is computed (p is not 2 or 3)."""
 
     FIXED = "a fixed point"  # period 1
     SMOOTH = "a smooth level cubic"  # delta is not 0, 1 or infinite: the order of T
@@ -49,7 +49,7 @@ class PeriodKind(StrEnum):
     TRIANGLE = "a level with delta = 1, three lines"  # Psi^3 multiplies by -8 along a line: 3 ord(-8), over Q none
     VERTEX = "a vertex of the three lines"  # period 3
     AT_POLE = "a pole at the start"  # W (W^2 + D) = 0, a conic and a line: period 4
-    NO_VALUE = "a start where the map has no value"  # a base point of the levels, or disc(h) = 0 there: none
+    NO_VALUE = "an initial point where the map is not defined"  # a base point of the levels, or disc(h) = 0 there: none
     STEPPED = "characteristic 2 or 3"  # walked
 
 
@@ -71,7 +71,7 @@ class PlanePeriod:
 
     @property
     def text(self) -> str:
-        """One line."""
+        """A line of text."""
         what = f"period {self.period}" if self.period is not None else self.status
         return f"{self.name}: {what} ({self.kind}{'; ' + self.reason if self.reason else ''})"
 
@@ -80,9 +80,9 @@ class PlanePeriod:
 class OrbitPeriod(PrintableResult):
     """The period of an orbit, continued through poles: the least common multiple over the planes.
 
-    `status` is "periodic", "aperiodic" (proved), "undefined" (a plane starts where the map has no value and cannot be
-    continued) or "undecided". If `meets_pole` is False, the map itself brings the start back after `period` steps and
-    not before; if True, the orbit of the map ends at the pole; None: not known.
+    `status` is "periodic", "aperiodic" (proved), "undefined" (the map is not defined at the initial point of a plane
+    and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the map
+    itself; if True, the orbit of the map ends at the pole; None: not known.
     """
 
     period: int | None
@@ -91,11 +91,11 @@ class OrbitPeriod(PrintableResult):
     planes: tuple[PlanePeriod, ...]
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each plane, for `pandas.DataFrame(found.rows())` and the like."""
-        return [{"plane": one.name, "status": one.status, "period": one.period} for one in self.planes]
+        """Return a row for each plane, for example for `pandas.DataFrame(period.rows())`."""
+        return [{"plane": plane.name, "status": plane.status, "period": plane.period} for plane in self.planes]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return all_fields(self)
 
     @property
@@ -104,7 +104,7 @@ class OrbitPeriod(PrintableResult):
         if self.period is None:
             sentence = {
                 "aperiodic": "the orbit has no period",
-                "undefined": "the orbit comes to a point where the map has no value and cannot be continued",
+                "undefined": "the orbit reaches a point where the map is not defined and cannot be continued",
             }.get(self.status, "the period was not found")
         elif self.meets_pole is False:
             sentence = f"the orbit has period {self.period} and meets no pole of the map"
@@ -118,7 +118,7 @@ class OrbitPeriod(PrintableResult):
 def orbit_period(
     form: NormalForm, eps: Any, start: Sequence[Any], prime: int, *, largest: int = LARGEST_FIELD
 ) -> OrbitPeriod:
-    """The exact period modulo p of the orbit of `start` under the Kahan map at `eps` (the time step is 2 eps).
+    """Compute the exact period modulo p of the orbit of `start` under the Kahan map at `eps`, half the time step.
 
     The period of a plane over a field of more than `largest` elements is "undecided". Raises BadPrime
     where the member has no normal form modulo p, InputError for a wrong start.
@@ -164,7 +164,7 @@ def plane_period(
         for step in range(1, min(q * q + q + 1, _WALK) + 1):
             image = block.image(image)
             if all(entry == 0 for entry in image):
-                return PlanePeriod(name, q, kind, "undefined", None, True, f"no value after {step} steps")
+                return PlanePeriod(name, q, kind, "undefined", None, True, f"not defined after {step} steps")
             passed = passed or bool(image[2] == 0)
             if same_point(image, point):
                 return PlanePeriod(name, q, kind, "periodic", step, passed)
@@ -191,8 +191,8 @@ def plane_period(
         met = _walk_meets_pole(block, point, 3 * order) if at_infinity else False
         return PlanePeriod(name, q, kind, "periodic", 3 * order, met)
     if q > largest:
-        size, most = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
-        reason = f"its field has {size} elements, more than {most}"
+        size, bound = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
+        reason = f"its field has {size} elements, more than {bound}"
         return PlanePeriod(name, q, kind, "undecided", None, None if at_infinity else False, reason)
     order = translation_order(gamma, q, context)
     # With a pole as zero of the group, T is its image, and the question is whether the point is a multiple.
@@ -208,13 +208,13 @@ def plane_period(
 
 def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
     """The kind of a point (U : V : 1) outside characteristics 2 and 3, and gamma if the level is smooth."""
-    above, below = block.level(point)
+    numerator, denominator = block.level(point)
     if block.is_zero or (point[0] == 0 and point[1] == 0):
         return PeriodKind.FIXED, None
     disc = block.discriminant
-    if below == 0:
-        return (PeriodKind.NO_VALUE if above == 0 or disc == 0 else PeriodKind.AT_POLE), None
-    delta = disc * above * above / (below * below)
+    if denominator == 0:
+        return (PeriodKind.NO_VALUE if numerator == 0 or disc == 0 else PeriodKind.AT_POLE), None
+    delta = disc * numerator * numerator / (denominator * denominator)
     if delta == 0:
         return (PeriodKind.FIXED if same_point(block.image(point), point) else PeriodKind.ADDITIVE), None
     gamma = 1 - delta
@@ -238,9 +238,9 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
     >>> sorted(poles(PlanarBlock(*(nmod(c, 7) for c in (1, 0, 0, 6))), 7), key=str)
     [(1, 1, 0), (2, 1, 0), (4, 1, 0)]
     """
-    nought = 0 * block.a
-    one = nought + 1
-    found: list[Triple] = [(one, nought, nought)] if block.a == 0 else []
+    zero = 0 * block.a
+    one = zero + 1
+    poles: list[Triple] = [(one, zero, zero)] if block.a == 0 else []
     coefficients: list[Any] = [block.d, block.c, block.b, block.a]
     if context is None:
         ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(prime))
@@ -248,11 +248,11 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
     else:
         factors = fq_default_poly_ctx(context)(coefficients).factor()[1]  # type: ignore[arg-type]
     roots = [-factor[0] for factor, _ in factors if factor.degree() == 1]
-    return found + [(nought + (int(root) if context is None else root), one, nought) for root in roots]
+    return poles + [(zero + (int(root) if context is None else root), one, zero) for root in roots]
 
 
 def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
-    """Whether an orbit meets a pole, by walking if the period is not long."""
+    """Return whether an orbit reaches a pole, by iteration if the period is not long."""
     image = point
     for _ in range(min(period, _WALK)):
         image = block.image(image)
@@ -272,7 +272,7 @@ def period_of(
     *,
     largest: int = LARGEST_FIELD,
 ) -> OrbitPeriod:
-    """The period of the orbit of `start`, in the system's own coordinates, modulo a prime or (None) over Q.
+    """Compute the period of the orbit of `start`, in the coordinates of the system, modulo a prime or (None) over Q.
 
     `normal_form` is that of the system (family.system_normal_form) or, where the coordinates are its own, of a member;
     otherwise like `orbit_period` and `period_over_rationals`.
@@ -326,7 +326,7 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
     that there is none.
 
     Reduction modulo an unramified odd prime of good reduction is injective on torsion. So T has infinite order if it
-    has different orders modulo two such primes; where they agree, n T = 0 is put to the test over the field itself.
+    has different orders modulo two such primes; where they agree, n T = 0 is tested over the field itself.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
@@ -338,7 +338,7 @@ def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> O
 
 
 def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str = "the plane") -> PlanePeriod:
-    """The period of (U : V : 1) under Psi of a block over Q, or over Q[t]/g with g irreducible.
+    """Compute the period of (U : V : 1) under Psi of a block over Q, or over Q[t]/g with g irreducible.
 
     >>> block = PlanarBlock(*(fmpq(c) for c in (0, 2, -1, 2)))
     >>> plane_period_over_rationals(block, (fmpq(-1, 3), fmpq(-1, 3), fmpq(1))).text
@@ -357,7 +357,7 @@ def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str 
 
 
 def torsion_order(gamma: Any) -> tuple[int | None, str]:
-    """The order of T over Q, or Q[t]/g with g irreducible, None for an infinite one, and the reason.
+    """Return the order of T over Q or Q[t]/g with g irreducible (None: infinite), and the reason.
 
     >>> torsion_order(fmpq(32, 27)), torsion_order(fmpq(3))
     ((5, '5 T = 0'), (None, 'T has the orders 54 and 88 modulo 101 and 103'))
@@ -366,11 +366,13 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
     for prime, residue, context in _reductions(gamma):
         if residue == 0 or residue == 1:
             continue
-        place = f"{prime}" if context is None else f"a prime over {prime}"
-        seen.append((translation_order(residue, prime if context is None else int(context.order()), context), place))
-        (first, there), (last, here) = seen[0], seen[-1]
+        prime_name = f"{prime}" if context is None else f"a prime over {prime}"
+        seen.append(
+            (translation_order(residue, prime if context is None else int(context.order()), context), prime_name)
+        )
+        (first, first_order), (last, last_order) = seen[0], seen[-1]
         if first != last:
-            return None, f"T has the orders {first} and {last} modulo {there} and {here}"
+            return None, f"T has the orders {first} and {last} modulo {first_order} and {last_order}"
         if len(seen) == _AGREEMENTS:
             curve = Jacobian(gamma)
             if curve.multiple(first, curve.T) is None:
@@ -397,9 +399,9 @@ def _reductions(gamma: Any) -> Iterator[tuple[int, Any, fq_default_ctx | None]]:
         if any(exponent > 1 for _, exponent in factors):
             continue
         factor = min((f for f, _ in factors), key=lambda f: int(f.degree()))
-        rest = ring([fmpz(int(field.convert(c))) for c in element.coeffs()]) % factor
+        remainder = ring([fmpz(int(field.convert(c))) for c in element.coeffs()]) % factor
         if factor.degree() == 1:
-            yield prime, field.convert(int(rest[0])), None
+            yield prime, field.convert(int(remainder[0])), None
         else:
             context = fq_default_ctx(modulus=factor)
-            yield prime, context(rest), context
+            yield prime, context(remainder), context

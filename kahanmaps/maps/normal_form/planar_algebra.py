@@ -1,12 +1,12 @@
-"""A plane over a number field K = Q[t]/g in integers: values of tau functions as short elements of Z[t], and back to Q.
+"""Planes over a number field K = Q[t]/g in integers: values of tau functions as short elements of Z[t].
 
-All that holds in a plane over Q (`planar_integers`, `tau`) holds over K prime ideal by prime ideal: outside the bad
-primes natural lifts are integral, and so are psi and chi. But ideals need not be principal, and an element may be short
-at one root of g and long at another. So a value is multiplied by a short element of the lattice of those that take its
-bad part away, with the lengths at the roots for weights: LLL finds one. Which one is free, since the product of value
-and scale is exact.
+The statements for planes over Q (`planar_integers`, `tau`) hold over K for each prime ideal: outside the bad primes
+natural lifts are integral, and so are psi and chi. But ideals need not be principal, and an element may be short at one
+root of g and long at another. So a value is multiplied by a short element of the lattice of elements that cancel its
+bad part; LLL finds such an element, with the lengths at the roots as weights. The choice is arbitrary, since the
+product of value and scale is exact.
 
-A point (U : V : W) comes back to rational numbers as U W'/N and V W'/N with N = W W', the norm of W.
+A point (U : V : W) is converted to rational numbers as U W'/N and V W'/N with N = W W', the norm of W.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def numbers(self) -> ShortElements:
-        """How values of tau functions are kept."""
+        """The representation of the values of tau functions."""
         return ShortElements(self.algebra, self.bad)
 
     @cached_property
@@ -64,16 +64,16 @@ class AlgebraBlock(LevelBlock):
         return [self.bad]
 
     def bits(self, triple: Triple) -> tuple[int, int]:
-        """About the bit lengths of numerators and denominator of `fraction`."""
+        """Return the approximate bit lengths of numerators and denominator of `fraction`."""
         U, V, W = (max((int(abs(c.p).bit_length()) for c in entry.polynomial.coeffs()), default=1) for entry in triple)
         if triple[2].polynomial.degree() == 0:
-            below = int(sum(entry.polynomial.denom().bit_length() for entry in triple))
-            return max(U, V) + below, W + below
+            denominator_bits = int(sum(entry.polynomial.denom().bit_length() for entry in triple))
+            return max(U, V) + denominator_bits, W + denominator_bits
         return (self.algebra.degree - 1) * W + max(U, V), self.algebra.degree * W
 
     @property
     def slack(self) -> int:
-        """By so much `bits` may be wrong."""
+        """The largest error of `bits`."""
         largest = max(abs(entry.p) for entry in self.algebra.chi.coeffs())
         return int(self.algebra.degree**2 * (largest.bit_length() + self.algebra.degree + 3))
 
@@ -85,13 +85,15 @@ class AlgebraBlock(LevelBlock):
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
-            above, below = over_one(e for z in (U, V) for e in (z / W).coefficients)
-            return above, below, below
+            numerators, denominator = over_one(e for z in (U, V) for e in (z / W).coefficients)
+            return numerators, denominator, denominator
         cofactor, norm = _adjugate(W)
-        above = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
-        rest, part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
-        common = common_part([norm.p, *above], self.bad**4 * part)  # taken out once rather than from every coordinate
-        return [entry // common for entry in above], norm.p // common, rest
+        numerators = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
+        coprime_part, part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
+        common = common_part(
+            [norm.p, *numerators], self.bad**4 * part
+        )  # taken out once rather than from every coordinate
+        return [entry // common for entry in numerators], norm.p // common, coprime_part
 
     def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
         """A number with the primes at which form and denominator may cancel; None if they may at all.
@@ -126,14 +128,14 @@ class AlgebraBlock(LevelBlock):
             return None
 
         def residue(element: EtaleElement) -> nmod:
-            above, below = element.polynomial.numer(), element.polynomial.denom()
-            return nmod_poly([int(c % prime) for c in above.coeffs()], prime)(root) / int(below % prime)
+            numerator, denominator = element.polynomial.numer(), element.polynomial.denom()
+            return nmod_poly([int(c % prime) for c in numerator.coeffs()], prime)(root) / int(denominator % prime)
 
         return residue
 
     @staticmethod
     def same(P: Triple, Q: Triple) -> bool:
-        """Whether two triples are one point."""
+        """Return whether two triples are the same point."""
         return same_point(P, Q)
 
 
@@ -142,9 +144,9 @@ class ShortElements:
 
     def __init__(self, algebra: EtaleAlgebra, bad: fmpz) -> None:
         self._algebra, self._power = algebra, bad**3
-        found: Any = algebra.chi.complex_roots()
+        roots: Any = algebra.chi.complex_roots()
         # Balls: roots may be beyond the range of doubles.
-        self._powers = [[root**k for k in range(algebra.degree)] for root, _ in found if not root.imag < 0]
+        self._powers = [[root**k for k in range(algebra.degree)] for root, _ in roots if not root.imag < 0]
 
     def split(self, value: EtaleElement) -> tuple[EtaleElement, EtaleElement]:
         """A value, not zero: short element and scale."""
@@ -153,7 +155,7 @@ class ShortElements:
 
     @staticmethod
     def divisor(value: EtaleElement) -> EtaleElement:
-        """What `difference` and `combined` take for a division by this element."""
+        """Return the divisor for `difference` and `combined`."""
         return 1 / value
 
     def difference(
@@ -185,14 +187,14 @@ class ShortElements:
         """
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]
-        below = reduce(fmpz.lcm, (denominator for _, denominator in factors))
+        common_denominator = reduce(fmpz.lcm, (denominator for _, denominator in factors))
         scaled: list[fmpz] = []
         for (factor, denominator), term in zip(factors, terms, strict=True):
             column = fmpz_mat(degree, 1, [entry.p for entry in term.coefficients])
-            scaled += (factor * (below // denominator) * column).entries()
+            scaled += (factor * (common_denominator // denominator) * column).entries()
         matrix, below_lifts = lifts
         entries = (matrix * fmpz_mat(3 * degree, 1, scaled)).entries()
-        common = below * below_lifts
+        common = common_denominator * below_lifts
         for entry in entries:
             common = common.gcd(entry % common)
         integers = [entry // common for entry in entries] if common != 1 else entries
@@ -202,16 +204,16 @@ class ShortElements:
         return U, V, W
 
     def _multiplier(self, value: EtaleElement) -> EtaleElement | None:
-        """What makes a value short; None if it is."""
-        degree, below = self._algebra.degree, value.polynomial.denom()
-        integers = [(entry * below).p for entry in value.coefficients]
+        """Return a factor that makes a value short; None if it is short."""
+        degree, denominator = self._algebra.degree, value.polynomial.denom()
+        integers = [(entry * denominator).p for entry in value.coefficients]
         residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))
         part = self._power.gcd(self._algebra.norm(residue).p % self._power)
         # About the absolute values at the roots.
         smallest = max(abs(entry) for entry in integers) * _LEAST
         sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
         lengths = [max(smallest, abs(value).mid()) for value in sums]
-        if below == 1 and part < _SHORT and max(lengths) < _SHORT * min(lengths):
+        if denominator == 1 and part < _SHORT and max(lengths) < _SHORT * min(lengths):
             return None
         # All b with b value = 0 modulo `part`.
         rows = (residue.matrix.transpose() if part != 1 else residue.matrix).numer_denom()[0].tolist()
@@ -233,20 +235,20 @@ class ShortElements:
             row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
             short = self._algebra.convert(fmpq_poly(row))
             if without(self._algebra.norm(short).p, self._power) in (1, -1):
-                return short * fmpq(below, part)
-        return None if below == 1 else self._algebra.convert(below)
+                return short * fmpq(denominator, part)
+        return None if denominator == 1 else self._algebra.convert(denominator)
 
 
 @lru_cache
 def _signs(count: int) -> list[tuple[int, ...]]:
     """Vectors of up to four 1 and -1, else 0, up to sign, those with few entries first."""
-    found = []
+    vectors = []
     for entries in range(1, min(count, 4) + 1):
-        for places in combinations(range(count), entries):
+        for positions in combinations(range(count), entries):
             for signs in product((1, -1), repeat=entries - 1):
-                chosen = dict(zip(places, (1, *signs), strict=True))
-                found.append(tuple(chosen.get(k, 0) for k in range(count)))
-    return found
+                chosen = dict(zip(positions, (1, *signs), strict=True))
+                vectors.append(tuple(chosen.get(k, 0) for k in range(count)))
+    return vectors
 
 
 def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:

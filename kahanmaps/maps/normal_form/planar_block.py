@@ -53,7 +53,7 @@ class PlanarBlock:
         return b * b * c * c - 4 * (a * c * c * c + b * b * b * d) + 18 * (a * b * c * d) - 27 * (a * a * d * d)
 
     def image(self, point: Sequence[Any]) -> Triple:
-        """Psi(U : V : W), content not removed; (0, 0, 0) where Psi has no value."""
+        """Return Psi(U : V : W), with its content; (0, 0, 0) at an indeterminacy point of Psi."""
         U, V, W = point
         UU, UV, VV = U * U, U * V, V * V
         p, q, r = self.D
@@ -64,27 +64,27 @@ class PlanarBlock:
         )
 
     def preimage(self, point: Sequence[Any]) -> Triple:
-        """The inverse of Psi at (U : V : W), content not removed."""
+        """Return the preimage of (U : V : W) under Psi, with its content."""
         U, V, W = point
-        above, right, below = self.image((U, V, -W))
-        return -above, -right, below
+        first, second, third = self.image((U, V, -W))
+        return -first, -second, third
 
     def h(self, U: Any, V: Any) -> Any:
         """The cubic form."""
         return (self.a * U + self.b * V) * (U * U) + (self.c * U + self.d * V) * (V * V)
 
     def level(self, point: Sequence[Any]) -> tuple[Any, Any]:
-        """The conserved ratio h : W (W^2 + D), numerator and denominator."""
+        """Return numerator and denominator of the conserved ratio h : W (W^2 + D)."""
         U, V, W = point
         p, q, r = self.D
         return self.h(U, V), W * (W * W + p * (U * U) + q * (U * V) + r * (V * V))
 
 
 def determinant(P: Sequence[Any], Q: Sequence[Any], R: Sequence[Any]) -> Any:
-    """det(P, Q, R), zero for three points on a line."""
+    """Return det(P, Q, R), which is 0 for three collinear points."""
     return P[0] * (Q[1] * R[2] - Q[2] * R[1]) - P[1] * (Q[0] * R[2] - Q[2] * R[0]) + P[2] * (Q[0] * R[1] - Q[1] * R[0])
 
 
 def same_point(P: Sequence[Any], Q: Sequence[Any]) -> bool:
-    """Whether two triples are proportional (neither of them zero)."""
+    """Return whether two nonzero triples are proportional."""
     return bool(P[0] * Q[1] == P[1] * Q[0] and P[0] * Q[2] == P[2] * Q[0] and P[1] * Q[2] == P[2] * Q[1])

@@ -1,11 +1,11 @@
-"""A plane over Q in integers: primitive triples, and what the bad primes are.
+"""Planes over Q in integers: primitive triples, and the bad primes.
 
-h and the start are scaled such that h is a primitive integer form and (U, V, W) integers without a common factor; eps
-is in that scale. Psi(P_k) is quadratic in the triple P_k, and its content has to go, or the numbers would double
-their length with every step. For primes that do not divide 6 disc(h) den(level) the content of Psi(P_k) is W_{k-1}, the
-last coordinate of the point before P_k (docs/mathematics.md proves it): these are the natural lifts of `tau`. Single
-steps take their content out by gcds: long orbits do not go by them, but those on singular cubics, whose numbers hardly
-grow.
+h and the initial point are scaled such that h is a primitive integer form and (U, V, W) are integers without a common
+factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k, and its content must be removed: otherwise the
+numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level) the content of
+Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
+lifts of `tau`. Single steps remove the content by gcds. They are used for short orbits, and for orbits on singular
+cubics, whose numbers hardly grow.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ class LevelBlock(ABC):
 
     @property
     def is_constant(self) -> bool:
-        """Whether every step leads to the start: h = 0, or the start is the origin."""
+        """Whether the initial point is fixed because h = 0 or it is the origin."""
         return bool(self.block.is_zero or (self.start[0] == 0 and self.start[1] == 0))
 
     @cached_property
     def level(self) -> Any:
-        """h / (W (W^2 + D)), conserved; None where the first step has no value."""
-        above, below = self.block.level(self.start)
-        return None if below == 0 else (fmpq(1) * above) / below
+        """The conserved level h / (W (W^2 + D)); None if the first step is not defined."""
+        numerator, denominator = self.block.level(self.start)
+        return None if denominator == 0 else (fmpq(1) * numerator) / denominator
 
     @cached_property
     def delta(self) -> Any:
@@ -82,12 +82,12 @@ class IntegerBlock(LevelBlock):
     """
 
     def __init__(self, cubic: Sequence[fmpq], eps: fmpq, u: fmpq, v: fmpq) -> None:
-        integers, below = over_one(cubic)
+        integers, denominator = over_one(cubic)
         common = content(integers)
         if common == 0:
             common = fmpz(1)
         self.block = PlanarBlock(*(entry // common for entry in integers))
-        self.scale: fmpq = 2 * eps * fmpq(common, below)
+        self.scale: fmpq = 2 * eps * fmpq(common, denominator)
         (U, V), W = over_one((u * self.scale, v * self.scale))
         self.start = U, V, W
 
@@ -104,7 +104,7 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def numbers(self) -> PlaneIntegers:
-        """How values of tau functions are kept."""
+        """The representation of the values of tau functions."""
         return PlaneIntegers(self.power)
 
     @property
@@ -126,7 +126,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def bits(triple: IntegerTriple) -> tuple[int, int]:
-        """About the bit lengths of numerators and denominator of `fraction`."""
+        """Return the approximate bit lengths of numerators and denominator of `fraction`."""
         return int(max(triple[0].bit_length(), triple[1].bit_length())), int(triple[2].bit_length())
 
     @staticmethod
@@ -142,22 +142,22 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def same(P: IntegerTriple, Q: IntegerTriple) -> bool:
-        """Whether two primitive triples are one point."""
+        """Return whether two primitive triples are the same point."""
         return P[2] in (Q[2], -Q[2]) and tuple(P) in (tuple(Q), tuple(-entry for entry in Q))
 
     @staticmethod
     def integral(triple: Triple) -> IntegerTriple:
-        """A rational triple as a primitive one."""
+        """Return a rational triple as a primitive integer triple."""
         return primitive(_cleared([triple])[0])
 
     @staticmethod
     def residue_map(prime: int) -> Callable[[fmpz], nmod] | None:
-        """How integers are reduced modulo a prime."""
+        """Return the map that reduces integers modulo a prime."""
         return lambda entry: nmod(entry, prime)
 
     @staticmethod
     def shortest(triple: IntegerTriple) -> IntegerTriple:
-        """The triple over its content."""
+        """Divide the triple by its content."""
         return primitive(triple)
 
 
@@ -188,7 +188,7 @@ def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
 
 
 def primitive(triple: Sequence[fmpz]) -> IntegerTriple:
-    """The triple over its content."""
+    """Divide the triple by its content."""
     common = content(triple)
     U, V, W = triple
     return (U, V, W) if common <= 1 else (U // common, V // common, W // common)

@@ -1,10 +1,11 @@
-"""Rational points that are kept as their primitive triples in the planes; x is put together only when asked for.
+"""Rational points stored as primitive triples in the planes; x is computed from them only on demand.
 
 x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
-product of the W_i cost a few multiplications. In lowest terms they are after three more things: the gcds of the W_i
-among each other; the primes of the fixed numbers (denominators of alpha, beta and of the level, and h_i(beta,
--alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides h(beta, -alpha)); and, where
-h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits go every plane by itself.
+product of the W_i take a few multiplications. To reduce them to lowest terms, three kinds of common factors must be
+removed: the gcds of the W_i with each other; the primes of the fixed numbers (denominators of alpha, beta and of the
+level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides
+h(beta, -alpha)); and, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed in each plane
+separately.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _POWER = 3
 
 @dataclass(frozen=True)
 class _Row:
-    """One coordinate: sum of (alpha_i U_i + beta_i V_i) / (below W_i) over the planes of `support`, with integers."""
+    """A coordinate: the sum of (alpha_i U_i + beta_i V_i) / (below W_i) over the planes of `support`, with integers."""
 
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
@@ -45,18 +46,21 @@ class _Row:
 
 
 class Assembly:
-    """How points are put together from triples: for blocks and, for each, the rows of x = sum of R (u, v)."""
+    """The conversion of triples to points x = sum of R (u, v), for blocks and the matrix R of each."""
 
     def __init__(self, blocks: Sequence[Block], matrices: Sequence[Sequence[Sequence[fmpq]]]) -> None:
         self.blocks = blocks
         self.dim = len(matrices[0])
         self.rows: list[_Row] = []
         for r in range(self.dim):
-            forms = [[entry / one.scale for entry in table[r]] for one, table in zip(blocks, matrices, strict=True)]
+            forms = [
+                [entry / planar_block.scale for entry in table[r]]
+                for planar_block, table in zip(blocks, matrices, strict=True)
+            ]
             support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
-            _, below = over_one(chain(*forms))
-            integers = [tuple((entry * below).p for entry in forms[i]) for i in support]
-            factors, dividing = [below], []
+            _, denominator = over_one(chain(*forms))
+            integers = [tuple((entry * denominator).p for entry in forms[i]) for i in support]
+            factors, dividing = [denominator], []
             for i, form in zip(support, integers, strict=True):
                 block = blocks[i]
                 if block.is_constant:
@@ -70,7 +74,7 @@ class Assembly:
                     dividing.append(i)
                 else:
                     factors.append(value)
-            self.rows.append(_Row(support, tuple(integers), below, radical(*factors), tuple(dividing)))
+            self.rows.append(_Row(support, tuple(integers), denominator, radical(*factors), tuple(dividing)))
         self.fixed = radical(*(row.fixed for row in self.rows))
         # The numbers of the rows with the same support, and the integers of their forms.
         self.by_support: dict[tuple[int, ...], tuple[list[int], fmpz_mat]] = {}
@@ -80,13 +84,13 @@ class Assembly:
             self.by_support[support] = numbers, fmpz_mat(len(table), len(table[0]), list(chain(*table)))
         self.below = reduce(fmpz.lcm, (row.below for row in self.rows), fmpz(1))
         zeros = [[fmpz(0)] * len(matrix[0]) for matrix in matrices]
-        whole = []
+        table_rows = []
         for row in self.rows:
-            known, factor = dict(zip(row.support, row.forms, strict=True)), self.below // row.below
-            whole += [entry * factor for i, zero in enumerate(zeros) for entry in known.get(i, zero)]
-        self.forms = fmpz_mat(self.dim, len(whole) // self.dim, whole)  # of all rows, over one denominator
+            forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.below // row.below
+            table_rows += [entry * factor for i, zero in enumerate(zeros) for entry in forms_by_plane.get(i, zero)]
+        self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, over one denominator
         # By so many bits numerators may be longer than the products of the triples they are made of.
-        largest = max(map(abs, whole))
+        largest = max(map(abs, table_rows))
         self.excess = int(max(self.below.bit_length(), (self.dim * largest).bit_length()))
         self.excess += sum(block.slack for block in blocks)
 
@@ -101,9 +105,11 @@ class PlanesPoint:
 
     @property
     def bits(self) -> int:
-        """About the bit length of the largest of the integers over one common denominator."""
+        """The approximate bit length of the largest integer over one common denominator."""
         pairs = [block.bits(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
-        return sum(below for _, below in pairs) + max(0, *(above - below for above, below in pairs))
+        return sum(denominator_bits for _, denominator_bits in pairs) + max(
+            0, *(numerator_bits - denominator_bits for numerator_bits, denominator_bits in pairs)
+        )
 
     @cached_property
     def _fractions(self) -> list[tuple[list[fmpz], fmpz, fmpz]]:
@@ -117,9 +123,9 @@ class PlanesPoint:
         `bits` is a few bits off, and much too high where planes have denominators in common.
         """
         if self._height is None:
-            numerators, below = self.common()
-            largest = max(map(abs, [*numerators, below]))
-            self._height = int((largest // content([below, *numerators])).bit_length())
+            numerators, denominator = self.common()
+            largest = max(map(abs, [*numerators, denominator]))
+            self._height = int((largest // content([denominator, *numerators])).bit_length())
         return self._height
 
     def exceeding(self, limit: int) -> int:
@@ -140,12 +146,12 @@ class PlanesPoint:
 
     def common(self) -> tuple[list[fmpz], fmpz]:
         """Numerators of all coordinates over one denominator; what the W_i have in common is left in both."""
-        column, product = _scaled([(above, W) for above, W, _ in self._fractions])
+        column, product = _scaled([(numerators, W) for numerators, W, _ in self._fractions])
         return (self._assembly.forms * column).entries(), self._assembly.below * product
 
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, reduced, denominators positive."""
-        planes = [(above, W) for above, W, _ in self._fractions]
+        planes = [(numerator, W) for numerator, W, _ in self._fractions]
         suspects = fmpz(1)  # with all primes that divide two of the W
         *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest is only reduced
         while others:
@@ -156,13 +162,13 @@ class PlanesPoint:
         for _, _, primes in self._fractions:
             suspects = suspects * primes
         modulus = (self._assembly.fixed * suspects) ** _POWER
-        residues = [([entry % modulus for entry in above], W % modulus) for above, W in planes]
-        whole, small = self._fractions_of(planes), self._fractions_of(residues)
+        residues = [([entry % modulus for entry in numerator], W % modulus) for numerator, W in planes]
+        fractions, reduced = self._fractions_of(planes), self._fractions_of(residues)
         divisors: dict[tuple[int, ...], fmpz] = {}  # one gcd for all rows with the same form
         pairs = []
-        for row, (above, below), rest in zip(self._assembly.rows, whole, small, strict=True):
-            if above == 0:
-                pairs.append((above, fmpz(1)))
+        for row, (numerator, denominator), residue in zip(self._assembly.rows, fractions, reduced, strict=True):
+            if numerator == 0:
+                pairs.append((numerator, fmpz(1)))
                 continue
             common = fmpz(1)
             for i, form in zip(row.support, row.forms, strict=True):
@@ -173,48 +179,48 @@ class PlanesPoint:
                         divisors[key] = sum(map(mul, map(fmpz, key[1:]), planes[i][0]), fmpz(0)).gcd(planes[i][1])
                     common = common * divisors[key]
             if common != 1:
-                above, below = divide_exactly((above, below), common)
-                common = _common_part(above, below, modulus)
+                numerator, denominator = divide_exactly((numerator, denominator), common)
+                common = _common_part(numerator, denominator, modulus)
             else:
-                common = _common_part(*rest, modulus)
+                common = _common_part(*residue, modulus)
             power = modulus
             while common != 1:
-                above, below = above // common, below // common
+                numerator, denominator = numerator // common, denominator // common
                 if is_all(common, power):
                     break
                 power = power * power  # a prime may be there to a high power
-                common = _common_part(above, below, power)
-            pairs.append((above, below) if below > 0 else (-above, -below))
+                common = _common_part(numerator, denominator, power)
+            pairs.append((numerator, denominator) if denominator > 0 else (-numerator, -denominator))
         return pairs
 
     def _fractions_of(self, planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, from numerators and W of the planes, or residues of these."""
-        found: dict[int, tuple[fmpz, fmpz]] = {}
+        fractions: dict[int, tuple[fmpz, fmpz]] = {}
         rows = self._assembly.rows
         for support, (numbers, forms) in self._assembly.by_support.items():
             column, product = _scaled([planes[i] for i in support])
-            above = (forms * column).entries()
-            found |= {k: (entry, rows[k].below * product) for k, entry in zip(numbers, above, strict=True)}
-        return [found[k] for k in range(len(rows))]
+            numerators = (forms * column).entries()
+            fractions |= {k: (entry, rows[k].below * product) for k, entry in zip(numbers, numerators, strict=True)}
+        return [fractions[k] for k in range(len(rows))]
 
     def rationals(self) -> tuple[fmpq, ...]:
-        """The coordinates as fmpq (whose constructor runs a gcd of its own)."""
-        return tuple(fmpq(above, below) for above, below in self.lowest_terms())
+        """Return the coordinates as fmpq (whose constructor runs another gcd)."""
+        return tuple(fmpq(numerator, denominator) for numerator, denominator in self.lowest_terms())
 
 
 def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fmpz]:
     """The numerators of planes, each times the W of the others, in one column; and the product of all W."""
-    *before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
-    behind = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
-    others = (some * more for some, more in zip(before, behind, strict=True))
-    column = [entry * other for (above, _), other in zip(planes, others, strict=True) for entry in above]
+    *products_before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
+    products_after = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
+    others = (some * after for some, after in zip(products_before, products_after, strict=True))
+    column = [entry * other for (numerators, _), other in zip(planes, others, strict=True) for entry in numerators]
     return fmpz_mat(len(column), 1, column), product
 
 
-def _common_part(above: fmpz, below: fmpz, modulus: fmpz) -> fmpz:
-    """What two numbers and the modulus have in common: all of it, unless one of its primes is there to a high power."""
-    common = modulus.gcd(above % modulus)
-    return common if common == 1 else common.gcd(below % common)
+def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
+    """Return a common factor of two numbers and the modulus: all of it, except high powers of primes."""
+    common = modulus.gcd(numerator % modulus)
+    return common if common == 1 else common.gcd(denominator % common)
 
 
 class NormalSteps:
@@ -248,7 +254,7 @@ class NormalSteps:
         return blocks, Assembly(blocks, [self.splitting.matrix(i) for i in range(len(planes))])
 
     def points(self, start: Sequence[Any]) -> Iterator[PlanesPoint]:
-        """The orbit, as long as the map has a value."""
+        """Yield the orbit, as long as the map is defined."""
         blocks, assembly = self.blocks(start)
-        for found in zip(*(triples(block) for block in blocks), strict=False):
-            yield PlanesPoint(assembly, found)
+        for triples_at_step in zip(*(triples(block) for block in blocks), strict=False):
+            yield PlanesPoint(assembly, triples_at_step)

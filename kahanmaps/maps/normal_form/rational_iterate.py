@@ -1,15 +1,15 @@
-"""The n-th iterate over Q, and what an orbit over Q comes to first: a pole, the end of its budget, or step n.
+"""The n-th iterate over Q, unless the orbit reaches a pole or exceeds its budget before step n.
 
-An orbit is stepped exactly while its numbers are short. From there on three things decide, and the order of events is
-that of an orbit which is stepped all the way.
+An orbit is computed exactly while its numbers are short. After that it ends at the same step as an orbit by single
+steps, which is determined as follows.
 
-* Heights are known at a few steps, farther and farther apart. But for O(1) they are convex in the step (a polynomial
-  of degree 2, or linear), so what is within the budget at both ends is so in between, and from a rise it follows where
-  the budget is exceeded at the latest; beyond that step nothing has to be known.
-* Poles up to there are found modulo random primes of 61 bits and put to the test over Q: a pole over Q is one modulo
-  every prime.
-* A plane that comes back, or moves on a parabolic level, is no burden: its poles are known for all steps at once, and
-  its numbers stay short. If all planes do so, any n is within reach.
+* Heights are computed at a few steps, at increasing distances. Up to O(1) they are convex functions of the step
+  (a polynomial of degree 2, or linear). So if the height is within the budget at two steps, it is within the budget in
+  between, and a rise shows where the budget is exceeded at the latest; later steps are irrelevant.
+* Poles up to there are found modulo random primes of 61 bits and verified over Q: a pole over Q is a pole modulo every
+  prime.
+* The poles of a plane that is periodic, or whose level is parabolic, are known for all steps at once, and its numbers
+  stay short. If this holds for all planes, any n can be reached.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_po
 from kahanmaps.maps.normal_form.planes_point import Block, NormalSteps, PlanesPoint
 
 _RISE = 16  # steps over which a rise of the heights is more than a fluctuation
-_WALKED = 256  # steps taken exactly at first,
-_LIGHT = 8192  # as long as the numbers have at most so many bits
-_SHORT = 24  # up to here a plane is stepped
+_EXACT_STEPS = 256  # taken first,
+_EXACT_BITS = 8192  # as long as the numbers have at most this bit length
+_SINGLE_STEPS = 24  # up to this step a plane is computed by single steps
 _PRIMES = 20
-# Where no limit is given: longer numbers take minutes. So many steps modulo a prime are cheaper than long numbers.
-_MOST_BITS, _LOOKED = 1 << 28, 250_000
+# The default limits: longer numbers take minutes; this number of steps modulo a prime is faster than long numbers.
+_MAX_BITS, _MAX_MODULAR_STEPS = 1 << 28, 250_000
 
 
 class OverBudget(Exception):
@@ -60,7 +60,7 @@ class OrbitInPlanes:
         triples = steps.splitting.triples(x)
         self._planes = [_Plane(plane.block, P) for plane, P in zip(steps.splitting.planes, triples, strict=True)]
         self._is_lazy = all(plane.lazy for plane in self._planes)
-        self._limit = _MOST_BITS if max_bits is None else max_bits
+        self._limit = _MAX_BITS if max_bits is None else max_bits
         self._end: SingularStep | OverBudget | None = None
         self._period: int | None = None
         self._walked: list[PlanesPoint] = []  # the first steps, exactly
@@ -74,7 +74,7 @@ class OrbitInPlanes:
             if step > 0 and value == self._walked[0]:
                 self._period = step
                 break
-            if step == _WALKED or value.bits > _LIGHT:
+            if step == _EXACT_STEPS or value.bits > _EXACT_BITS:
                 break
         else:
             self._end = _no_value(len(self._walked) - 1)
@@ -91,9 +91,9 @@ class OrbitInPlanes:
         step, value, bits = self._sighted(n)
         pole = self._first_pole(step, value)
         if pole is not None:
-            before = self._point(pole - 1)
-            if more := before.exceeding(self._limit):
-                raise OverBudget(pole - 1, more)
+            preimage = self._point(pole - 1)
+            if excess_bits := preimage.exceeding(self._limit):
+                raise OverBudget(pole - 1, excess_bits)
             raise _no_value(pole - 1)
         if bits != 0:
             raise OverBudget(step, bits)
@@ -109,7 +109,7 @@ class OrbitInPlanes:
         """
         step = max(1, min(self._far, n - 1))
         target = n if self._is_lazy else _halved(n, step)
-        before: tuple[int, int] | None = None
+        previous: tuple[int, int] | None = None
         while True:
             try:
                 value = self._point(target)
@@ -118,15 +118,15 @@ class OrbitInPlanes:
             bits = value.exceeding(self._limit)
             if target == n or bits:
                 return target, value, bits
-            here = target, value.bits
-            if before is not None and here[0] - before[0] >= _RISE and here[1] > before[1]:
+            current = target, value.bits
+            if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
                 # At four times the budget, by a line, it certainly is over.
-                beyond = 1 + 4 * self._limit * (here[0] - before[0]) // (here[1] - before[1])
-                if beyond <= min(n - target, _LOOKED):
+                beyond = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
+                if beyond <= min(n - target, _MAX_MODULAR_STEPS):
                     return target + beyond, None, None
-            before = here
+            previous = current
             # Four times the size is borne, but not more: heights may grow like n^2.
-            target = _halved(n, target) if 4 * here[1] <= self._limit else min(n, target + target // 2)
+            target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
 
     def _point(self, n: int) -> PlanesPoint:
         """Phi^n(start), poles on the way passed over. Raises SingularStep at a pole."""
@@ -137,7 +137,7 @@ class OrbitInPlanes:
 
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
         """The first step up to n without a value; `value` is the n-th, to be compared modulo a prime."""
-        known = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
+        known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
         busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
         generator = random.Random()
         for _ in range(_PRIMES):
@@ -159,7 +159,7 @@ class OrbitInPlanes:
                     break
                 poles.append(pole)
             else:
-                return min([*known, *poles], default=None)
+                return min([*known_poles, *poles], default=None)
         raise ArithmeticError("the orbit modulo many primes met a pole that it has not: please report this")
 
 
@@ -171,31 +171,31 @@ def _halved(n: int, step: int) -> int:
 
 
 def _no_value(step: int) -> SingularStep:
-    return SingularStep(f"the map has no value at step {step}")
+    return SingularStep(f"the map is not defined at step {step}")
 
 
 class _Plane:
-    """What is known of the orbit in one plane for all steps: whether it is lazy, then its period and its pole.
+    """The data of the orbit in one plane for all steps: whether it is lazy, its period and its pole.
 
-    Lazy means that its numbers stay short: it comes back after `period` steps, or its level is parabolic (`period` is
-    None). `pole` is the first step then that has no value, None for none.
+    Lazy means that its numbers stay short: it returns after `period` steps, or its level is parabolic (`period` is
+    None). `pole` is the first step then that is not defined, None for none.
     """
 
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
-        found = plane_period_over_rationals(block, start)
-        self.period = found.period
-        self.lazy = found.period is not None or found.kind in (PeriodKind.ADDITIVE, PeriodKind.NO_VALUE)
+        period = plane_period_over_rationals(block, start)
+        self.period = period.period
+        self.lazy = period.period is not None or period.kind in (PeriodKind.ADDITIVE, PeriodKind.NO_VALUE)
         self.pole: int | None = None
-        if found.kind is PeriodKind.NO_VALUE:
+        if period.kind is PeriodKind.NO_VALUE:
             self.pole = 1
-        elif found.kind is PeriodKind.ADDITIVE:
+        elif period.kind is PeriodKind.ADDITIVE:
             r = translation.parabolic_ratio(block, start)
             if not (r is None or isinstance(r, fmpq)):  # an element of a number field: is it rational?
                 r = r.coefficients[0] if not any(entry != 0 for entry in r.coefficients[1:]) else None
             self.pole = int(r.p) if r is not None and r.q == 1 and r > 0 else None
-        elif found.period is not None and found.meets_pole is not False:
+        elif period.period is not None and period.meets_pole is not False:
             try:
-                stepped_over(block, start, found.period)
+                stepped_over(block, start, period.period)
             except _Pole as pole:
                 self.pole = pole.step
 
@@ -205,11 +205,11 @@ class _Plane:
 
 
 class _Pole(SingularStep):
-    """Attribute: `step`, the first one that has no value."""
+    """Attribute: `step`, the first one that is not defined."""
 
     def __init__(self, step: int) -> None:
         self.step = step
-        super().__init__(f"the map has no value at step {step - 1}")
+        super().__init__(f"the map is not defined at step {step - 1}")
 
 
 def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
@@ -225,14 +225,14 @@ def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
 
 def _reached(block: Block, n: int) -> Triple:
     """P_n; poles on the way are passed over, unless it has to be stepped. Raises SingularStep then."""
-    if n <= _SHORT or block.is_constant or block.level is None:
+    if n <= _SINGLE_STEPS or block.is_constant or block.level is None:
         points = list(islice(tau.triples(block), n + 1))
         if len(points) <= n:
             raise _no_value(len(points) - 1)
         return points[n]
-    found = tau.iterate(block, n)
-    if found is not None:
-        return found
+    point = tau.iterate(block, n)
+    if point is not None:
+        return point
     over_field, (U, V, W), _ = block.lifts
     start = (U / W, V / W, W / W)
     try:

@@ -51,8 +51,8 @@ class _Torsion:
             return None
         else:
             raise _Divisor((Y - T).gcd(f))
-        above = (slope * slope % f * self.c - X - Z) % f
-        return above, (slope * (X - above) - Y) % f
+        x_sum = (slope * slope % f * self.c - X - Z) % f
+        return x_sum, (slope * (X - x_sum) - Y) % f
 
 
 def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> Any:
@@ -87,26 +87,26 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
         prime = next(n for n in range(prime + 1, 2 * prime) if fmpz(n).is_prime())
         if q % prime == 0:
             continue
-        f, found = divisions[prime], None
-        while found is None:
+        f, residue = divisions[prime], None
+        while residue is None:
             torsion = _Torsion(f, c, A)  # which trace fits on the torsion points where f is 0?
             try:
                 once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
                 twice = (pow(once[0], q, f), once[1] * pow(once[1], q, f) % f)
-                wanted = torsion.add(twice, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1)))
+                target = torsion.add(twice, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1)))
                 image: Point = None
-                for t in range(1, prime // 2 + 1) if wanted else ():
+                for t in range(1, prime // 2 + 1) if target else ():
                     image = torsion.add(image, once)
-                    if image is not None and wanted is not None and image[0] == wanted[0]:
-                        found = t if image[1] == wanted[1] else prime - t
+                    if image is not None and target is not None and image[0] == target[0]:
+                        residue = t if image[1] == target[1] else prime - t
                         break
                 else:
-                    if wanted is not None:
+                    if target is not None:
                         raise AssertionError("no trace of Frobenius fits: it would be a mistake of ours")
-                    found = 0
+                    residue = 0
             except _Divisor as smaller:
                 f = smaller.divisor
-        trace += modulus * ((found - trace) * pow(modulus, -1, prime) % prime)
+        trace += modulus * ((residue - trace) * pow(modulus, -1, prime) % prime)
         modulus *= prime
     return trace, modulus
 
@@ -132,9 +132,13 @@ class _DivisionPolynomials:
         if n not in self._known:
             m, odd = divmod(n, 2)
             if odd:
-                left = self[m + 2] * self[m] * self[m] * self[m]
-                right = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]
-                self._known[n] = left - right * self._square if m % 2 else left * self._square - right
+                first_product = self[m + 2] * self[m] * self[m] * self[m]
+                second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]
+                self._known[n] = (
+                    first_product - second_product * self._square
+                    if m % 2
+                    else first_product * self._square - second_product
+                )
             else:
                 bracket = self[m + 2] * self[m - 1] * self[m - 1] - self[m - 2] * self[m + 1] * self[m + 1]
                 self._known[n] = self[m] * bracket

@@ -79,7 +79,7 @@ class Splitting:
 
     @property
     def dim(self) -> int:
-        """2m."""
+        """The dimension 2m."""
         return self.form.dim
 
     def matrix(self, plane: int) -> list[list[Any]]:
@@ -94,11 +94,11 @@ class Splitting:
         with self.field.working():
             z = (self._inverse * self.field.matrix(n, 1, list(x))).entries()
             z = [entry * self._scale for entry in z]
-            found = []
+            triples = []
             for plane in self.planes:
                 U, V = plane.residue(z[:m]), plane.residue(z[m:])
-                found.append((U, V, U * 0 + 1))
-            return found
+                triples.append((U, V, U * 0 + 1))
+            return triples
 
     def point(self, triples: Sequence[Triple]) -> tuple[Any, ...]:
         """The point with these homogeneous coordinates. Raises SingularStep where one of them is at infinity."""
@@ -158,8 +158,8 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
                 return context([int(c) for c in (polynomial(z) % factor).coeffs()] or [0])
 
             def coefficients(value: Any) -> list[Any]:
-                known = [field.convert(int(c)) for c in value.to_list()]
-                return known + [field.zero] * (degree - len(known))
+                coefficients_in_field = [field.convert(int(c)) for c in value.to_list()]
+                return coefficients_in_field + [field.zero] * (degree - len(coefficients_in_field))
 
         else:
             # The generator is a multiple of t that is integral.
@@ -193,8 +193,8 @@ def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
 def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:
     planes, lifts = [], []
     slope = form.chi.derivative()
-    for found in form.chi.complex_roots():
-        root: Any = found[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
+    for complex_root in form.chi.complex_roots():
+        root: Any = complex_root[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
         if root.imag < 0:
             continue
         real = bool(root.imag == 0)
@@ -208,11 +208,11 @@ def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[l
 
         block = PlanarBlock(*(value_at(_balls(c, field)) for c in form.coefficients))
         # chi / (t - root) by Horner's rule; divided by chi'(root) it is 1 at the root and 0 at the others.
-        chi, below = _balls(form.chi, field), value_at(_balls(slope, field))
+        chi, denominator = _balls(form.chi, field), value_at(_balls(slope, field))
         quotient = [chi[-1]]
         for coefficient in chi[-2:0:-1]:
             quotient.append(quotient[-1] * at + coefficient)
-        unit = [entry / below for entry in reversed(quotient)]
+        unit = [entry / denominator for entry in reversed(quotient)]
         if real:
             planes.append(Plane(f"t = {at.str(8, radius=False)}", 1, block, value_at, lambda value: [value]))
             lifts.append([unit])

@@ -1,4 +1,4 @@
-"""Tau functions: the points of an orbit in a plane as products of two Somos sequences a third of their length.
+"""Tau functions: the points of an orbit in a plane as products of terms of two Somos sequences of a third the length.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
@@ -15,9 +15,9 @@ and for a + b and a - b everything is bilinear (phi is psi or chi; there are no 
     phi_{a+b} phi_{a-b} = phi_{a+1} phi_{a-1} psi_b^2 - psi_{b+1} psi_{b-1} phi_a^2.
 
 psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4 with
-gamma = 1 - delta. The cube roots are taken out where 3 divides n. These are the sequences W and U of `somos`, whose
-terms follow from those of half the index: over Q integers prime to the bad primes, with scales that are never formed,
-since the numbers would grow by powers of the bad primes like everything else, with exponents quadratic in n.
+gamma = 1 - delta. For n divisible by 3 the cube roots are factored out. These are the sequences W and U of `somos`,
+whose terms follow from those of half the index: over Q they are integers coprime to the bad primes, times scales that
+are never computed, since they contain powers of the bad primes with exponents quadratic in n.
 docs/mathematics.md has the proofs. Source: ward-1948, for such sequences.
 """
 
@@ -36,7 +36,7 @@ _SHARED = 8  # so many points are taken from one table, which holds some ten tim
 
 
 def triples(block: Any) -> Iterator[Triple]:
-    """P_0, P_1, ... as `IntegerBlock.triples` gives them, up to signs, three times as fast.
+    """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
     What has to be remembered is less than the points between n/2 and n themselves.
     """
@@ -89,9 +89,9 @@ def table_near(block: Any) -> TauTable | None:
     return None
 
 
-def _over(triple: Triple, below: Any) -> Triple:
+def _over(triple: Triple, denominator: Any) -> Triple:
     U, V, W = triple
-    return U / below, V / below, W / below
+    return U / denominator, V / denominator, W / denominator
 
 
 def first_chi(P: Mapping[int, Triple], indices: Iterable[int]) -> dict[int, Any]:
@@ -119,7 +119,7 @@ class TauTable:
         self._product: tuple[int, Any] = (0, None)  # n and psi_{n-1} psi_n of the next point
 
     def points(self) -> Iterator[Triple]:
-        """P_2, P_3, ..., primitive, as long as the map has a value."""
+        """Yield P_2, P_3, ..., primitive, as long as the map is defined."""
         for n in count(_FIRST):
             point = self.point(n)
             if point[2] == 0:
@@ -129,7 +129,7 @@ class TauTable:
             self.chi.forget(n // 2 - 4)
 
     def point(self, n: int) -> Triple:
-        """P_n for n >= 2, primitive over Q."""
+        """Return P_n for n >= 2, primitive over Q."""
         psi, chi = self.psi, self.chi
         before, here, after = (psi.integer(n + k) for k in (-1, 0, 1))
         behind = self._product[1] if self._product[0] == n else before * here
@@ -139,5 +139,5 @@ class TauTable:
         # Scales, over that of the first term.
         ratio = chi.ratio(n)
         scales = [self._one, chi.part(n) / ratio, ratio / psi.part(n)]
-        found: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)
-        return found
+        point: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)
+        return point

@@ -1,18 +1,17 @@
 """The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
 
-In balls the formulas are those of `tau`, with natural lifts and without scales: they lose the fewest bits. For exact
-elements fewer operations do. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is found by doublings and additions.
-With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y) the point is
+In balls the formulas are those of `tau`, with natural lifts and without scales, since they lose the fewest bits. For
+exact elements there is a faster way. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is computed by doublings and
+additions. With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y), the point is
 
     P_n ~ chi_0 x (x - x_u) P_0 + chi_{-1} (Y - Y_u - m (x - x_u)) P_1 - chi_1 (Y - Y_u - m' (x - x_u)) P_{-1},
 
-m = (Y_u + 8 gamma)/x_u, m' = (Y_u - 8 gamma)/x_u, where u = (x_u, Y_u) is what the zero of chi is away from the base
-point (docs/mathematics.md). Where the
-level cubic is three lines (gamma = 0), Psi^3 is a projective map of each line: a 2 x 2 matrix to the power n. Where
-delta = 0 there is a formula for P_n: see `parabolic_ratio`.
+with m = (Y_u + 8 gamma)/x_u and m' = (Y_u - 8 gamma)/x_u, where u = (x_u, Y_u) is the difference between the zero of
+chi and the base point (docs/mathematics.md). If the level cubic consists of three lines (gamma = 0), Psi^3 is a
+projective map of each line, given by the power of a 2 x 2 matrix. If delta = 0, there is a formula for P_n: see
+`parabolic_ratio`.
 
-Poles are passed over: P_n is the value of the rational map Psi^n, also if an orbit that steps would have met W = 0
-before.
+P_n is the value of the rational map Psi^n, even if the orbit by single steps would reach a pole W = 0 before.
 """
 
 from __future__ import annotations
@@ -31,13 +30,13 @@ _STEPPED = 16  # up to this n one steps
 
 
 class NoTranslation(Exception):
-    """Doubling does not apply to this orbit: it has to be stepped."""
+    """Doublings do not apply to this orbit: it must be computed step by step."""
 
 
 def iterate(
     block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], bool], *, inexact: bool = False
 ) -> Triple:
-    """P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
+    """Return P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
     `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep where a
     pole is met before `n`, as far as the orbit is stepped (a few points from the start); NoTranslation where it meets
@@ -55,10 +54,10 @@ def iterate(
     points = _first_points(block, [start], min(n, _STEPPED if n <= _STEPPED else 4), is_zero)
     if len(points) > n:
         return points[n]
-    above, below = block.level(start)
-    if above == 0 or block.discriminant == 0:
+    numerator, denominator = block.level(start)
+    if numerator == 0 or block.discriminant == 0:
         return _parabolic(block, start, n)
-    level = above / below
+    level = numerator / denominator
     gamma = 1 - block.discriminant * level * level
     if is_zero(gamma):
         points = _first_points(block, points, n % 3 + 10, is_zero)
@@ -66,11 +65,11 @@ def iterate(
     for base in range(3, _BASES + 3):
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:
-            found = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
+            point = _by_curve(points[base - 3 : base + 2], gamma, n - base + 1, is_zero)
         else:
-            found = _doubled(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
-        if found is not None:
-            return found
+            point = _doubled(block, points[base - 3 :], gamma, n - base, is_zero) if n - base >= 8 else None
+        if point is not None:
+            return point
     raise NoTranslation
 
 
@@ -84,11 +83,11 @@ def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
     def square(point: Triple) -> Any:
         U, V, W = point
         p, q, r = block.D
-        below = p * (U * U) + q * (U * V) + r * (V * V)
-        return None if below == 0 else -(W * W) / below
+        denominator = p * (U * U) + q * (U * V) + r * (V * V)
+        return None if denominator == 0 else -(W * W) / denominator
 
-    here = square(start)
-    return None if here is None else (here - square(block.image(start)) + 1) / 2
+    square_at_start = square(start)
+    return None if square_at_start is None else (square_at_start - square(block.image(start)) + 1) / 2
 
 
 def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
@@ -98,16 +97,16 @@ def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
     root, which is multiplied by ((r - n)^2 - 1)/(r^2 - 1).
     """
     U, V, W = block.image(start)
-    here, after = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
+    point, image = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
     r = parabolic_ratio(block, start)
     if r is None:
-        u, v = (z + n * (w - z) for z, w in zip(here, after, strict=True))
+        u, v = (z + n * (w - z) for z, w in zip(point, image, strict=True))
         return u, v, W / W
-    rest, below = r - n, r * r - 1
-    factor = rest * (rest * rest - 1)
-    parts = [(z, (z * r * (r + 1) - w * below) / (3 * r)) for z, w in zip(here, after, strict=True)]
-    u, v = ((z - double) * r * below + double * factor for z, double in parts)
-    return u, v, rest * below
+    complement, denominator = r - n, r * r - 1
+    factor = complement * (complement * complement - 1)
+    parts = [(z, (z * r * (r + 1) - w * denominator) / (3 * r)) for z, w in zip(point, image, strict=True)]
+    u, v = ((z - double) * r * denominator + double * factor for z, double in parts)
+    return u, v, complement * denominator
 
 
 def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
@@ -116,7 +115,7 @@ def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: 
     for k in range(len(points) - 1, last):
         U, V, W = block.image(points[k])
         if is_zero(W):
-            raise SingularStep(f"the map has no value at step {k}")
+            raise SingularStep(f"the map is not defined at step {k}")
         if k:
             inverse = 1 / points[k - 1][2]
             U, V, W = U * inverse, V * inverse, W * inverse
@@ -131,8 +130,10 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
         return P
     # Coordinates (x, y) stand for x P + y Q, found from two entries of the triples that tell P and Q apart.
     i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
-    whole = P[i] * Q[j] - P[j] * Q[i]
-    (a, b), (c, d) = (((R[i] * Q[j] - R[j] * Q[i]) / whole, (P[i] * R[j] - P[j] * R[i]) / whole) for R in points[2:4])
+    determinant = P[i] * Q[j] - P[j] * Q[i]
+    (a, b), (c, d) = (
+        ((R[i] * Q[j] - R[j] * Q[i]) / determinant, (P[i] * R[j] - P[j] * R[i]) / determinant) for R in points[2:4]
+    )
     # The matrix takes (1, 0) to r (0, 1) and (0, 1) to (a, b), and (a, b) to a multiple of (c, d):
     # r a (0, 1) + b (a, b) ~ (c, d).
     if is_zero(a):
@@ -222,14 +223,14 @@ def _digits(n: int) -> list[tuple[int, int]]:
     >>> _digits(100)
     [(3, 3), (1, 2)]
     """
-    found, places = [], 0
+    digits, length = [], 0
     while n:
         zeros = (n & -n).bit_length() - 1
-        n, places = n >> zeros, zeros
+        n, length = n >> zeros, zeros
         digit = (n + 4) % 8 - 4
-        found.append((digit, places))
+        digits.append((digit, length))
         n -= digit
-    return found[::-1]
+    return digits[::-1]
 
 
 def _doubled(
@@ -239,9 +240,9 @@ def _doubled(
     # Lifts that are natural around this base point: the first two of them decide the rest.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):
-        below = P[k - 1][2]
+        denominator = P[k - 1][2]
         U, V, W = block.image(P[k])
-        P[k + 1] = (U / below, V / below, W / below)
+        P[k + 1] = (U / denominator, V / denominator, W / denominator)
     chi = first_chi(P, range(-2, 3))
     if any(is_zero(chi[k]) for k in (-2, -1, 0, 1)):
         return None

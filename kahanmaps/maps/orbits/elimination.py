@@ -1,4 +1,7 @@
-"""Fraction-free elimination on long integers whose minors share a known factor, as for maps of the commuting family."""
+"""Fraction-free Gaussian elimination (Bareiss' two-step algorithm) for integer systems whose minors share a factor.
+
+The equations of a step of a map of the commuting family are such systems.
+"""
 
 from __future__ import annotations
 
@@ -11,77 +14,82 @@ _USEFUL_BITS = 64
 _PRIME = 2**61 - 1
 
 
-def solve_fraction_free(matrix: fmpz_mat, right: fmpz_mat, candidate: fmpz) -> IntegerPoint | None:
-    """The solution of matrix x = right; powers of the integer `candidate` may divide the minors. None if in doubt.
+def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz) -> IntegerPoint | None:
+    """Solve matrix x = rhs over Q; return None where the matrix is singular or the elimination fails.
 
-    Two columns at a time. For maps of the commuting family the matrix has rank 2 modulo (nearly) every prime of the
-    denominator W, so that minors of order k share the (k - 2)-th power of W up to small primes. Taken out once, at
-    order 3, this keeps all later entries at twice the size of W instead of up to n times: the exact divisions by the
-    previous pivot then take out the higher powers by themselves. Where nothing is shared this is Bareiss' two-step
-    algorithm. That divisions are exact is assumed; what is found is tried in the equation.
+    Bareiss' two-step algorithm eliminates two columns at a time. For maps of the commuting family the matrix has rank 2
+    modulo (nearly) every prime of the denominator W of the point, so all minors of order k are divisible by W^(k - 2),
+    up to small primes. Dividing the minors of order 3 by W (`candidate_divisor`) keeps all later entries at twice the
+    length of W instead of up to n times: the exact divisions by the previous pivot remove the higher powers. If the
+    minors share nothing with `candidate_divisor`, this is the usual algorithm. The algorithm assumes that the divisions
+    are exact; the solution is verified in the equation.
     """
     n = matrix.nrows()
-    rows = [[*row, right[i, 0]] for i, row in enumerate(matrix.tolist())]
+    rows = [[*row, rhs[i, 0]] for i, row in enumerate(matrix.tolist())]
     previous = fmpz(1)
     for k in range(0, n - 1, 2):
-        a, b, below = rows[k], rows[k + 1], rows[k + 2 :]
+        a, b, rows_below = rows[k], rows[k + 1], rows[k + 2 :]
         pivot = (a[k] * b[k + 1] - a[k + 1] * b[k]) // previous
         if pivot == 0:
             return None
-        # Every entry below becomes the minor of order 3 that it makes with the two pivot rows, over the previous pivot.
+        # Each entry of the other rows becomes its minor of order 3 with the two pivot rows, over the previous pivot.
         minors = []
-        for row in below:
+        for row in rows_below:
             of_b = (a[k + 1] * row[k] - a[k] * row[k + 1]) // previous
             of_a = (b[k] * row[k + 1] - b[k + 1] * row[k]) // previous
             minors.append([pivot * row[j] + of_b * b[j] + of_a * a[j] for j in range(k + 2, n + 1)])
         divisor = previous
         if k == 0 and minors:
-            # A few entries decide what all share; the result is verified in the end.
+            # The divisor is found from a few entries only: the solution is verified at the end.
             entries = [entry for row in minors for entry in row]
-            divisor = _shared(candidate, entries[:: max(1, len(entries) // 3)])
-        for row, entries in zip(below, minors, strict=True):
+            divisor = _shared(candidate_divisor, entries[:: max(1, len(entries) // 3)])
+        for row, entries in zip(rows_below, minors, strict=True):
             row[k + 2 :] = entries if divisor == 1 else [entry // divisor for entry in entries]
         b[k + 1 :] = [pivot, *((a[k] * b[j] - b[k] * a[j]) // previous for j in range(k + 2, n + 1))]
         previous = pivot
     if any(rows[i][i] == 0 for i in range(n)):
         return None
-    # The triangular system, with one gcd of large numbers in all.
+    # Back substitution, with a single gcd of large numbers.
     numerator, denominator = rows[-1][n], rows[-1][n - 1]
     content = numerator.gcd(denominator)
     solution = [numerator // content]
     denominator = denominator // content
     for i in range(n - 2, -1, -1):
         value = denominator * rows[i][n]
-        for j, known in enumerate(solution, start=i + 1):
-            value -= rows[i][j] * known
+        for j, component in enumerate(solution, start=i + 1):
+            value -= rows[i][j] * component
         quotient, remainder = divmod(value, rows[i][i])
         if remainder != 0:
             content = remainder.gcd(rows[i][i])
-            missing = rows[i][i] // content
-            solution = [known * missing for known in solution]
-            denominator = denominator * missing
+            missing_factor = rows[i][i] // content
+            solution = [component * missing_factor for component in solution]
+            denominator = denominator * missing_factor
             quotient = value // content
         solution.insert(0, quotient)
-    # In lowest terms already: each new numerator is coprime to the factor that all others have just received.
+    # The point is in lowest terms: each new numerator is coprime to the factor by which the others were multiplied.
     sign = 1 if denominator > 0 else -1
-    found = IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
-    return found if is_the_solution(found, matrix, right) else None
+    point = IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
+    return point if is_unique_solution(point, matrix, rhs) else None
 
 
-def is_the_solution(found: IntegerPoint, matrix: fmpz_mat, right: fmpz_mat) -> bool:
-    """Whether matrix x = right has this solution and no other; False also if det is 0 modulo a certain prime only."""
+def is_unique_solution(point: IntegerPoint, matrix: fmpz_mat, rhs: fmpz_mat) -> bool:
+    """Return whether the point is the only solution of matrix x = rhs.
+
+    True is proved. False may be wrong: it is also returned if the determinant is 0 modulo 2^61 - 1 only.
+    """
     if not int(nmod_mat(matrix, _PRIME).det()):
         return False
-    return bool(matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator)
+    return bool(matrix * fmpz_mat(rhs.nrows(), 1, point.numerators) == rhs * point.denominator)
 
 
-def _shared(candidate: fmpz, values: list[fmpz]) -> fmpz:
-    """The part of `candidate` without small primes that divides the values, or 1 where it is not worth removing.
+def _shared(candidate_divisor: fmpz, values: list[fmpz]) -> fmpz:
+    """Return the part of `candidate_divisor` without small primes that divides all values, or 1 if it is short.
 
-    Small primes often divide minors of order 3 by accident and then not, to the power needed, those of higher order.
+    Small primes are left out: they often divide all minors of order 3 by chance, but not those of higher order to the
+    power needed.
     """
-    common, small_primes = candidate, fmpz.primorial_ui(fmpz(1000))
-    while (small := common.gcd(small_primes)) != 1:  # first of all: what is left often divides as it stands
+    common, small_primes = candidate_divisor, fmpz.primorial_ui(fmpz(1000))
+    while (small := common.gcd(small_primes)) != 1:  # first: what remains usually divides the values
         common = common // small
     for value in values:
         if (remainder := value % common) != 0:

@@ -1,8 +1,8 @@
-"""Orbits x, Phi(x), Phi^2(x), ... over any exact field or over balls: lazy, with an end that says what happened.
+"""Lazy iteration of orbits x, Phi(x), Phi^2(x), ... over any exact field or over balls.
 
-An orbit is walked with a `for` loop; afterwards `orbit.end` tells how it ended. Meeting the singular set or running
-out of the digit budget is no exception: what was computed is delivered. Heights of non-integrable orbits multiply
-with every step, so the budget is never absent by accident.
+An orbit is a `for` loop; afterwards `orbit.end` states how it ended. Reaching a singular point or the digit budget
+raises no exception: the points computed so far are delivered. Heights of non-integrable orbits grow by a factor with
+every step, so there is a default budget.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from kahanmaps.maps.implicit import Map, det_of
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.rational_orbit import RationalOrbit
 
-# Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
+# Normal forms are imported where they are used: most orbits do not need them, and start in half the time.
 if TYPE_CHECKING:
     from kahanmaps.family.system_normal_form import SystemNormalForm
     from kahanmaps.maps.normal_form.iterate import NthIterate
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
 DEFAULT_MAX_DIGITS = 200_000
-LONGEST_INPUT = 10_000  # digits of eps and of the start, unless --max-digits says more
-FIRST_POINTS = 3  # that an orbit remembers
+LONGEST_INPUT = 10_000  # digits of eps and of the initial point, unless --max-digits allows more
+FIRST_POINTS = 3  # kept by an orbit
 _DIGITS_PER_BIT = 0.30103
 
 
@@ -40,10 +40,10 @@ _DIGITS_PER_BIT = 0.30103
 class OrbitEnd:
     """How an orbit ended.
 
-    `status` is "completed", "periodic" (completed, and the start came back), "singular", "budget", "precision"
-    (balls too wide), "overflow" (machine floats) or "interrupted"; `steps` is the number of the last point, delivered
-    or left out as not wanted. Modulo p a birational map need not be injective: an orbit may run into a cycle that its
-    start is not on, and is then "completed".
+    `status` is "completed", "periodic" (completed, and the initial point was reached again), "singular", "budget",
+    "precision" (balls too wide), "overflow" (floating-point numbers) or "interrupted"; `steps` is the number of the
+    last step that was taken. Modulo p a birational map need not be injective: an orbit may enter a cycle that does not
+    contain its initial point, and is then "completed".
     """
 
     status: str
@@ -53,21 +53,21 @@ class OrbitEnd:
 
     @property
     def is_whole(self) -> bool:
-        """Whether every step that was asked for has been delivered."""
+        """Whether all requested steps were taken."""
         return self.status in ("completed", "periodic")
 
     @property
     def text(self) -> str:
-        """How it ended, in a sentence that says it once."""
+        """Status and message, without repetition."""
         return self.message if self.message.startswith(self.status) else f"{self.status}: {self.message}"
 
     def to_json(self) -> dict[str, Any]:
-        """Its fields; the period where there is one."""
+        """Return the fields as plain data; the period only if there is one."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 class OrbitPoint:
-    """The point after `step` steps; coordinates over Q are reduced to lowest terms only when `x` is asked for."""
+    """The point after `step` steps; over Q the coordinates are reduced to lowest terms only when `x` is read."""
 
     def __init__(self, step: int, field: Field, value: IntegerPoint | PlanesPoint | tuple[Any, ...]) -> None:
         self.step = step
@@ -81,14 +81,17 @@ class OrbitPoint:
 
     @property
     def text(self) -> list[str]:
-        """The coordinates as text that parses back (over Q cheaper than `x`: no fraction has to be formed)."""
+        """The coordinates as text that can be parsed back (over Q faster than `x`)."""
         if isinstance(self.value, tuple):
             return [self.field.format(entry) for entry in self.x]
-        return [str(above) if below == 1 else f"{above}/{below}" for above, below in self.value.lowest_terms()]
+        return [
+            str(numerator) if denominator == 1 else f"{numerator}/{denominator}"
+            for numerator, denominator in self.value.lowest_terms()
+        ]
 
     @property
     def digits(self) -> int:
-        """About how many decimal digits the largest integer over the common denominator has (0 unless over Q)."""
+        """Approximate number of decimal digits of the largest integer over the common denominator (0 unless over Q)."""
         return 0 if isinstance(self.value, tuple) else _digits(self.value.bits)
 
     def __repr__(self) -> str:
@@ -102,20 +105,26 @@ class OrbitPoint:
     __hash__ = None  # type: ignore[assignment]  # residues have no hash
 
 
-class _GivenUp(Exception):
+class _IterateInterrupted(Exception):
     """Raised by `Orbit.interrupt` in the thread that computes an iterate directly."""
 
 
 class Orbit(HtmlDisplay):
-    """The orbit of `start` under a map, or some iterates of it: iterate over it once, then look at `end`.
+    """The orbit of an initial point under a map, or some of its iterates: iterate over it once, then read `end`.
 
-    `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
-    back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one common
-    denominator (over Q). With a `normal_form` (family.system_normal_form) the orbit is walked in normal form: over
-    Q plane by plane; over balls every point directly, so that balls do not widen from step to step. Points that are not
-    `wanted` are left out where that saves time. With a normal form and the steps `at`, each of these iterates is
-    reached directly, not by way of those before it; poles on the way are passed over then, except over Q. `first` and
-    `last` are the first points and the last one that were delivered so far.
+    Args:
+        kahan_map: the map, over any exact field or over balls.
+        start: the initial point, a sequence of exact numbers.
+        steps: the number of steps; None for no limit.
+        at: the requested iterates, each computed directly by means of the normal form. Except over Q, poles at steps
+            in between are not noticed.
+        backward: step by the inverse map.
+        max_digits: the largest number of decimal digits of the integers over one common denominator (over Q).
+        normal_form: if given (family.system_normal_form), steps are taken in normal form: over Q plane by plane; over
+            balls each point directly from the initial point, so that balls do not widen from step to step.
+        is_requested: which steps are requested; others may be skipped where this saves time.
+
+    `first` and `last` are the first points and the last point delivered so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -143,7 +152,7 @@ class Orbit(HtmlDisplay):
         backward: bool = False,
         max_digits: int | None = DEFAULT_MAX_DIGITS,
         normal_form: SystemNormalForm | None = None,
-        wanted: Callable[[int], bool] | None = None,
+        is_requested: Callable[[int], bool] | None = None,
     ) -> None:
         self.at = None if at is None else sorted(set(at))
         for number in [steps] if self.at is None else self.at:
@@ -156,16 +165,16 @@ class Orbit(HtmlDisplay):
         self.backward = backward
         self.max_digits = max_digits
         self.normal_form = normal_form
-        self._wanted = wanted
+        self._wanted = is_requested
         self._jump: NthIterate | None = None
         if normal_form is not None and (at is not None or isinstance(self.map.field, BallField)):
             from kahanmaps.maps.normal_form.iterate import NthIterate
 
             self._jump = NthIterate(normal_form, self.map.eps, self.map.field)
         elif at is not None:
-            raise InputError("found at= without a normal form: only there iterates are reached directly")
+            raise InputError("at= requires a normal form, by which iterates are computed directly")
         self.end: OrbitEnd | None = None
-        self.first: list[OrbitPoint] = []  # up to FIRST_POINTS of them
+        self.first: list[OrbitPoint] = []  # at most FIRST_POINTS
         self.last: OrbitPoint | None = None
         self._interrupted = False
         self._busy_in: int | None = None  # the thread that computes an iterate directly
@@ -173,18 +182,18 @@ class Orbit(HtmlDisplay):
 
     @property
     def relations(self) -> str | None:
-        """The relations along the orbit that are in use, and from which step on; None where there are none."""
+        """The relations between points of the orbit that are in use, and since which step; None if there are none."""
         walk = self._walk
         return None if walk is None or walk.relations is None else f"{walk.relations.name} from step {walk.since} on"
 
     def interrupt(self) -> None:
-        """Ask a running orbit to end after the step in flight (safe to call from a signal handler).
+        """Stop a running orbit after the current step (safe to call from a signal handler).
 
-        An iterate that is being reached directly, which may be a long one, is given up.
+        The direct computation of an iterate, which may take long, is abandoned.
         """
         self._interrupted = True
         if self._busy_in == get_ident():
-            raise _GivenUp
+            raise _IterateInterrupted
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         self.first, self.last = [], None
@@ -194,7 +203,7 @@ class Orbit(HtmlDisplay):
                     self.first.append(point)
                 self.last = point
                 yield point
-        except _GivenUp:
+        except _IterateInterrupted:
             self._end_interrupted(0 if self.last is None else self.last.step)
         finally:
             self._busy_in = None
@@ -207,7 +216,7 @@ class Orbit(HtmlDisplay):
         images = self._images()
         value = start = next(images)
         step, period = 0, None
-        yield OrbitPoint(0, field, value)  # the budget is for what is computed
+        yield OrbitPoint(0, field, value)  # delivered even if it exceeds the budget
         if bits := self._excess(value):
             self.end = OrbitEnd("budget", 0, _budget_text(0, bits, self.max_digits))
             return
@@ -219,12 +228,12 @@ class Orbit(HtmlDisplay):
                 value = next(images)
             except (SingularStep, StopIteration):
                 det = det_of(self.map.denominator_name(self.backward))
-                self.end = OrbitEnd("singular", step, f"{det} = 0 at step {step}: the map has no value there")
+                self.end = OrbitEnd("singular", step, f"{det} = 0 at step {step}: the map is not defined there")
                 return
             except PrecisionLost as error:
                 self.end = OrbitEnd("precision", step, f"step {step + 1} cannot be decided: {error}")
                 return
-            if value is None:  # left out
+            if value is None:  # skipped, since it is not requested
                 step += 1
                 continue
             if bits := self._excess(value):
@@ -235,12 +244,12 @@ class Orbit(HtmlDisplay):
                 period = step
             yield OrbitPoint(step, field, value)
         if period is not None:
-            self.end = OrbitEnd("periodic", step, f"the start came back after {counted(period, 'step')}", period)
+            self.end = OrbitEnd("periodic", step, f"back at the initial point after {counted(period, 'step')}", period)
         else:
             self.end = OrbitEnd("completed", step, counted(step, "step"))
 
     def _images(self) -> Iterator[Any]:
-        """The start and its images; ends, or raises SingularStep, where the map has no value."""
+        """Yield the initial point and its images; end, or raise SingularStep, where the map is not defined."""
         field = self.map.field
         if self.normal_form is not None and field is QQ:
             from kahanmaps.maps.normal_form.planes_point import NormalSteps
@@ -252,7 +261,7 @@ class Orbit(HtmlDisplay):
             for step in count(1):
                 try:
                     value = self._jump.value(self.start, step)
-                except PrecisionLost:  # for tiny eps a step from the last point may need fewer bits
+                except PrecisionLost:  # for very small eps a step from the last point may need fewer bits
                     value = self.map.step(value)
                 yield value
         elif field is QQ:
@@ -266,7 +275,7 @@ class Orbit(HtmlDisplay):
                 value = self.map.step(value)
 
     def _excess(self, value: Any) -> int:
-        """The bits of a value that is beyond the budget, otherwise 0."""
+        """Return the bit length of a point that exceeds the budget, otherwise 0."""
         limit = _bits(self.max_digits)
         if limit is None:
             return 0
@@ -279,7 +288,7 @@ class Orbit(HtmlDisplay):
         return bits if bits > limit else 0
 
     def _iterates(self, at: Sequence[int]) -> Iterator[OrbitPoint]:
-        """Each of these iterates directly."""
+        """Yield each of these iterates, computed directly."""
         from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 
         assert self._jump is not None
@@ -304,35 +313,35 @@ class Orbit(HtmlDisplay):
                 self._busy_in = None
             done = step
             yield OrbitPoint(step, self.map.field, value)
-        self.end = OrbitEnd("completed", done, f"{counted(len(at), 'iterate')} reached directly")
+        self.end = OrbitEnd("completed", done, f"{counted(len(at), 'iterate')} computed directly")
 
 
 def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | None) -> None:
-    """Raises InputError where eps or the start is longer than anybody means, unless the budget is as long.
+    """Raise InputError if eps or the initial point has more digits than the budget and LONGEST_INPUT.
 
-    The first step alone would take minutes, in calls that nothing can interrupt.
+    The first step alone would take minutes, in calls that cannot be interrupted.
     """
-    most = max(LONGEST_INPUT, max_digits or 0)
+    max_length = max(LONGEST_INPUT, max_digits or 0)
     for name, numbers in (("eps", () if eps is None else (eps,)), ("start", start)):
         digits = max((_digits(max(x.p.bit_length(), x.q.bit_length())) for x in numbers), default=0)
-        if digits > most:
+        if digits > max_length:
             raise InputError(
-                f"found numbers of about {digits} digits for {name}, expected at most {most}: "
-                "a larger --max-digits allows as many"
+                f"found numbers of about {digits} digits for {name}, expected at most {max_length}: "
+                "raise --max-digits to allow longer numbers"
             )
 
 
 def _bits(max_digits: int | None) -> int | None:
-    """A budget of digits in bits."""
+    """Convert a budget of decimal digits to bits."""
     return None if max_digits is None else max_digits * 100_000 // 30103
 
 
-def _budget_text(step: int, bits: int | None, max_digits: int | None, wanted: int | None = None) -> str:
-    """How the budget is exceeded at a step, perhaps on the way to the one that is wanted."""
+def _budget_text(step: int, bits: int | None, max_digits: int | None, requested: int | None = None) -> str:
+    """Describe how a step exceeds the budget, perhaps one before the requested step."""
     limit = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
-    has = "would have longer numbers" if bits is None else f"has numbers of {counted(_digits(bits), 'digit')}, more"
-    text = f"step {step} {has} than {limit}"
-    return text if wanted is None or wanted == step else f"step {wanted} cannot be reached: {text}"
+    excess = "would have longer numbers" if bits is None else f"has numbers of {counted(_digits(bits), 'digit')}, more"
+    text = f"step {step} {excess} than {limit}"
+    return text if requested is None or requested == step else f"step {requested} cannot be reached: {text}"
 
 
 def _digits(bits: int) -> int:
@@ -340,6 +349,6 @@ def _digits(bits: int) -> int:
 
 
 def require_steps(steps: int | None) -> None:
-    """Raises InputError for a negative number of steps, and one that is not whole."""
+    """Raise InputError unless the number of steps is an integer >= 0 or None."""
     if steps is not None and integer(steps, "steps") < 0:
         raise InputError(f"found {steps} steps, expected 0 or more (for the inverse map, step backward)")

@@ -1,8 +1,8 @@
-"""Which way an orbit is computed: generic, in normal form, or by doublings; chosen from the wish, with the reason.
+"""The choice of the method for an orbit, with the reason.
 
-* generic: linear solves, and over Q relations where they hold along the orbit; for every map.
-* normal-form: plane by plane, for members of the family with distinct roots.
-* doubling: each point wanted directly, by doublings; the same members, any chi.
+* generic: one linear system per step, and over Q relations between the points of the orbit; for every map.
+* normal-form: plane by plane, for members of the family with distinct roots of chi.
+* doubling: each requested iterate directly, by doublings on the planes; for the same members.
 """
 
 from __future__ import annotations
@@ -14,47 +14,54 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 
 METHODS = ("generic", "normal-form", "doubling")
-# From here on doublings are faster than steps: over Q, and modulo p, where steps do not pass poles silently.
+# From this step on doublings are faster than single steps. (Modulo p, single steps also report every pole on the way.)
 DOUBLING_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
 
 
 @dataclass(frozen=True)
 class Method:
-    """The name of a method and, in a sentence, why it was taken."""
+    """The name of a method and the reason for its choice."""
 
     name: str
     reason: str
 
     @property
     def text(self) -> str:
-        """One line for people."""
+        """Method and reason in one line."""
         return f"method {self.name}: {self.reason}"
 
 
 def choose_method(
-    wish: str | None, arithmetic: str, normal_form: SystemNormalForm | NoNormalForm, at: Sequence[int] | None
+    requested: str | None, arithmetic: str, normal_form: SystemNormalForm | NoNormalForm, at: Sequence[int] | None
 ) -> Method:
-    """The method for an orbit in "exact", "mod", "ball" or "float" arithmetic; `at` has the steps, if only some count.
+    """Choose the method for an orbit.
 
-    Raises InputError where the wish cannot be met.
+    Args:
+        requested: "generic", "normal-form" or "doubling"; None to choose automatically.
+        arithmetic: "exact", "mod", "ball" or "float".
+        normal_form: the normal form of the system, or the reason why there is none.
+        at: the requested iterates, or None for all steps.
+
+    Raises:
+        InputError: if the requested method is not available for this orbit.
 
     >>> choose_method(None, "exact", NoNormalForm("H is not a homogeneous cubic"), None).text
     'method generic: no normal form (H is not a homogeneous cubic)'
     """
-    if wish is not None and wish not in METHODS:
-        raise InputError(f"found the method {wish!r}, expected one of {', '.join(METHODS)}")
-    if wish == "generic":
-        return Method("generic", "as asked for")
+    if requested is not None and requested not in METHODS:
+        raise InputError(f"found the method {requested!r}, expected one of {', '.join(METHODS)}")
+    if requested == "generic":
+        return Method("generic", "as requested")
     if isinstance(normal_form, NoNormalForm):
-        if wish is not None:
-            raise InputError(f"the method {wish} needs a normal form, and there is none: {normal_form.reason}")
+        if requested is not None:
+            raise InputError(f"the method {requested} needs a normal form, and there is none: {normal_form.reason}")
         return Method("generic", f"no normal form ({normal_form.reason})")
-    if wish == "doubling" and (at is None or arithmetic == "float"):
+    if requested == "doubling" and (at is None or arithmetic == "float"):
         raise InputError("the method doubling is for --at N1,N2,... in exact, mod:P or ball arithmetic")
-    if wish == "normal-form" and arithmetic == "mod":
+    if requested == "normal-form" and arithmetic == "mod":
         raise InputError("modulo P there are the methods generic and doubling")
-    if wish is not None:
-        return Method(wish, normal_form.text)
+    if requested is not None:
+        return Method(requested, normal_form.text)
     if arithmetic == "float":
         return Method("normal-form", normal_form.text)
     if at is not None and max(at, default=0) >= DOUBLING_FROM[arithmetic]:

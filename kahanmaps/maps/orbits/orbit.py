@@ -1,4 +1,4 @@
-"""One door to all orbits: of any map, in any arithmetic, by the fastest way that gives what is asked for."""
+"""Orbits of any map in any arithmetic: `orbit` chooses the method, `Trajectory` is its result."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ from kahanmaps.version import __version__
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
-_TOO_FAR = 10**13  # years
-_FEW_STEPS = 3  # for which looking for a normal form does not pay
-_LONG_INPUT = 4000  # bits of start and eps, from which on setting up a normal form pays later
-_LARGE_DIMENSION = 16
-_BITS_AT_LEAST = 4096  # where no precision is enough
+_MAX_SINGLE_STEPS = 10**13  # more would take years
+_MIN_STEPS = 3  # up to this number of steps a search for a normal form does not pay
+_LONG_INPUT = 4000  # bits of the initial point and eps above which a normal form pays only for more steps
+_MAX_SEARCH_DIMENSION = 16  # for the search for a normal form
+_FALLBACK_BITS = 4096  # precision of balls if none is sufficient
 _BITS_PER_DIGIT = 3.3219281
 
 
@@ -68,33 +68,35 @@ def orbit(
     accuracy: int = 15,
     progress: Callable[[str], None] | None = None,
 ) -> Trajectory:
-    """The orbit of a start, or some of its iterates: iterate over it once, then look at `end`.
+    """Return the orbit of an initial point, or some of its iterates, as a lazy sequence of points.
 
     Args:
-        system: the map; a quadratic system stands for its Kahan map. A map at one eps, phi @ psi for example, is
-            iterated as it is, in its own numbers.
-        start: exact numbers, or text such as "1/2,-1/3"; floats may start float orbits.
-        eps: an exact number, for Kahan maps half the time step; none for a map without it.
-        time_step: 2 eps, in its place.
-        steps: how many steps to take, or
-        at: which iterates alone are wanted.
+        system: the map; a quadratic system stands for its Kahan map. A map at a fixed eps, such as phi @ psi, is
+            iterated in its own field.
+        start: the initial point: exact numbers, or text such as "1/2,-1/3"; for float orbits also floats.
+        eps: an exact number, for Kahan maps half the time step; None for a map that does not depend on it.
+        time_step: 2 eps, instead of eps.
+        steps: the number of steps, or
+        at: the requested iterates.
         arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field: QQ, GF(p), RR(bits), CC(bits), a
             number field.
-        method: "generic", "normal-form" or "doubling"; chosen by itself unless given.
+        method: "generic", "normal-form" or "doubling"; by default chosen automatically.
         backward: step by the inverse map.
-        every: multiples of it alone are wanted.
-        max_digits: the digit budget in exact arithmetic (200,000 unless given).
-        hamiltonian, member: what is known of a quadratic system, so that its normal form need not be searched.
-        normal_form: the normal form itself, or why there is none; looked for where it pays unless given.
+        every: deliver only the points whose step is a multiple of this number.
+        max_digits: the budget of decimal digits in exact arithmetic (default 200,000).
+        hamiltonian, member: the Hamiltonian of a quadratic system or its structure as a member of the family, if known,
+            so that the normal form need not be searched for.
+        normal_form: the normal form itself, or the reason why there is none; by default computed where it pays.
         kernel: "numpy" or "numba", for floats.
-        accuracy: decimal digits, for "ball:auto".
-        progress: is told of trials.
+        accuracy: the number of correct decimal digits, for "ball:auto".
+        progress: called with a message for each precision that "ball:auto" tries.
 
     Returns:
-        The points as they come, exact, enclosed or rounded as the arithmetic is; `method` says how and why.
+        The trajectory: points are computed as they are read, and are exact, enclosed or rounded according to the
+        arithmetic. Read `end` afterwards; `method` and `why` name the method and the reason for it.
 
     Raises:
-        InputError: for wrong values, and for what the map, the method and the arithmetic do not allow together.
+        InputError: for invalid values, and for combinations of map, method and arithmetic that are not available.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> riccati = QuadraticSystem.from_text(["x"], ["x^2"])
@@ -105,7 +107,7 @@ def orbit(
     """
     eps = resolve_eps(eps, time_step)
     if (steps is None) == (at is None):
-        raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
+        raise InputError("expected either steps=, the number of steps, or at=, the requested iterates")
     require_steps(steps)
     if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
@@ -113,26 +115,28 @@ def orbit(
     if isinstance(start, str):
         start = parse_point(start)
     if not hasattr(start, "__len__"):
-        raise InputError(f"found the start {start!r}, expected a sequence of numbers")
-    if arithmetic.kind == "float":  # which floats may start, exactly these
+        raise InputError(f"found the initial point {start!r}, expected a sequence of numbers")
+    if arithmetic.kind == "float":  # floats are accepted, and converted exactly
         for x in start:
             if isinstance(x, float) and not math.isfinite(x):
-                raise InputError(f"found {x} in the start, expected finite numbers")
+                raise InputError(f"found {x} in the initial point, expected finite numbers")
         start = [fmpq(*x.as_integer_ratio()) if isinstance(x, float) else x for x in start]
     if not isinstance(at, Iterable | None):
         raise InputError(f"found at = {at!r}, expected a sequence of steps, at=[{at}]")
-    wanted = None if at is None else frozenset(integer(step, "a step of at") for step in at)
-    far = max(wanted, default=0) if wanted is not None else (steps or 0)
-    require_steps(far)
-    request = OrbitRequest(system, start, eps, far, wanted, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel)
+    requested_steps = None if at is None else frozenset(integer(step, "a step of at") for step in at)
+    last_step = max(requested_steps, default=0) if requested_steps is not None else (steps or 0)
+    require_steps(last_step)
+    request = OrbitRequest(
+        system, start, eps, last_step, requested_steps, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel
+    )
     if isinstance(system, Map):
         return _orbit_at_one_eps(request, field)
     map_ = as_map(system)
     if eps is None and map_.has_eps:
-        raise InputError("found no eps, expected an exact number: the map depends on it")
+        raise InputError("found no eps, expected an exact number: the map depends on eps")
     if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
         if at is not None or method not in (None, "generic"):
-            raise InputError(f"over {field} orbits go step by step: found at= or method=, expected steps alone")
+            raise InputError(f"orbits over {field} are computed step by step: give steps=, without at= and method=")
         phi = map_.at(1 if eps is None else eps, field)
         return _orbit_at_one_eps(request._replace(map=phi, eps=None), field)
     request = request._replace(map=map_, eps=fmpq(1) if eps is None else rational(eps))
@@ -142,10 +146,10 @@ def orbit(
     if normal_form is None:
         normal_form = _normal_form(request, method, arithmetic, hamiltonian, member)
     chosen = choose_method(method, arithmetic.kind, normal_form, at)
-    if chosen.name != "doubling" and far > _TOO_FAR:
+    if chosen.name != "doubling" and last_step > _MAX_SINGLE_STEPS:
         raise InputError(
-            f"step {far} is too far to be reached one step after the other (more than {_TOO_FAR:.0e}), "
-            f"and there is no other way here: {chosen.reason}"
+            f"step {last_step} is too large for single steps (at most {_MAX_SINGLE_STEPS:.0e}), "
+            f"and no other method is available: {chosen.reason}"
         )
     used = normal_form if chosen.name != "generic" and isinstance(normal_form, SystemNormalForm) else None
     remark = ""
@@ -153,13 +157,13 @@ def orbit(
         try:
             bits = bits_for(lambda bits: request.by(chosen.name, used, Arithmetic("ball", bits)), accuracy, progress)
         except NotAccurate as error:
-            bits, remark = _BITS_AT_LEAST, str(error)
+            bits, remark = _FALLBACK_BITS, str(error)
         arithmetic = Arithmetic("ball", bits)
     return Trajectory(request.by(chosen.name, used, arithmetic), request, arithmetic, chosen, remark)
 
 
 class OrbitRequest(NamedTuple):
-    """Which points of which orbit are wanted; `steps` is the last one."""
+    """The arguments of an orbit and the requested points; `steps` is the last step."""
 
     map: Any
     start: Sequence[Any]
@@ -171,34 +175,33 @@ class OrbitRequest(NamedTuple):
     max_digits: int
     kernel: str | None
 
-    def wants(self, step: int) -> bool:
-        """Whether this step is one that was asked for."""
+    def is_requested(self, step: int) -> bool:
+        """Return whether the point of this step is requested."""
         return step in self.at if self.at is not None else step % self.every == 0
 
     def by(self, method: str, normal_form: SystemNormalForm | None, numbers: Arithmetic) -> Any:
-        """The iterator over them by a method, in an arithmetic."""
+        """Return the iterator over the points by a method, in an arithmetic."""
         if numbers.kind == "float":
-            from kahanmaps.maps.floats.fast import FloatOrbit
+            from kahanmaps.maps.floats.float_orbit import FloatOrbit
 
             every = self.every if self.at is None else max(1, math.gcd(*self.at))
             form = None if normal_form is None else normal_form.form
-            given = (self.map.real_approximation, self.eps, self.start, self.steps)
-            return FloatOrbit(*given, backward=self.backward, form=form, kernel=self.kernel, every=every)
+            arguments = (self.map.real_approximation, self.eps, self.start, self.steps)
+            return FloatOrbit(*arguments, backward=self.backward, form=form, kernel=self.kernel, every=every)
         over = self.map.at(self.eps, numbers.field)
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and normal_form is not None:
             return Orbit(over, self.start, at=self.at or (), normal_form=normal_form, **limits)
         normal = normal_form if method == "normal-form" else None
-        wanted = self.wants if self.at is not None or self.every > 1 else None
-        return Orbit(over, self.start, self.steps, normal_form=normal, wanted=wanted, **limits)
+        is_requested = self.is_requested if self.at is not None or self.every > 1 else None
+        return Orbit(over, self.start, self.steps, normal_form=normal, is_requested=is_requested, **limits)
 
 
 class Trajectory:
-    """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it.
+    """The result of `orbit`: points in the given `arithmetic`, computed by `method`, for the reason `why`.
 
-    Iterate over it, and nothing is kept; or ask for its length, for points by their number, for a table or an array,
-    and all points are computed and kept. `integrals` are functions of x and eps (PhaseFunction) by name, whose values
-    tables and files are to have beside the points.
+    Iterating over it keeps no points in memory; its length, indexing, tables and arrays compute all points and keep
+    them. `integrals` are functions of x and eps (PhaseFunction) by name, whose values are added to tables and files.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
@@ -221,17 +224,17 @@ class Trajectory:
 
     @property
     def why(self) -> str:
-        """The method and the reason for it, of long orbits over Q also what came to be known on the way."""
+        """The method and the reason for it; for long orbits over Q also the relations that were found and used."""
         relations = getattr(self.orbit, "relations", None)
         return self._why if relations is None else f"{self._why}; {relations}"
 
     def interrupt(self) -> None:
-        """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
+        """Stop a running orbit after the current step (safe to call from a signal handler)."""
         self.orbit.interrupt()
 
     @property
     def end(self) -> OrbitEnd:
-        """How it ended; where not all points have come yet, they are computed and kept."""
+        """How the orbit ended; the remaining points are computed and kept."""
         if self.orbit.end is None:
             _ = self.points
         end: OrbitEnd = self.orbit.end
@@ -239,8 +242,8 @@ class Trajectory:
 
     @cached_property
     def points(self) -> list[OrbitPoint]:
-        """All points that were asked for."""
-        return [point for point in self._computed() if self._request.wants(point.step)]
+        """All requested points."""
+        return [point for point in self._computed() if self._request.is_requested(point.step)]
 
     def __len__(self) -> int:
         return len(self.points)
@@ -253,36 +256,36 @@ class Trajectory:
         return self.points[index]
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each point: its step, the coordinates and the values of the integrals, None at poles.
+        """Return a row for each point: its step, the coordinates and the values of the integrals (None at poles).
 
-        Floats and residues are numbers, others exact text.
+        Floats and residues are numbers, all other values exact text.
         """
         kind = {"float": float, "mod": int}.get(self.arithmetic.kind, str)
         names = (*self.variables, *self.integrals)
-        found = []
+        rows = []
         for point in self.points:
             numbers = [text and kind(text) for text in (*point.text, *self.values(point))]
-            found.append({"step": point.step, **dict(zip(names, numbers, strict=True))})
-        return found
+            rows.append({"step": point.step, **dict(zip(names, numbers, strict=True))})
+        return rows
 
     def values(self, point: OrbitPoint) -> list[str | None]:
-        """Those of the integrals, as text; None where one is not defined."""
+        """Return the values of the integrals at a point, as text; None for an integral that is not defined there."""
         values: list[str | None] = []
         for function in self.integrals.values():
-            try:  # eps itself, also where the orbit steps by -eps: integrals are those of the map
+            try:  # at eps also if the orbit is backward: the integrals are those of the map, not of its inverse
                 value = function.value(point.field, self._request.eps, point.x)
-            except (KahanmapsError, ArithmeticError):  # not defined where the map is not, or beyond the range of floats
+            except (KahanmapsError, ArithmeticError):  # not defined at the point, or out of the range of floats
                 value = None
             is_defined = value is not None and not (isinstance(value, float) and not math.isfinite(value))
             values.append(point.field.format(value) if is_defined else None)
         return values
 
     def to_pandas(self) -> Any:
-        """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
+        """Return `rows()` as a pandas DataFrame. Raises InputError if pandas is not installed."""
         return data_frame(self.rows())
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the points alone, as `kahanmaps orbit -o` does: step and coordinates, exact."""
+        """Write step and exact coordinates of the points to a .csv file, without a metadata file."""
         with open_append(path) as stream:
             self.write(stream, "csv")
 
@@ -291,54 +294,54 @@ class Trajectory:
         to: str | Path | IO[str] | Writer,
         form: str = "",
         name: str = "",
-        told: Callable[[int], None] = lambda _: None,
+        on_step: Callable[[int], None] = lambda _: None,
     ) -> OrbitEnd:
-        """Write the points that are wanted as they are computed, as `kahanmaps orbit` does.
+        """Write the requested points as they are computed, like the command `kahanmaps orbit`.
 
         Args:
-            to: a path, beside which a .csv file gets what it is of; a stream of text; or a writer.
-            form: "text", "json", "jsonl", "csv", "npz", for the points of float orbits alone "npy"; by default what
-                the ending of the path stands for, for a stream text.
-            name: that of the system.
-            told: is called with every step that was computed.
+            to: a path, a stream of text, or a writer. For csv, a file with the metadata is written next to the path.
+            form: "text", "json", "jsonl", "csv", "npz", or (float orbits without integrals) "npy"; by default the
+                format of the suffix of the path, and text for a stream.
+            name: the name of the system.
+            on_step: called with the number of every step that was computed.
 
         Returns:
-            How it ended, as the file says it; "budget" where an npz file cannot hold more.
+            How the orbit ended, as written to the file; "budget" if an npz file cannot hold more points.
 
         Raises:
-            InputError: for other formats, and for npy where it cannot hold what is wanted.
+            InputError: for unknown formats, and if npy cannot hold the requested data.
         """
         if not form:
             form = form_of(to) if isinstance(to, str | Path) else "text"
         if form not in FORMATS:
             raise InputError(f"found the format {form!r}, expected {', '.join(FORMATS)}")
         if form == "npy":
-            from kahanmaps.maps.floats.fast import stream_orbit
+            from kahanmaps.maps.floats.float_orbit import stream_orbit
 
             if not isinstance(to, str | Path):
-                raise InputError("npy grows in a file: found a stream, expected a path")
+                raise InputError("the format npy needs a path, got a stream")
             if self.arithmetic.kind != "float":
-                raise InputError("npy is for float orbits: take npz, or jsonl, which holds numbers of any length")
+                raise InputError("npy is for float orbits: use npz, or jsonl, which holds numbers of any length")
             if self._request.at is not None or self.integrals:
-                raise InputError("npy holds the points of steps= and every=: for at= or integrals take npz")
-            return self._ended(stream_orbit(self.orbit, to, progress=told))[0]
+                raise InputError("npy holds the points of steps= and every=: for at= or integrals use npz")
+            return self._ended(stream_orbit(self.orbit, to, progress=on_step))[0]
         columns = (self.variables, list(self.integrals))
         with nullcontext(to) if isinstance(to, Writer) else writer_to(to, form, *columns) as writer:
             writer.header(self.header(name))
             try:
-                for point in self._known():
-                    told(point.step)
-                    if self._request.wants(point.step):
+                for point in self._all_points():
+                    on_step(point.step)
+                    if self._request.is_requested(point.step):
                         writer.point(point.step, point.text, self.values(point))
                 end = self.end
             except OutputFull as full:
                 end = OrbitEnd("budget", full.steps, str(full))
-            end, more = self._ended(end)
-            writer.end(end, more)
+            end, extra = self._ended(end)
+            writer.end(end, extra)
         return end
 
     def header(self, name: str = "") -> dict[str, Any]:
-        """What the orbit can be made again from, as plain data; `name` is that of the system."""
+        """Return the data from which the orbit can be reproduced; `name` is the name of the system."""
         request = self._request
         header = {
             "system": name,
@@ -356,35 +359,35 @@ class Trajectory:
         return {**header, "kernel": self.orbit.kernel} if self.arithmetic.kind == "float" else header
 
     def _ended(self, end: OrbitEnd) -> tuple[OrbitEnd, dict[str, Any]]:
-        """How it ended, and of a float orbit what it may have lost on the way, in the message and as plain data."""
+        """Return how the orbit ended, for a float orbit with its drift and near-singular steps."""
         if self.arithmetic.kind != "float":
             return end, {}
-        message, more = end.message, {"near_singular": self.orbit.near_singular}
+        message, extra = end.message, {"near_singular": self.orbit.near_singular}
         if self.orbit.drift:
-            more["drift"] = {drift.name: json_float(drift.largest) for drift in self.orbit.drift}
+            extra["drift"] = {drift.name: json_float(drift.largest) for drift in self.orbit.drift}
             largest = max(float(drift.largest) for drift in self.orbit.drift)
-            message += f"; block integrals moved by at most {largest:.3g} where looked at"
+            message += f"; largest observed drift of the block integrals: {largest:.3g}"
         if self.orbit.near_singular:
             first = self.orbit.near_singular_at
             message += f"; near-singular steps: {self.orbit.near_singular}, the first from step {first}"
-        return replace(end, message=message), more
+        return replace(end, message=message), extra
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
-        """The coordinates (points, dim) as an array for `numpy.asarray`.
+        """Return the coordinates as an array of shape (points, dim), for `numpy.asarray`.
 
         Args:
-            dtype: float64 by default, to which exact numbers are rounded; of residues int64, or object where they do
-                not fit. `object` has the coordinates as they are: fmpq, elements of a number field, balls, float, and
-                residues as int. An integer dtype has them exactly.
+            dtype: by default float64, to which exact numbers are rounded; for residues int64, or object if they do not
+                fit. `object` keeps the coordinates unchanged: fmpq, elements of a number field, balls, float, and
+                residues as int. An integer dtype holds them exactly.
 
         Raises:
-            InputError: for what the dtype does not hold: numbers that are no integers or too large for an integer
-                dtype; balls, algebraic numbers, and residues that are rounded, for floats.
+            InputError: if the dtype cannot hold the coordinates: for an integer dtype, numbers that are not integers or
+                too large; for floats, balls, algebraic numbers, and residues that would be rounded.
         """
         import numpy as np
 
         if copy is False:
-            raise InputError("found copy=False, expected copy=None: an orbit has no array before it is asked for one")
+            raise InputError("found copy=False, expected copy=None: the array of an orbit is created on demand")
         prime = self.arithmetic.number if self.arithmetic.kind == "mod" else 0
         rows: list[list[Any]] = [[int(x) if prime else x for x in point.x] for point in self.points]
         default = np.float64 if not prime else np.int64 if prime < 2**63 else object
@@ -396,7 +399,7 @@ class Trajectory:
             return table
         if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
             raise InputError(
-                f'found {self.arithmetic} arithmetic, expected numbers: take arithmetic="float", or dtype=object'
+                f'{self.arithmetic} arithmetic has no values of dtype {kind}: use arithmetic="float" or dtype=object'
             )
         if kind.kind in "iu":
             limits = np.iinfo(kind)
@@ -408,45 +411,46 @@ class Trajectory:
                         text = str(x)
                         raise InputError(
                             f"found the coordinate {text if len(text) < 50 else text[:40] + '...'}, expected integers "
-                            f"from {limits.min} to {limits.max} for {kind}: take dtype=object, which has all numbers "
-                            "as they are, or dtype=float"
+                            f"from {limits.min} to {limits.max} for {kind}: use dtype=object, which keeps all numbers "
+                            "unchanged, or dtype=float"
                         )
             return np.array(rows, dtype=kind)
         if kind.kind not in "fc":
             raise InputError(f"found the dtype {kind}, expected one of floats or integers, or object")
         if prime > 2 ** (np.finfo(kind).nmant + 1):
             raise InputError(f"found {kind}, which rounds residues modulo {prime}, expected dtype=int or dtype=object")
-        from kahanmaps.maps.floats.doubles import to_float
+        from kahanmaps.maps.floats.float_conversion import to_float
 
         return np.array([[to_float(x) if isinstance(x, fmpq) else x for x in row] for row in rows], dtype=kind)
 
     def __iter__(self) -> Iterator[OrbitPoint]:
-        # `list` asks for the length between here and the first point
-        yield from (point for point in self._known() if self._request.wants(point.step))
+        # a generator, since `list` calls __len__, which computes the points, before it reads the first one
+        yield from (point for point in self._all_points() if self._request.is_requested(point.step))
 
-    def _known(self) -> Iterator[OrbitPoint]:
-        """The points that are kept, or all that are computed now, of which not all need be asked for."""
+    def _all_points(self) -> Iterator[OrbitPoint]:
+        """Yield the stored points, or else all points as they are computed, including those not requested."""
         yield from self.points if "points" in self.__dict__ else self._computed()
 
     def _computed(self) -> Iterator[OrbitPoint]:
         if self.arithmetic.kind != "float":
             yield from self.orbit
             return
-        from kahanmaps.maps.floats.fast import FLOATS
+        from kahanmaps.maps.floats.float_orbit import FLOATS
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
 
 
 class NotAccurate(Exception):
-    """No precision was enough."""
+    """No available precision gives the requested number of correct digits."""
 
 
-def bits_for(orbit_with: Callable[[int], Orbit], digits: int, told: Callable[[str], None] | None = None) -> int:
-    """The bits with which every point has `digits` correct digits of its largest coordinate; doubled in every trial.
+def bits_for(orbit_with: Callable[[int], Orbit], digits: int, on_progress: Callable[[str], None] | None = None) -> int:
+    """Return a precision in bits at which every point has `digits` correct digits of its largest coordinate.
 
-    `orbit_with` makes the orbit over RR(bits). An orbit that ends for another reason than precision is taken as it
-    is. `told` hears of every trial. Raises NotAccurate where not even the largest precision will do.
+    The precision is doubled until it suffices. `orbit_with` returns the orbit over RR(bits); an orbit that ends for
+    another reason than precision is accepted. `on_progress` is called for every trial. Raises NotAccurate if the
+    largest precision is not sufficient.
 
     >>> from kahanmaps.algebra.fields import RR
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -460,25 +464,25 @@ def bits_for(orbit_with: Callable[[int], Orbit], digits: int, told: Callable[[st
         bits *= 2
     while bits < MAX_BALL_BITS:
         orbit = orbit_with(bits)
-        if told is not None:
-            told(f"balls of {bits} bits")
-        # The largest coordinate counts, for one may be zero; the first point that is not accurate ends the trial.
-        enough = all(
+        if on_progress is not None:
+            on_progress(f"balls of {bits} bits")
+        # Relative to the largest coordinate, since others may be 0; the first inaccurate point ends the trial.
+        is_accurate = all(
             entry.is_exact() or entry.rad() * arb(10) ** digits <= max(abs(other.mid()) for other in point.x)
             for point in orbit
             for entry in point.x
         )
-        if enough and orbit.end is not None and orbit.end.status != "precision":
+        if is_accurate and orbit.end is not None and orbit.end.status != "precision":
             return bits
         bits *= 2
     raise NotAccurate(f"not even balls of {bits // 2} bits give {digits} digits at every point")
 
 
 def _orbit_at_one_eps(request: OrbitRequest, numbers: Any) -> Trajectory:
-    """The orbit of a map that has its eps and its field, which `numbers` may name."""
+    """Return the orbit of a map at a fixed eps over its own field; `numbers` may be that field or "exact"."""
     phi, exact = request.map, Arithmetic("exact")
     if request.eps is not None or request.at is not None or numbers not in ("exact", exact, phi.field):
-        raise InputError(f"{phi!r} has its eps and its numbers, expected a start and a number of steps alone")
+        raise InputError(f"{phi!r} has a fixed eps and field: give only an initial point and steps=")
     p, bits = phi.field.characteristic, getattr(phi.field, "bits", 0)
     kind = Arithmetic("mod", p) if p else Arithmetic("ball", bits) if bits else exact
     points = Orbit(phi, request.start, request.steps, backward=request.backward, max_digits=request.max_digits)
@@ -493,26 +497,26 @@ def _normal_form(
     hamiltonian: CubicHamiltonian | None,
     member: FamilyMember | None,
 ) -> SystemNormalForm | NoNormalForm:
-    """The normal form, where it may be of use."""
+    """Return the normal form, or the reason why none is used."""
     map_, eps = request.map, request.eps
     if method == "generic":
         return NoNormalForm("not looked for")
     if not isinstance(map_, KahanFamily) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
-    if method is None:  # where looking for a normal form would cost more than it can save
-        few = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
+    if method is None:  # no search for a normal form where it would take longer than the orbit
+        max_steps = DOUBLING_FROM["mod"] - 1 if arithmetic.kind == "mod" else _MIN_STEPS
         numbers = [eps, *(rational(entry) for entry in request.start)]
         if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
-            few = max(few, 24)
-        if request.steps <= few:
+            max_steps = max(max_steps, 24)
+        if request.steps <= max_steps:
             return NoNormalForm("not looked for, for so few steps")
-        if member is None and map_.dim > _LARGE_DIMENSION:
+        if member is None and map_.dim > _MAX_SEARCH_DIMENSION:
             return NoNormalForm(f"not looked for in dimension {map_.dim}")
     normal_form = system_normal_form(map_.system, hamiltonian, member)
     if isinstance(normal_form, NoNormalForm):
         return normal_form
     if arithmetic.kind == "float" and normal_form.T is not None and method is None:
-        return NoNormalForm("in machine numbers only J = [[0, I], [-I, 0]] has one")
+        return NoNormalForm("in floating-point numbers it requires J = [[0, I], [-I, 0]]")
     if arithmetic.kind in ("ball", "mod"):
         from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
 

@@ -1,6 +1,7 @@
-"""An orbit in a file: text, jsonl and csv line by line, json as well, npz whole at the end; stored.py reads them.
+"""Writers of orbit files, one class for each format: text, json, jsonl, csv and npz.
 
-All but json and npz are valid after every record, so that whatever ends an orbit leaves a file that can be read.
+Files of text, jsonl and csv are valid after every record, so that a file remains readable however the orbit ends. npz
+files are written at the end.
 """
 
 from __future__ import annotations
@@ -21,15 +22,15 @@ from kahanmaps.maps.convention import eps_words
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.version import __version__
 
-# An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
+# An npz file of exact numbers pads each of them to the longest one; larger orbits need jsonl.
 MAX_PADDED_BYTES = 512_000_000
-_UNFLUSHED = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
-_ENVELOPE = {"command": "orbit", "version": __version__}  # what every JSON object of a command begins with
-_TEXT = ("", ".txt", ".tsv", ".out", ".dat", ".log")  # endings of files of text
+_FLUSH_AFTER = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
+_COMMAND = {"command": "orbit", "version": __version__}  # the beginning of the JSON object of every command
+_TEXT_SUFFIXES = ("", ".txt", ".tsv", ".out", ".dat", ".log")
 
 
 class OutputFull(Exception):
-    """A format cannot hold the next point. Attribute: `steps`, the last step that it holds."""
+    """The format cannot hold the next point. Attribute: `steps`, the last step that was written."""
 
     def __init__(self, message: str, steps: int) -> None:
         self.steps = steps
@@ -37,7 +38,7 @@ class OutputFull(Exception):
 
 
 class Writer(ABC):
-    """Receives a header, points and an end; columns are those of the variables and then of the integrals, by name."""
+    """Base class: writes a header, points and an end. The columns are the variables, then the integrals."""
 
     def __init__(self, stream: IO[Any], variables: Sequence[str], integrals: Sequence[str]) -> None:
         self.stream = stream
@@ -47,27 +48,27 @@ class Writer(ABC):
 
     @abstractmethod
     def header(self, header: dict[str, Any]) -> None:
-        """What the orbit is of."""
+        """Write the data that determine the orbit: system, eps, initial point, arithmetic."""
 
     @abstractmethod
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
-        """One point, its coordinates and the values of the integrals (None at a pole)."""
+        """Write a point: its coordinates and the values of the integrals (None at a pole)."""
 
     @abstractmethod
-    def end(self, end: OrbitEnd, more: Mapping[str, Any]) -> None:
-        """How it ended, and what else is known of a float orbit."""
+    def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
+        """Write how the orbit ended, and further data of a float orbit."""
 
     def _line(self, text: str) -> None:
         self.stream.write(text + "\n")
-        # Now and then, so that a reader of the file sees it grow and a kill loses little; always before long steps.
+        # Flushed regularly, so that a killed process loses little, and always before steps that may take long.
         self._unflushed += len(text)
-        if self._unflushed > _UNFLUSHED:
+        if self._unflushed > _FLUSH_AFTER:
             self.stream.flush()
             self._unflushed = 0
 
 
 class Text(Writer):
-    """Columns separated by tabs between two comments."""
+    """Tab-separated columns; the first and the last line are comments."""
 
     def header(self, header: dict[str, Any]) -> None:
         self._line(title(header))
@@ -76,13 +77,13 @@ class Text(Writer):
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line("\t".join([str(step), *x, *("pole" if value is None else value for value in values)]))
 
-    def end(self, end: OrbitEnd, more: Mapping[str, Any]) -> None:
+    def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
         self._line(f"# {end.text}")
         self.stream.flush()
 
 
 class JsonLines(Writer):
-    """One JSON object a line, with "record" header, point or end."""
+    """One JSON object per line, whose "record" is "header", "point" or "end"."""
 
     def header(self, header: dict[str, Any]) -> None:
         self._line(json.dumps({"record": "header", **header}))
@@ -90,62 +91,61 @@ class JsonLines(Writer):
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(json.dumps({"record": "point", **self._point(step, x, values)}))
 
-    def end(self, end: OrbitEnd, more: Mapping[str, Any]) -> None:
-        self._line(json.dumps({"record": "end", **end.to_json(), **more}))
+    def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
+        self._line(json.dumps({"record": "end", **end.to_json(), **extra}))
         self.stream.flush()
 
     def _point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> dict[str, Any]:
-        beside = {"integrals": dict(zip(self.integrals, values, strict=True))} if self.integrals else {}
-        return {"step": step, "x": list(x), **beside}
+        integrals = {"integrals": dict(zip(self.integrals, values, strict=True))} if self.integrals else {}
+        return {"step": step, "x": list(x), **integrals}
 
 
 class Json(JsonLines):
     """One JSON object with the header, all points and the end."""
 
     def header(self, header: dict[str, Any]) -> None:
-        self._line(json.dumps({**_ENVELOPE, **header})[:-1] + ', "points": [')
+        self._line(json.dumps({**_COMMAND, **header})[:-1] + ', "points": [')
         self._separator = ""
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(self._separator + json.dumps(self._point(step, x, values)))
         self._separator = ","
 
-    def end(self, end: OrbitEnd, more: Mapping[str, Any]) -> None:
-        self._line(f'], "end": {json.dumps({**end.to_json(), **more})}}}')
+    def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
+        self._line(f'], "end": {json.dumps({**end.to_json(), **extra})}}}')
         self.stream.flush()
 
 
 class Csv(Writer):
-    """Comma-separated values below a row of names, and nothing else: header and end are in a file beside them.
+    """Comma-separated values with a row of column names; header and end go to a separate JSON file.
 
-    `beside` is its path, None where the table goes to standard output; it is there from the beginning.
+    `metadata_path` is the path of that file, None if the table goes to standard output.
     """
 
-    beside: str | None = None
+    metadata_path: str | None = None
 
     def header(self, header: dict[str, Any]) -> None:
         self._header = header
-        self._tell(None)
+        self._write_metadata(None)
         self._line(csv_line(["step", *self.variables, *map(guarded, self.integrals)])[:-1])
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
 
-    def end(self, end: OrbitEnd, more: Mapping[str, Any]) -> None:
+    def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
         self.stream.flush()
-        self._tell({**end.to_json(), **more})
+        self._write_metadata({**end.to_json(), **extra})
 
-    def _tell(self, end: dict[str, Any] | None) -> None:
-        if self.beside is not None:
-            told = {**_ENVELOPE, "header": self._header, "end": end}
-            write_atomically(self.beside, (json.dumps(told, indent=1) + "\n").encode())
+    def _write_metadata(self, end: dict[str, Any] | None) -> None:
+        if self.metadata_path is not None:
+            record = {**_COMMAND, "header": self._header, "end": end}
+            write_atomically(self.metadata_path, (json.dumps(record, indent=1) + "\n").encode())
 
 
 class Npz(Writer):
-    """Arrays `step`, `x` and, if there are any, `integrals`, and the header and end as JSON text, all at the end.
+    """Arrays `step`, `x` and `integrals` (if any), and header and end as JSON text; written at the end.
 
-    Floats and residues below 2^63 are machine numbers; exact numbers and balls are text, for a float would no longer be
-    exact.
+    Floats and residues below 2^63 are stored as float64 and int64; exact numbers and balls are stored as text.
     """
 
     def header(self, header: dict[str, Any]) -> None:
@@ -159,39 +159,39 @@ class Npz(Writer):
         self._longest = 1
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
-        longest = max(self._longest, *map(len, x), *(len(value or "") for value in values))
-        size = longest * (len(x) + len(values)) * (len(self._x) + 1)
+        max_length = max(self._longest, *map(len, x), *(len(value or "") for value in values))
+        size = max_length * (len(x) + len(values)) * (len(self._x) + 1)
         if self._convert is str.encode and size > MAX_PADDED_BYTES:
             raise OutputFull(
                 f"with step {step} an npz file of exact numbers would exceed {MAX_PADDED_BYTES} bytes: "
-                "take --format jsonl, fewer steps or --every",
+                "use --format jsonl, fewer steps or --every",
                 self._steps[-1] if self._steps else 0,
             )
-        self._longest = longest
-        pole = float("nan") if self._convert is float else None
+        self._longest = max_length
+        undefined = float("nan") if self._convert is float else None
         self._steps.append(step)
         self._x.append(list(map(self._convert, x)))
-        self._values.append([pole if value is None else self._convert(value) for value in values])
+        self._values.append([undefined if value is None else self._convert(value) for value in values])
 
-    def end(self, end: OrbitEnd, more: Mapping[str, Any]) -> None:
+    def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
         import numpy as np
 
-        told = {**end.to_json(), **more}
-        meta = {"header": self._header, "columns": self.variables, "integrals": self.integrals, "end": told}
-        # Steps that were reached directly may be longer than machine integers.
+        end_record = {**end.to_json(), **extra}
+        meta = {"header": self._header, "columns": self.variables, "integrals": self.integrals, "end": end_record}
+        # The numbers of iterates computed directly may exceed 64 bits.
         are_short = max(self._steps, default=0) < 2**63
         steps: list[Any] = self._steps if are_short else [str(step).encode() for step in self._steps]
         n = len(self._x)
         arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.variables))}
         if self.integrals:
-            if any(None in row for row in self._values):  # at a pole, which residues and text have no number for
+            if any(None in row for row in self._values):  # poles are empty text, since there is no NaN for these types
                 filled = [["" if x is None else x for x in row] for row in self._values]
                 self._values = [[x if isinstance(x, bytes) else str(x).encode() for x in row] for row in filled]
             arrays["integrals"] = np.array(self._values).reshape(n, len(self.integrals))
         save: Any = np.savez_compressed
-        held = io.BytesIO()  # a zip archive needs a stream that can seek
-        save(held, meta=np.array(json.dumps(meta)), **arrays)
-        self.stream.write(held.getvalue())
+        archive = io.BytesIO()  # zip archives need a seekable stream
+        save(archive, meta=np.array(json.dumps(meta)), **arrays)
+        self.stream.write(archive.getvalue())
 
 
 WRITERS: dict[str, type[Writer]] = {"text": Text, "json": Json, "jsonl": JsonLines, "csv": Csv, "npz": Npz}
@@ -202,31 +202,36 @@ FORMATS = (*WRITERS, "npy")
 def writer_to(
     to: str | Path | IO[str], form: str, variables: Sequence[str], integrals: Sequence[str]
 ) -> Iterator[Writer]:
-    """What writes points in one of the formats `WRITERS` to a path, on the disk at the end, or a stream of text."""
+    """Open a writer in one of the formats `WRITERS` to a path or a stream of text.
+
+    Raises InputError if the format is npz and the stream has no buffer of bytes.
+    """
     if not isinstance(to, str | Path):
-        stream = getattr(to, "buffer", None) if form == "npz" else to  # bytes, behind a stream that is not in memory
+        stream = getattr(to, "buffer", None) if form == "npz" else to
         if stream is None:
-            raise InputError("npz is not text: found a stream without a buffer of bytes, expected a path")
+            raise InputError("npz is a binary format: give a path, or a stream with a buffer of bytes")
         yield WRITERS[form](stream, variables, integrals)
         return
-    if form == "csv" and os.path.isdir(meta_of(to)):  # said before an older table is lost
-        raise InputError(f"found a folder {meta_of(to)}, where what the table is of is written")
+    if form == "csv" and os.path.isdir(meta_of(to)):  # raised before an existing table is overwritten
+        raise InputError(
+            f"found a folder {meta_of(to)}, expected no folder of this name: the metadata is written there"
+        )
     with atomic_write(to) if form == "npz" else open_append(to) as stream:
         writer = WRITERS[form](stream, variables, integrals)
         if isinstance(writer, Csv):
-            writer.beside = meta_of(to)
+            writer.metadata_path = meta_of(to)
         yield writer
 
 
 def meta_of(path: str | Path) -> str:
-    """The file beside a .csv file that says what its table is of."""
+    """Return the path of the file with the metadata of a .csv file."""
     return f"{path}.meta.json"
 
 
 def form_of(path: str | Path) -> str:
-    """The format that the name of a file stands for. Raises InputError for other endings."""
+    """Return the format for the suffix of a file name. Raises InputError for unknown suffixes."""
     suffix = Path(path).suffix.lower()
-    if suffix in _TEXT:
+    if suffix in _TEXT_SUFFIXES:
         return "text"
     if suffix[1:] not in FORMATS:
         endings = ", ".join(f".{form}" for form in FORMATS[1:])
@@ -235,7 +240,7 @@ def form_of(path: str | Path) -> str:
 
 
 def title(header: Mapping[str, Any]) -> str:
-    """What an orbit is of, on a line: the system, eps, the arithmetic, the number that a parameter is."""
+    """Return the title line of an orbit: system, eps, arithmetic, algebraic numbers, direction."""
     t = "t = " if header["arithmetic"] == "exact" else ""
     return (
         f"# {header['system']}{eps_words(header)}, {header['arithmetic']} arithmetic"

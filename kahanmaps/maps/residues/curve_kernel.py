@@ -1,4 +1,4 @@
-"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in machine numbers.
+"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in floating-point numbers.
 
 An element a + b w of GF(p^2), with w^2 = nu no square modulo p, is a pair of doubles that hold integers in [0, p); a
 polynomial is an array (2, length). Sums of products stay below 2^53 by the choice of p and of the largest length, so
@@ -118,8 +118,8 @@ def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, i
     inverse = _inverse_of_last(b, length_b, p, nu, inverses)
     _clear(into, max(length_a, 1))
     while length_a >= length_b:
-        place = length_a - length_b
-        into[0, place], into[1, place] = _subtract(a, length_a, b, length_b, inverse, p, nu)
+        shift = length_a - length_b
+        into[0, shift], into[1, shift] = _subtract(a, length_a, b, length_b, inverse, p, nu)
         length_a = _stripped(a, length_a - 1)
     return length_a
 
@@ -168,13 +168,13 @@ def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
             if columns != k + 1:
                 continue
             _clear(minors[mask], size + length - 1)
-            place = 0
+            column = 0
             for j in range(n + 1):
                 if mask >> j & 1:
-                    sign = 1.0 if (k + place) % 2 == 0 else -1.0
+                    sign = 1.0 if (k + column) % 2 == 0 else -1.0
                     _add_product(minors[mask], M[k, j], _stripped(M[k, j], length), minors[mask ^ 1 << j], size, sign,
                                  nu)  # fmt: skip
-                    place += 1
+                    column += 1
             _reduce(minors[mask], size + length - 1, p)
         size += length - 1
     return size
@@ -191,17 +191,17 @@ def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: floa
         _add_product(b, weights[1, :, j : j + 1], 1, X[j], length, 1.0, nu)
     _reduce(a, length, p)
     _reduce(b, length, p)
-    found, size = _gcd(a, _stripped(a, length), b, _stripped(b, length), p, nu, inverses)
-    _copy(found, common, size)
+    divisor, size = _gcd(a, _stripped(a, length), b, _stripped(b, length), p, nu, inverses)
+    _copy(divisor, common, size)
     if size != 1:  # two mixtures may have a factor that not all have
         for j in range(count):
             _copy(X[j], c, length)
-            rest = _stripped(c, length)
+            quotient = _stripped(c, length)
             if size:
-                rest = _divide(c, rest, common, size, p, nu, inverses, a)
-            if rest:
-                found, size = _gcd(common, size, c, rest, p, nu, inverses)
-                _copy(found, common, size)
+                quotient = _divide(c, quotient, common, size, p, nu, inverses, a)
+            if quotient:
+                divisor, size = _gcd(common, size, c, quotient, p, nu, inverses)
+                _copy(divisor, common, size)
     longest = 0
     for j in range(count):
         if size > 1:

@@ -1,8 +1,8 @@
 """Degrees of the iterates of many members of a family of maps: all modulo one small prime p, on lines over GF(p^2).
 
 The parameters of the members are residues modulo p, so that all of them can be tried. A line over GF(p) would meet
-points without a value all the time; over GF(p^2) it does with a probability of about 1/p^2 for each of them. A line
-can only give degrees that are too small: who wants to be certain takes several and the largest.
+indeterminacy points all the time; over GF(p^2) it does so with a probability of about 1/p^2 for each of them. A line
+can only give degrees that are too small: take the largest over several lines.
 """
 
 from __future__ import annotations
@@ -48,21 +48,21 @@ class Family:
         field, n = GF(prime), map_.dim
         self.terms: list[tuple[int, int, int, int]] = []
         self._values: list[list[tuple[tuple[int, ...], int]]] = []  # polynomials in the symbols, then eps
-        places: dict[tuple[int, ...], int] = {}
+        positions: dict[tuple[int, ...], int] = {}
         for i, row in enumerate(map_.rows):
             for j, entry in enumerate(row):
-                found: dict[tuple[int, ...], list[tuple[tuple[int, ...], int]]] = {}
+                terms: dict[tuple[int, ...], list[tuple[tuple[int, ...], int]]] = {}
                 for monomial, coefficient in entry.terms():
                     value = int(field.convert(coefficient))
                     if value:
                         exponents = tuple(int(e) for e in monomial)
-                        found.setdefault(exponents[:n], []).append((exponents[n:], value))
-                for exponent, polynomial in found.items():
-                    place = places.setdefault(exponent, len(places))
-                    self.terms.append((i, j, place, len(self._values)))
+                        terms.setdefault(exponents[:n], []).append((exponents[n:], value))
+                for exponent, polynomial in terms.items():
+                    position = positions.setdefault(exponent, len(positions))
+                    self.terms.append((i, j, position, len(self._values)))
                     self._values.append(polynomial)
-        self.degree = max(1, *(sum(exponent) for exponent in places))
-        self.exponents = [(*exponent, self.degree - sum(exponent)) for exponent in places]
+        self.degree = max(1, *(sum(exponent) for exponent in positions))
+        self.exponents = [(*exponent, self.degree - sum(exponent)) for exponent in positions]
         self._nu = next(c for c in range(2, prime) if pow(c, (prime - 1) // 2, prime) == prime - 1)
         self._inverses = np.array([0, *(pow(c, -1, prime) for c in range(1, prime))], dtype=float)
 
@@ -91,9 +91,9 @@ class Family:
         start[:, -1] = 0.0
         start[:, -1, 0, 0] = 1.0
         weights = draw.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
-        found = np.full((count, terms), TOO_LARGE, dtype=np.int64)
+        degrees = np.full((count, terms), TOO_LARGE, dtype=np.int64)
         walk = _walk_in_flint
-        if choose_kernel(kernel, long=count >= LONG) == "numba":
+        if choose_kernel(kernel, is_long=count >= LONG) == "numba":
             from kahanmaps.maps.residues import curve_kernel
 
             walk = curve_kernel.kernel()
@@ -101,15 +101,15 @@ class Family:
         layout = np.array(self.terms, dtype=np.int64)
 
         def part(low: int) -> None:
-            here = slice(low, low + _CHUNK)
-            walk(start[here], exponents, layout, values[here], weights, self._inverses, float(p), float(self._nu),
-                 room, found[here])  # fmt: skip
+            chunk = slice(low, low + _CHUNK)
+            walk(start[chunk], exponents, layout, values[chunk], weights, self._inverses, float(p), float(self._nu),
+                 room, degrees[chunk])  # fmt: skip
 
         part(count)  # no members: compiles in this thread, which Ctrl-C can end; the pool waits for its own
         with ThreadPoolExecutor(jobs) as pool:
             for _ in pool.map(part, range(0, count, _CHUNK)):
                 pass
-        return found
+        return degrees
 
     def units(self, degrees: Sequence[int]) -> float:
         """The work for one member whose iterates, from the 0th on, have these degrees, in units (algebra/work.py).
@@ -131,8 +131,8 @@ class Family:
             step = np.zeros((2, count), dtype=np.int64)
             step[0] = int(GF(p).convert(eps))
         powers = [np.array([[1], [0]]) + 0 * step]
-        found = np.zeros((count, 2, len(self._values)))
-        for place, polynomial in enumerate(self._values):
+        coefficients = np.zeros((count, 2, len(self._values)))
+        for position, polynomial in enumerate(self._values):
             total = np.zeros((2, count), dtype=np.int64)
             for exponents, coefficient in polynomial:
                 while len(powers) <= exponents[-1]:
@@ -143,15 +143,15 @@ class Family:
                     for _ in range(exponent):
                         term = term * members[:, k] % p
                 total += term * powers[exponents[-1]] % p
-            found[:, :, place] = (total % p).T
-        return found
+            coefficients[:, :, position] = (total % p).T
+        return coefficients
 
 
 def _walk_in_flint(
     start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
     degrees: Any,
 ) -> None:  # fmt: skip
-    """What `walk` of curve_kernel.py does, without numba."""
+    """Do the same as `walk` of curve_kernel.py, without numba."""
     modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
     field: Any = fq_default_ctx(modulus=modulus, var="w")
     context: Any = fq_default_poly_ctx(field)
@@ -168,8 +168,8 @@ def _walk_in_flint(
                 break
             rows: list[list[Any]] = [[None] * (n + 1) for _ in range(n)]
             monomials = [prod((x**e for x, e in zip(X, row, strict=True)), start=one) for row in exponents.tolist()]
-            for i, j, k, place in layout:
-                term = monomials[k] * polynomial(values[m][:, place : place + 1])
+            for i, j, k, position in layout:
+                term = monomials[k] * polynomial(values[m][:, position : position + 1])
                 rows[i][j] = term if rows[i][j] is None else rows[i][j] + term
             image = [zero if minor is None else minor for minor in kernel_minors(rows)]
             common = reduce(lambda a, b: a.gcd(b), image)

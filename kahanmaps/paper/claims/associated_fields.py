@@ -246,11 +246,11 @@ def lagrange_coefficients(o: PaperObjects) -> Pairs:
     for i in o.free:
         j, k = (other for other in o.each if other != i)
         li, lj, lk = o.lam[i], o.lam[j], o.lam[k]
-        below = (li - lj) * (li - lk)
+        denominator = (li - lj) * (li - lk)
         alpha, beta, gamma = o.lagrange(i)
-        yield alpha, (li * li - b) / below
-        yield beta, o.number(2) * (lj + lk) / below
-        yield gamma, o.number(-2) / below
+        yield alpha, (li * li - b) / denominator
+        yield beta, o.number(2) * (lj + lk) / denominator
+        yield gamma, o.number(-2) / denominator
 
 
 @claim("(41)-(43)", "alpha", "B")
@@ -358,10 +358,10 @@ def sixth_powers(o: PaperObjects) -> Pairs:
     square = o.df * o.df
     fourth = square * square
     for i in o.free:
-        rest = o.I - o.B(i).transpose()
+        difference = o.I - o.B(i).transpose()
         traces = o.trace(square) - o.trace(o.B(i).transpose() * square)
-        yield rest * (fourth * square) * o.number(32), rest * fourth * (o.number(8) * traces)
-        yield rest * square * o.number(32), rest * (o.number(8) * traces)
+        yield difference * (fourth * square) * o.number(32), difference * fourth * (o.number(8) * traces)
+        yield difference * square * o.number(32), difference * (o.number(8) * traces)
 
 
 @claim("Lemma 8, proof", "", "H B")

@@ -1,4 +1,4 @@
-"""What survives of the paper's statements where its hypotheses are varied: proved or refuted, cell by cell.
+"""The table of the paper's statements under varied hypotheses: proved or refuted, cell by cell.
 
 Each cell is a claim of section 10, decided like all of them for the member in general. A statement that fails is shown
 to by the smallest counterexample: all numbers 0 or 1 and eps = 1, as few ones as can be, in the order of m.
@@ -23,14 +23,14 @@ from kahanmaps.paper.registry import UNDEFINED, ClaimFunction, ClaimOutcome, cla
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import VerifyOptions, verify
 
-_MOST_ONES = 7
+_MAX_ONES = 7
 _KEY = "not "
 
 Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coordinates, "x" with one
 
 
 def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
-    """Every statement for every variation, in half the dimension m: what holds is proved, what fails is refuted.
+    """Return all statements for all variations in dimension 2m: proved if they hold, refuted if they fail.
 
     Refuted cells are expected to be, and count as controls. Returns a Report with one Finding a cell; raises InputError
     as `verify` does.
@@ -49,9 +49,9 @@ def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
         verdict, evidence, witness = finding.verdict, finding.evidence, finding.witness
         if fails and verdict is Certainty.PROVED:
             verdict = Certainty.REFUTED
-            found = smallest_counterexample(functions[claim.statement], claim.variation)
-            if found is not None:
-                text, witness = found
+            counterexample = smallest_counterexample(functions[claim.statement], claim.variation)
+            if counterexample is not None:
+                text, witness = counterexample
                 evidence = Evidence("exact rational point", f"fails for {text}")
         title = f"{claim.statement}: {VARIATIONS[claim.variation].title}"
         place = {**finding.place, "statement": claim.statement, "variation": claim.variation}
@@ -63,25 +63,25 @@ def table(report: Report) -> str:
     """The cells as a table in Markdown, and the counterexamples below it."""
     titles = [variation.title for variation in VARIATIONS.values()]
     lines = [f"| statement | {' | '.join(titles)} |", "|---" * (len(titles) + 1) + "|"]
-    cells = {(found.place["statement"], found.place["variation"]): found for found in report.findings}
+    cells = {(finding.place["statement"], finding.place["variation"]): finding for finding in report.findings}
     for _, formula, *_ in STATEMENTS:
         row = [str(cells[formula, name].verdict) if (formula, name) in cells else "" for name in VARIATIONS]
         lines.append(f"| `{formula}` | {' | '.join(row)} |".replace("  |", " |"))
     lines.append("")
-    for found in report.findings:
-        if found.witness is not None:
-            left, right = found.witness.left[0], found.witness.right[0]
-            point = ", ".join(found.witness.point)
-            lines.append(f"* {found.claim}: {found.evidence.summary} at x = ({point}), eps = 1: {left} and {right}")
+    for finding in report.findings:
+        if finding.witness is not None:
+            left, right = finding.witness.left[0], finding.witness.right[0]
+            point = ", ".join(finding.witness.point)
+            lines.append(f"* {finding.claim}: {finding.evidence.summary} at x = ({point}), eps = 1: {left} and {right}")
     return "\n".join(lines)
 
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
     """The data in words, and the point with both sides; None where there is none with at most seven ones."""
-    m, roots, slots, more = _SMALL[variation]
-    for count in range(2, _MOST_ONES + 1):
+    m, roots, slots, extras = _SMALL[variation]
+    for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):
-            o = _objects(m, roots, ones, **more)
+            o = _objects(m, roots, ones, **extras)
             try:
                 failure = next((pair for pair in function(o) if not same(QQ, *pair)), None)
             except UNDEFINED:
@@ -138,13 +138,13 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) 
 
 def _slots(m: int, degrees: Sequence[int], planar: bool = True) -> list[Slot]:
     """The monomials of these degrees, each in the variables of one plane if `planar`, and the coordinates of x."""
-    found: list[Slot] = []
+    slots: list[Slot] = []
     for degree in degrees:
         for exponent in monomials(2 * m, degree):
             planes = {i % m for i, e in enumerate(exponent) if e}
             if not planar or len(planes) == 1:
-                found.append(("H", tuple(exponent)))
-    return found + [("x", (i,)) for i in range(2 * m)]
+                slots.append(("H", tuple(exponent)))
+    return slots + [("x", (i,)) for i in range(2 * m)]
 
 
 # Where a variation is tried: m, the roots of chi, what may be 1, and the matrices B.

@@ -140,10 +140,10 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
         # N has degree 5 in l over these denominators, and vanishes at 0, 1 and -1: a quadratic, known at 2, 3 and 4.
         values = []
         for l in (2, 3, 4):
-            below = o.K.one + square * o.number(l * l) * o.block_determinant(i, x)
+            denominator = o.K.one + square * o.number(l * l) * o.block_determinant(i, x)
             moved = x + fx * (o.eps * o.number(2 * l))
             first = o.K.one + square * o.number(l * l) * o.block_determinant(i, x_tilde)
-            second = below * below + square * o.block_determinant(i, moved)
+            second = denominator * denominator + square * o.block_determinant(i, moved)
             difference = o.step(o.f, x_tilde, times=l) - o.step(o.f, o.step(o.f, x, times=l))
             values.append(difference * (first * second * o.number(1, l**3 - l)))
         low, middle, high = values

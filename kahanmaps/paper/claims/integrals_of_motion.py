@@ -72,7 +72,7 @@ def terms_of_the_series(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 7", "", "eps f inhomogeneous", blockwise=True)
 def series_of_the_integrals(o: PaperObjects) -> Pairs:
-    """The series of H~ and K~ to every order up to the one asked for, with the exact remainder
+    """The series of H~ and K~ to every order up to the requested one, with the exact remainder
     H~ = sum_{k<N} eps^{2k} x^T J f'^{2k+1} x + O(eps^{2N})"""
     for g in [o.f, *(o.g_(i) for i in o.each)]:
         jacobian = o.jac(g, o.x)

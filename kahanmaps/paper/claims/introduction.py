@@ -55,8 +55,8 @@ def perturbed_hamiltonians_tend_to_the_hamiltonians(o: PaperObjects) -> Pairs:
     """H~_i is a perturbation of -6 H_i: their difference is eps^2 times a function regular at eps = 0
     H~_i = -6 H_i + O(eps^2)"""
     for i in range(o.m):
-        rest = o.solve(o.one_minus_square(o.f, o.x), o.df * (o.df * o.fx))
-        remainder = o.dot(o.x, o.J * (o.power(o.AT, i) * rest)) * o.number(2)
+        correction = o.solve(o.one_minus_square(o.f, o.x), o.df * (o.df * o.fx))
+        remainder = o.dot(o.x, o.J * (o.power(o.AT, i) * correction)) * o.number(2)
         yield o.H_tilde_(i, o.x), o.H(o.x, i) * o.number(-6) + remainder * (o.eps * o.eps)
 
 

@@ -92,8 +92,8 @@ def polarisation(o: PaperObjects) -> Pairs:
     """Q(x,x~) is the symmetric bilinear form of the quadratic form Q
     Q(x,x~) = (Q(x + x~) - Q(x) - Q(x~))/2"""
     y = o.vector("y")
-    whole = o.value(o.f, o.x + y) - o.value(o.f, o.x) - o.value(o.f, y)
-    yield o.K.column(o.f.polarised(o.x.entries(), y.entries())) * o.number(2), whole
+    polar_form = o.value(o.f, o.x + y) - o.value(o.f, o.x) - o.value(o.f, y)
+    yield o.K.column(o.f.polarised(o.x.entries(), y.entries())) * o.number(2), polar_form
 
 
 @claim("Sect. 2", "", "eps map", blockwise=True)
@@ -103,9 +103,9 @@ def second_order(o: PaperObjects) -> Pairs:
     for system in (o, o.inhomogeneous()):
         f = system.f
         fx, df = o.value(f, o.x), o.jac(f, o.x)
-        rest = o.solve(o.minus_eps_jac(f, o.x), df * (df * fx))
+        remainder = o.solve(o.minus_eps_jac(f, o.x), df * (df * fx))
         series = o.x + fx * (o.number(2) * o.eps) + df * fx * (o.number(2) * o.eps * o.eps)
-        yield system.step(f, o.x), series + rest * (o.number(2) * o.eps * o.eps * o.eps)
+        yield system.step(f, o.x), series + remainder * (o.number(2) * o.eps * o.eps * o.eps)
 
 
 @claim("(6)", "eq: reversible", "map", blockwise=True)

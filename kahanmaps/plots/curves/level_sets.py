@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.plots.figures import require_matplotlib
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.windows import Window

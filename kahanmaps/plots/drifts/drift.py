@@ -19,8 +19,8 @@ from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.floats.classical import ClassicalOrbit
-from kahanmaps.maps.floats.doubles import FloatArray, to_floats
-from kahanmaps.maps.floats.fast import FloatOrbit
+from kahanmaps.maps.floats.float_conversion import FloatArray, to_floats
+from kahanmaps.maps.floats.float_orbit import FloatOrbit
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.plots.drifts.drift_functions import WatchedFunction
 from kahanmaps.plots.figures import (

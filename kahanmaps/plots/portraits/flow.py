@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.floats.classical import VectorField
-from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for
 from kahanmaps.plots.portraits.windows import Window, window_of

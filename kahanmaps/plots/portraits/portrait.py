@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.plots.curves.level_sets import Levels
 from kahanmaps.plots.figures import MAX_VECTOR_POINTS, dot_size, draw_points, drawing, legend_above, new_figure
 from kahanmaps.plots.point_functions import PointFunction

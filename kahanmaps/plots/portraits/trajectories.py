@@ -16,8 +16,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.floats.classical import VectorField
-from kahanmaps.maps.floats.doubles import FloatArray, to_float
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import require_steps

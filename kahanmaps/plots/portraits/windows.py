@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.float_conversion import FloatArray
 
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 

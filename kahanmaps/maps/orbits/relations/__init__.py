@@ -1,1 +1,1 @@
-"""Relations between the points of one orbit, and steps by them."""
+"""Relations between the points of an orbit over Q, and steps by means of them."""

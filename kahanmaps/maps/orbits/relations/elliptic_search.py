@@ -1,18 +1,18 @@
-"""What an orbit has in common with multiples of a point on an elliptic curve: found modulo a prime.
+"""Search modulo a prime for an elliptic curve on which an orbit is P + n T, with its Somos sequences.
 
 Let the points of an orbit be P + n T on an elliptic curve, and their coordinates sections of a line bundle of degree d.
-There are d independent sections; those that are no coordinates are found among the products of coordinates of several
-points, divided by coordinates of all but one. Two of them vanish at d - 2 points of the orbit, and the quotient z of
-these takes each value twice. With sigma functions W(n) of n T and U(n) of n T + d P - s, where s is the sum of the
-zeros of a section,
+There are d independent sections; those that are not coordinates are found among the products of coordinates of several
+points, divided by coordinates of all but one. Two independent sections vanish at d - 2 points of the orbit, and their
+quotient z takes each value twice. With sigma functions W(n) of n T and U(n) of n T + d P - s, where s is the sum of
+the zeros of a section,
 
     z(n) - z(m) = W(n - m) U(n + m + k)/(r(n) r(m)),
 
-so that cross ratios of z give quotients of both. Those of consecutive points are 1 - y(2n + k - 1) with
+so the cross ratios of z give quotients of W and U. Those of four consecutive points are 1 - y(2n + k - 1) with
 
     y(u) = H U(u)^2/(U(u + 1) U(u - 1)),      y(u + 1) y(u) (1 - y(u)) y(u - 1) = H,
 
-where W(2) = H and W(3) = H^3; other four points give y(u) at the u in between, up to one more unknown number.
+where W(2) = H and W(3) = H^3. Another choice of four points gives y(u) at the u in between, up to an unknown factor.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from math import prod
 from flint import nmod
 
 from kahanmaps.algebra.modular_matrices import echelon, integers, kernel, matrix, null_space, pivots
-from kahanmaps.maps.orbits.relations.forms import forms
+from kahanmaps.maps.orbits.relations.sections import forms
 from kahanmaps.maps.somos import around, first_terms
 
 Rows = list[list[int]]
 
-_MOST_PRODUCTS = 64
-_MOST_DEGREE = 8
-_SPARE = 8  # rows beyond the unknowns: each lets what is no relation pass with a chance of 2^-60
-_VALUES = 14  # of z, from which the sequences are found: nine are enough
-_POINTS, _LAGS = (2, 3), (1, 2)  # of which products are made
+_MAX_PRODUCTS = 64
+_MAX_DEGREE = 8
+_EXTRA_POINTS = 8  # rows beyond the unknowns: each lets a wrong relation pass with a probability of 2^-60
+_VALUES = 14  # of z, from which the sequences are computed; nine suffice
+_POINTS, _LAGS = (2, 3), (1, 2)  # numbers of points in a product, and their distances
 
 
 @dataclass(frozen=True)
 class Sections:
-    """How all sections are made: of products of independent coordinates at so many points, each `lag` before the next.
+    """The construction of all sections: products of independent `coordinates` at `points` points, `lag` steps apart.
 
-    There are no products where coordinates are all there is.
+    `products` is empty if the coordinates span all sections.
     """
 
     degree: int
@@ -53,36 +53,37 @@ class Sections:
 
     @property
     def points_used(self) -> int:
-        """How many points of the orbit it takes to make them at all that are used."""
-        return (self.points - 1) * self.lag + max(self.rows, self.degree - 2 + _VALUES, 2 * self.degree + _SPARE)
+        """The number of points of the orbit that the search uses."""
+        return (self.points - 1) * self.lag + max(self.rows, self.degree - 2 + _VALUES, 2 * self.degree + _EXTRA_POINTS)
 
     @property
     def rows(self) -> int:
-        """How many points sections are found from."""
+        """The number of points from which the sections are computed."""
         unknowns, others = len(self.products), (1 << (self.points - 1)) - 1
-        return unknowns + (unknowns + _SPARE) // others + 1
+        return unknowns + (unknowns + _EXTRA_POINTS) // others + 1
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Modulo a prime: `sections`; H, y(2), y(3) and all coefficients of the coordinates, row by row, as residues."""
+    """A curve modulo a prime: `sections`, and as `numbers` H, y(2), y(3) and the coefficients of the coordinates."""
 
     sections: Sections
     numbers: list[list[int]]
 
 
 def points_needed(size: int) -> list[int]:
-    """How many points `curve` is to be given for so many coordinates, and how many if it finds nothing with these."""
+    """Return the numbers of points to give to `curve` for this number of coordinates, to be tried in turn."""
     products: list[int] = [(size + 1) ** count for count in _POINTS]
-    return [number + 2 * _SPARE + 2 * max(_LAGS) for number in products if number <= _MOST_PRODUCTS]
+    return [number + 2 * _EXTRA_POINTS + 2 * max(_LAGS) for number in products if number <= _MAX_PRODUCTS]
 
 
-def curve(points: Rows, prime: int, known: Sections | None = None) -> Curve | None:
-    """The curve of an orbit whose points have last coordinate 1; None where there is none.
+def curve(points: Rows, prime: int, known_sections: Sections | None = None) -> Curve | None:
+    """Search for the elliptic curve of an orbit whose points have last coordinate 1; return None if there is none.
 
-    Raises ArithmeticError where there seems to be one: then the prime is unlucky, or the start is special.
+    Raises ArithmeticError if the dimensions are those of a curve, but the sequences are not: then the prime or the
+    initial point is special.
     """
-    tries = [known] if known else list(_tries(points, prime))
+    tries = [known_sections] if known_sections else list(_tries(points, prime))
     for sections in tries:
         values = _all_sections(points, sections, prime)
         with suppress(ZeroDivisionError):
@@ -95,59 +96,62 @@ def curve(points: Rows, prime: int, known: Sections | None = None) -> Curve | No
 
 
 def _tries(points: Rows, prime: int) -> Iterator[Sections]:
-    """How sections may be made: where products are too independent for a curve, or points too few, there is no way."""
-    coordinates = tuple(pivots(echelon(points[: len(points[0]) + _SPARE], prime)))
+    """Yield possible constructions of the sections; none if the products span too large a space for a curve."""
+    coordinates = tuple(pivots(echelon(points[: len(points[0]) + _EXTRA_POINTS], prime)))
     for count, lag in product(_POINTS, _LAGS):
         size = len(coordinates) ** count
-        used = size + _SPARE + (count - 1) * lag
+        used = size + _EXTRA_POINTS + (count - 1) * lag
         if len(points) < used:
             continue
         products = pivots(echelon(_table(points[:used], coordinates, count, lag, prime), prime))
-        if len(products) > count * _MOST_DEGREE:
+        if len(products) > count * _MAX_DEGREE:
             return
-        degree, rest = divmod(len(products), count)
-        if not rest and 2 <= degree <= _MOST_DEGREE and len(products) < size:
+        degree, remainder = divmod(len(products), count)
+        if not remainder and 2 <= degree <= _MAX_DEGREE and len(products) < size:
             yield Sections(degree, coordinates, count, lag, () if degree == len(coordinates) else tuple(products))
 
 
 def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
-    """A basis of all sections at the points that have enough behind them; None where there seems to be none."""
+    """Return a basis of the sections at all points with enough points before them; None if there is none."""
     count, lag, coordinates = sections.points, sections.lag, sections.coordinates
     if not sections.products:
         return [[point[i] for i in coordinates] for point in points[(count - 1) * lag :]]
-    # Sections t are such that t g is a sum of products for products g of coordinates of the points before: of the last
-    # ones, which are 1, and of combinations that have no zeros in common with these. Sums are what `checks` annihilate.
+    # t is a section if t g is in the span of the products for all products g of coordinates of the earlier points: of
+    # the last coordinate, 1, and of a linear form without common zeros with it. `checks` annihilate this span.
     values = [[row[k] for k in sections.products] for row in _table(points, coordinates, count, lag, prime)]
     sums = matrix(values[: sections.rows], prime)
     checks = kernel(*sums.transpose().rref())
     factors = [
-        [(1, sum((j + 2) ** 3 * x for j, x in enumerate(one))) for one in before]
-        for _, *before in _together(points, count, lag)[: sections.rows]
+        [(1, sum((j + 2) ** 3 * x for j, x in enumerate(earlier))) for earlier in points_before]
+        for _, *points_before in _together(points, count, lag)[: sections.rows]
     ]
     weighed = []
     for chosen in list(product((0, 1), repeat=count - 1))[1:]:
-        g = [prod(one[i] for one, i in zip(before, chosen, strict=True)) % prime for before in factors]
+        g = [
+            prod(earlier[i] for earlier, i in zip(points_before, chosen, strict=True)) % prime
+            for points_before in factors
+        ]
         weighed += [[c and c * x % prime for c, x in zip(check, g, strict=True)] for check in checks]
-    found = kernel(*(matrix(weighed, prime) * sums).rref())
-    if len(found) != sections.degree:
+    kernel_rows = kernel(*(matrix(weighed, prime) * sums).rref())
+    if len(kernel_rows) != sections.degree:
         return None
-    return integers(matrix(values, prime) * matrix(found, prime).transpose())
+    return integers(matrix(values, prime) * matrix(kernel_rows, prime).transpose())
 
 
 def _table(points: Rows, coordinates: Sequence[int], count: int, lag: int, prime: int) -> Rows:
-    """The products of these coordinates of so many points."""
+    """Return the products of these coordinates of `count` points, `lag` steps apart."""
     chosen = [[point[i] for i in coordinates] for point in points]
     return [[prod(x) % prime for x in product(*rows)] for rows in _together(chosen, count, lag)]
 
 
 def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]:
-    """Each point behind which there are enough, with those before it, nearest first."""
+    """Return each point with the count - 1 points before it, `lag` steps apart, nearest first."""
     first = (count - 1) * lag
     return [tuple(points[n - k * lag] for k in range(count)) for n in range(first, len(points))]
 
 
 def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list[list[int]] | None:
-    """Those of `Curve`; None where there is no pencil or sequence, or the coordinates are no sections."""
+    """Return the numbers of a `Curve`; None if there is no pencil or sequence, or the coordinates are not sections."""
     degree, first = sections.degree, (sections.points - 1) * sections.lag
     pencil = null_space(values[: degree - 2], degree, prime)
     if len(pencil) != 2:
@@ -155,17 +159,17 @@ def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list
     quotients = matrix(values[degree - 2 : degree - 2 + _VALUES], prime) * matrix(pencil, prime).transpose()
     z = [nmod(int(quotients[n, 0]), prime) / int(quotients[n, 1]) for n in range(quotients.nrows())]
     shift = 2 * (first + degree - 2) + (degree - 2) * first + (degree - 2) * (degree - 3) // 2  # of u, for z[0]
-    found = _sequence(z, prime)
-    if found is None:
+    sequence = _sequence(z, prime)
+    if sequence is None:
         return None
-    H, y = found
+    H, y = sequence
     y = {m + shift: value for m, value in y.items()}
     for u in range(min(y), 2, -1):
         y[u - 1] = H / (y[u + 1] * y[u] * (1 - y[u]))
-    length = (sections.degree * len(points[0])) // (len(points[0]) - 1) + _SPARE
+    length = (sections.degree * len(points[0])) // (len(points[0]) - 1) + _EXTRA_POINTS
     multiples, others = first_terms(H, y[2], y[3])
     W, U = around(multiples, length + 2), around(others, length + 2, multiples)
-    # The rows of coefficients of the coordinates, up to one factor.
+    # The coefficients of the coordinates, up to a common factor.
     last, rows = len(points[0]) - 1, []
     for n, point in zip(range(2, length), points[2:], strict=False):
         value = [int(entry) for entry in forms(degree, W, U, n)]
@@ -179,15 +183,18 @@ def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list
 
 
 def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | None:
-    """H and y at consecutive u, of which the first belongs to the four points around z[2], z[3]; None if z has none."""
+    """Return H, and y at consecutive u, the first of which belongs to the four points around z[2] and z[3].
+
+    None if z does not come from such a sequence.
+    """
     odd = {}  # 1 - cross ratio is y(u)
     even = {}  # 1 - K times this is y(u)
     for n in range(2, len(z) - 1):
-        ahead, here, before, behind = z[n + 1], z[n], z[n - 1], z[n - 2]
-        odd[2 * n - 1] = 1 - (ahead - here) * (before - behind) / ((ahead - before) * (here - behind))
+        z1, z0, z_1, z_2 = z[n + 1], z[n], z[n - 1], z[n - 2]
+        odd[2 * n - 1] = 1 - (z1 - z0) * (z_1 - z_2) / ((z1 - z_1) * (z0 - z_2))
         if n >= 4:
-            far = z[n - 4]
-            even[2 * n - 2] = (ahead - before) * (here - far) / ((ahead - far) * (here - before))
+            z_4 = z[n - 4]
+            even[2 * n - 2] = (z1 - z_1) * (z0 - z_4) / ((z1 - z_4) * (z0 - z_1))
     rows = []
     for m in odd:
         if m - 1 in even and m + 1 in even:
@@ -196,8 +203,8 @@ def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | N
     kernel = null_space(rows, 4, prime)
     if len(kernel) != 1 or not kernel[0][0]:
         return None
-    K, again, H = (nmod(entry, prime) / kernel[0][0] for entry in kernel[0][1:])
-    if K * K != again:
+    K, K_squared, H = (nmod(entry, prime) / kernel[0][0] for entry in kernel[0][1:])
+    if K * K != K_squared:
         return None
     y = odd | {m: 1 - K * value for m, value in even.items()}
     run = range(min(even), max(even) + 1)

@@ -15,60 +15,65 @@ from kahanmaps.algebra.integers import common_part
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import FractionsPoint, IntegerPoint
-from kahanmaps.maps.orbits.relations.forms import exponents
+from kahanmaps.maps.orbits.relations.sections import exponents
 from kahanmaps.maps.somos import Terms
 
 _PRIME = 2**61 - 1
 
 
 class EllipticSteps:
-    """The steps of an orbit, of which the sequences leave out some at the beginning.
+    """The steps of an orbit by Somos sequences.
 
-    `places` has, for the curves in turn, a row with the Coordinates of each group, or the number of the group that it
-    was one step before. Nothing is given before `first` steps of factors.
+    `groups` contains, for the curves in turn, a row with the Coordinates of each group, or the index of the group one
+    step before of which it is a copy. The forms are used from `first` steps of factors on. The sequences begin after
+    the first `left_out` points of the orbit.
     """
 
     name = "Somos sequences along the orbit"
 
     def __init__(
-        self, map_over: Map, places: Sequence[Sequence[Coordinates | int]], first: int, left_out: int = 0
+        self, map_over: Map, groups: Sequence[Sequence[Coordinates | int]], first: int, left_out: int = 0
     ) -> None:
-        self._map, self._places, self._first, self._left_out = map_over, places, first, left_out
+        self._map, self._places, self._first, self._left_out = map_over, groups, first, left_out
         self._residue: list[int] | None = None
         self._known: dict[tuple[int, int], list[fmpz]] = {}
 
     @property
     def multiples(self) -> Terms:
         """The sequence W of the multiples of T."""
-        return next(one.W for row in self._places for one in row if isinstance(one, Coordinates))
+        return next(
+            coordinates.W for row in self._places for coordinates in row if isinstance(coordinates, Coordinates)
+        )
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """The point with this number, that before being done or skipped; None where the forms do not give it."""
+        """Return the point with this number, after the previous one was computed or skipped; None if not determined."""
         return self.point(number) if self.skip(number) else None
 
     def skip(self, number: int) -> bool:
-        """Whether the point before is sure to have an image: modulo a prime, by an orbit that goes along."""
+        """Return whether the previous point surely has an image, by means of the orbit modulo a prime."""
         if self._residue is None:
-            before = self.point(number - 1)
-            self._residue = None if before is None else before.residues(_PRIME)
-        for one in self._map.factors:
-            self._residue = self._residue and one.integer_steps.image_modulo(self._residue, _PRIME)
+            previous = self.point(number - 1)
+            self._residue = None if previous is None else previous.residues(_PRIME)
+        for factor in self._map.factors:
+            self._residue = self._residue and factor.integer_steps.image_modulo(self._residue, _PRIME)
         return self._residue is not None
 
     def point(self, number: int) -> IntegerPoint | None:
-        """The point with this number, None where the forms do not give it. What is far behind is forgotten."""
-        done = (number - self._left_out) * len(self._map.factors)
-        n = done // len(self._places)
-        for key in [key for key in self._known if key[0] < done - len(self._map.factors) * len(self._places[0])]:
+        """Return the point with this number, None if the forms do not give it; discard terms no longer needed."""
+        factor_steps = (number - self._left_out) * len(self._map.factors)
+        n = factor_steps // len(self._places)
+        for key in [
+            key for key in self._known if key[0] < factor_steps - len(self._map.factors) * len(self._places[0])
+        ]:
             del self._known[key]
         for row in self._places:
-            for one in row:
-                if isinstance(one, Coordinates):
-                    one.forget(n // 2 - 4)
-        return self.at(done)
+            for coordinates in row:
+                if isinstance(coordinates, Coordinates):
+                    coordinates.forget(n // 2 - 4)
+        return self.at(factor_steps)
 
     def at(self, number: int) -> IntegerPoint | None:
-        """The point after so many steps of factors from the first that is not left out; None where it is not given."""
+        """Return the point after `number` steps of factors; None if the forms do not give it."""
         if number < self._first:
             return None
         try:
@@ -80,35 +85,35 @@ class EllipticSteps:
         return FractionsPoint([(p, q) for p, q in values])
 
     def _value(self, number: int, group: int) -> list[fmpz]:
-        """Numerators and denominator of a group. Raises ArithmeticError."""
+        """Return numerators and denominator of a group. Raises ArithmeticError if the denominator is 0."""
         key = number, group
         if key not in self._known:
             n, k = divmod(number, len(self._places))
-            place = self._places[k][group]
-            self._known[key] = self._value(number - 1, place) if isinstance(place, int) else place.at(n)
+            source = self._places[k][group]
+            self._known[key] = self._value(number - 1, source) if isinstance(source, int) else source.at(n)
         return self._known[key]
 
 
 class Coordinates:
-    """A group of coordinates on one curve: `forms` has a row for each of them, the last one for their denominator."""
+    """A group of coordinates on one curve: `forms` has a row for each, and a last row for their denominator."""
 
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
         self.W, self._degree, self._U, self._primes = W, degree, U, primes
         self._exponents = exponents(degree)
-        # What the entries of a column have in common would be multiplied once for each row, by longer numbers.
+        # The content of each column is multiplied into the monomial, not into each row: fewer products of long numbers.
         self._common = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
         self._forms = fmpz_mat([[c // g for c, g in zip(row, self._common, strict=True)] for row in forms.tolist()])
 
     def at(self, n: int) -> list[fmpz]:
-        """Numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError where it is 0."""
+        """Return numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError if the latter is 0."""
         W, U = self.W, self._U
         ratio, part = U.ratio(n), W.part(n)
         weights = primitive_integers(
             tuple(g * ratio**k * part**j for g, (k, _, j) in zip(self._common, self._exponents, strict=True))
         )
         first, second = U.integer(n), U.integer(n + 1) * W.integer(n - 1)
-        here, (square, outer) = W.integer(n), W.pair(n)
-        first, second = (first, second * here) if self._degree % 2 else (first * here, second)
+        term, (square, outer) = W.integer(n), W.pair(n)
+        first, second = (first, second * term) if self._degree % 2 else (first * term, second)
         powers = {(i, j): square**i * outer**j for i, j in {(i, j) for _, i, j in self._exponents}}
         column = [
             weight * (second if k else first) * powers[i, j]
@@ -123,6 +128,6 @@ class Coordinates:
         return values if common == 1 else [value // common for value in values]
 
     def forget(self, n: int) -> None:
-        """Keep no long terms of numbers below n."""
+        """Discard the long terms with index below n."""
         self.W.forget(n)
         self._U.forget(n)

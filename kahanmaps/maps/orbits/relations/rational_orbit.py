@@ -1,4 +1,4 @@
-"""The points of an orbit over Q: single steps until relations between its points are known, which make steps short."""
+"""Orbits over Q: single steps until relations between the points are found, which make further steps faster."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 
-# Relations are looked for when the steps so far took about as long as the search will, which depends on the bits of
-# points, and numbers grow by less than _SLOW_GROWTH in a step: elsewhere there are none, or no steps for which they
-# pay. As their coefficients are about as long as the start, points have to be longer; where coefficients are even
-# longer, they are looked for again when points are _AGAIN times as long.
-_LONG, _LONG_BY_COORDINATES = 4500, 300  # bits; the second times the square of (dimension + 1)
+# The search for relations starts when the steps so far took about as long as it will (which depends on the bit length
+# of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: otherwise there are none. The
+# coefficients of relations are about as long as the initial point, so points must be longer than that. If the
+# coefficients turn out to be longer, the search is repeated when points are _AGAIN times as long.
+_MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second times the square of (dimension + 1)
 _AGAIN = 4
 _LONGER_THAN_START = 8
 _SLOW_GROWTH = 1.5
 
 
 class Relations(Protocol):
-    """Relations along one orbit, and their name."""
+    """Relations between the points of one orbit, by which its next points are computed."""
 
     @property
     def name(self) -> str: ...
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
-        """The point with this number, after the last ones; None where the relations do not give it."""
+        """Return the point with this number from the last ones; None if the relations do not determine it."""
 
     def skip(self, number: int) -> bool:
-        """Whether the orbit has a point with this number, and those after it can do without it."""
+        """Return whether the orbit surely has a point with this number and later points can be computed without it."""
 
     def point(self, number: int) -> IntegerPoint | None:
-        """The point with this number, where it can be reached directly; otherwise None."""
+        """Return the point with this number if it can be computed directly, otherwise None."""
 
 
 class RationalOrbit:
-    """The points of an orbit over Q: iterate once; ends where the map has no value, or after one with too many bits.
+    """The points of an orbit over Q: iterate once.
 
-    Points that are not `wanted` are None where that makes them quicker. `since` is the number of the step from which on
-    `relations` are in use; both are None before.
+    The orbit ends where the map is not defined, or after a point with more than `max_bits` bits. Points that are not
+    requested may be None, where that saves time. `relations` are used from step `since` on; both are None before.
     """
 
     def __init__(
@@ -51,27 +51,27 @@ class RationalOrbit:
         map_over: Map,
         start: IntegerPoint,
         max_bits: int | None = None,
-        wanted: Callable[[int], bool] | None = None,
+        is_requested: Callable[[int], bool] | None = None,
     ) -> None:
-        self.map, self.start, self.max_bits, self._wanted = map_over, start, max_bits, wanted
+        self.map, self.start, self.max_bits, self._wanted = map_over, start, max_bits, is_requested
         self.relations: Relations | None = None
         self.since: int | None = None
 
     def __iter__(self) -> Iterator[IntegerPoint | None]:
         last, reached = deque([self.start], maxlen=3), 0
-        by_coordinates = _LONG_BY_COORDINATES * (self.map.dim + 1) ** 2
-        long: float = max(_LONG, by_coordinates, _LONGER_THAN_START * self.start.bits)
-        too_late = inf if self.max_bits is None else self.max_bits / 2  # few steps are left then: bits grow like n^2
+        by_coordinates = _MIN_BITS_BY_COORDINATES * (self.map.dim + 1) ** 2
+        search_bits: float = max(_MIN_BITS, by_coordinates, _LONGER_THAN_START * self.start.bits)
+        latest_bits = inf if self.max_bits is None else self.max_bits / 2  # later, few steps remain: bits grow like n^2
         yield self.start
         for number in count(1):
             if self.relations is not None and self._wanted is not None and not self._wanted(number):
-                # Left out is a point that is not wanted, unless it may have too many bits.
+                # A point that is not requested is skipped, unless it may exceed the budget.
                 is_short = self.max_bits is None or 2 * last[-1].bits * number**2 < self.max_bits * reached**2
                 if is_short and self.relations.skip(number):
                     yield None
                     continue
             image = None if self.relations is None else self.relations.step(last, number)
-            # Near the end a factor on the way may have too many bits, which single steps see.
+            # Near the budget, an intermediate point of a composition may exceed it: only single steps notice that.
             if image is None or (
                 self.max_bits is not None and len(self.map.factors) > 1 and 4 * image.bits > self.max_bits
             ):
@@ -93,15 +93,22 @@ class RationalOrbit:
             before = last[-1]
             last.append(image)
             reached = number
-            if long < too_late and number > 1 and long <= image.bits < min(too_late, _SLOW_GROWTH * before.bits):
+            if (
+                search_bits < latest_bits
+                and number > 1
+                and search_bits <= image.bits < min(latest_bits, _SLOW_GROWTH * before.bits)
+            ):
                 try:
                     self.relations = relations(self.map, self.start, image)
-                    long = inf
+                    search_bits = inf
                 except TooLongRelation:
-                    long = _AGAIN * image.bits
+                    search_bits = _AGAIN * image.bits
                 self.since = None if self.relations is None else number + 1
 
 
 def relations(map_over: Map, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
-    """The relations that make steps shortest along the orbit of a start on which the point lies. Raises TooLong."""
+    """Search for relations along the orbit of `start`, of which `point` is a later point.
+
+    Raises TooLongRelation if there are relations whose coefficients are still too long.
+    """
     return elliptic_steps(map_over, start, point.bits) or bilinear_forms(map_over, point)

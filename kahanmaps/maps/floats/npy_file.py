@@ -1,12 +1,11 @@
-"""Float orbits on disk: points appended to a .npy file as they are computed, which is valid at every moment.
+"""A .npy file to which float orbits are appended as they are computed, and which is valid at all times.
 
-A .npy file is a header with the shape, then the numbers. numpy leaves room in the header for the first length to
-grow, so a portion is appended in two writes: first the numbers, then the header with the new length, in place. Whoever
-reads in between, or after the program was killed, finds a file that is complete up to the last portion (a few numbers
-may follow that the header does not count yet, and readers ignore them). Compared with a file of full size filled with
-NaN beforehand there is nothing to fill, no disk used for steps that are never taken, and no doubt about what was
-computed: the length says it. Memory needed is that of a portion. A file that has been closed is on the disk (fsync); if
-the machine itself crashes before, the last portions may be missing, or be zeros that the header counts already.
+A .npy file is a header with the shape, followed by the numbers. numpy reserves space in the header for the first length
+to grow, so a portion is appended in two writes: first the numbers, then the header with the new length, in place. A
+reader in between, or after the program was killed, finds a file that is complete up to the last portion (readers ignore
+numbers that the header does not count yet). The length shows how much was computed, and no disk space is used for steps
+that are never taken. A closed file is on the disk (fsync); if the machine crashes before, the last portions may be
+missing, or be zeros that the header already counts.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from kahanmaps.errors import InputError
 
 
 class NpyFile:
-    """A .npy file of shape (rows, *shape), of doubles or 64-bit integers, whose rows are appended; `rows` counts them.
+    """A growing .npy file of shape (rows, *shape), of doubles or 64-bit integers; `rows` is its current length.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, NpyFile(Path(folder) / "x.npy", (2,)) as file:
@@ -34,13 +33,13 @@ class NpyFile:
     """
 
     def __init__(self, path: str | Path, shape: tuple[int, ...], kind: Literal["<f8", "<i8"] = "<f8") -> None:
-        if Path(path).is_fifo():  # to open it would wait for a reader, and it could not grow
-            raise InputError(f"{path}: found a pipe, expected a file: a .npy file is written to in several places")
+        if Path(path).is_fifo():  # opening it would wait for a reader
+            raise InputError(f"{path} is a pipe, expected a file: the header of a .npy file is rewritten in place")
         self.path = path
         self.shape = shape
         self.rows = 0
         self.kind = kind
-        self._room = len(self._header(0))
+        self._header_size = len(self._header(0))
         self._stream: IO[bytes] = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by `close`)
         try:
             with named(path):
@@ -50,23 +49,23 @@ class NpyFile:
             raise
 
     def append(self, rows: NDArray[Any]) -> None:
-        """Write more rows (count, *shape), and count them in the header when they are there."""
+        """Append rows (count, *shape), then update the header."""
         if rows.shape[1:] != self.shape:
             raise InputError(f"found rows of shape {rows.shape[1:]}, expected {self.shape}")
         header = self._header(self.rows + len(rows))
-        if len(header) != self._room:
-            raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file has room for")
+        if len(header) != self._header_size:
+            raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file can hold")
         with named(self.path):
             self._stream.seek(0, io.SEEK_END)
-            left = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
-            while left:  # a single write may take less than everything
-                left = left[self._stream.write(left) :]
+            remaining = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
+            while remaining:  # a single write may be partial
+                remaining = remaining[self._stream.write(remaining) :]
             self._stream.seek(0)
             self._stream.write(header)
         self.rows += len(rows)
 
     def close(self) -> None:
-        """Close the file, which is on the disk then."""
+        """Write everything to the disk (fsync) and close the file."""
         try:
             if not self._stream.closed:
                 with named(self.path):
@@ -75,7 +74,7 @@ class NpyFile:
             self._stream.close()
 
     def _header(self, rows: int) -> bytes:
-        """The header; numpy pads it so that its length does not depend on the number of rows."""
+        """Return the header; numpy pads it so that its length does not depend on the number of rows."""
         stream = io.BytesIO()
         what = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
         np.lib.format.write_array_header_1_0(stream, what)

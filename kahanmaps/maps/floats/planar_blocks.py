@@ -1,7 +1,7 @@
-"""The normal form in machine numbers: one planar map for each root of chi, nearly all of them the same two.
+"""The normal form in floating-point numbers: one planar map for each root of chi, in a canonical form.
 
 At a root r of chi the Kahan map of a member is planar, with a binary cubic h_r (see kahanmaps/family/planar.py). In
-(U, V) = 2 eps (u, v), with half the second derivatives A = a U + b V, B = b U + c V, C = c U + d V of
+coordinates (U, V) = 2 eps (u, v), with half the second derivatives A = a U + b V, B = b U + c V, C = c U + d V of
 h = a U^3/3 + b U^2 V + c U V^2 + d V^3/3, it is Cramer's rule for two equations:
 
     U~ = ((1 + B) U + C V)/w,     V~ = ((1 - B) V - A U)/w,     w = (1 + B)(1 - B) + A C = 1 + eps^2 D.
@@ -10,15 +10,15 @@ A linear change of U and V (h is divided by its determinant) makes h one of
 
     lines    U V (U + V)         (a, b, c, d) = (0, 1, 1, 0)    three linear factors over R, or over C at a complex r
     cubes    (U^3 + V^3)/3                      (1, 0, 0, 1)    one real linear factor
-    general                      whatever they are              a repeated factor, h = 0, or a frame too oblique
+    general                      arbitrary                      a repeated factor, h = 0, or U and V nearly dependent
 
-so that nearly every map has no coefficient left, and costs five or six multiplications and a division. The two factors
-that serve as U and V are those whose forms in x are the least oblique. The block's integral h_r/(1 + eps^2 D) is
+so most maps have no coefficients other than 0 and 1, and take five or six multiplications and a division. Of the linear
+factors, U and V are the two whose forms in x are closest to orthogonal. The integral h_r/(1 + eps^2 D) of the block is
 kappa (A U^2 + 2 B U V + C V^2)/w.
 
 A real root gives one real block (two rows: U, V), a pair of complex roots one complex block (four rows: Re U, Im U,
-Re V, Im V). Roots, coefficients and the linear maps between x and the rows are found in balls and rounded once, so each
-of these numbers is the double nearest to the true one, or next to it.
+Re V, Im V). Roots, coefficients and the linear maps between x and the rows are computed in balls and rounded once, so
+each of these numbers is the double nearest to the exact one, or next to it.
 """
 
 from __future__ import annotations
@@ -35,29 +35,29 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 LINES, CUBES, GENERAL = "lines", "cubes", "general"
 _CANONICAL = {LINES: (0, 1, 1, 0), CUBES: (1, 0, 0, 1)}
-_ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1))  # one of them makes u^3 or u^2 appear in a form that is not 0
-_OBLIQUE = 0.02  # of the sine between the forms U and V: below, digits are lost, so no canonical form
+_ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1))  # one of them gives a nonzero form a nonzero leading coefficient
+_MIN_SINE = 0.02  # of the angle between the forms U and V: for smaller angles too many digits would be lost
 _BITS = (192, 384, 768, 1536, 3072)
-_GOOD_BITS = 60  # of an entry before it is rounded
-_NEGLIGIBLE = 120  # bits below the largest entry of its row: 0, as far as doubles can tell
+_MIN_ACCURACY = 60  # bits of an entry before it is rounded
+_NEGLIGIBLE = 120  # an entry smaller than 2^-120 times the largest of its row is rounded to 0
 
 Frame = tuple[list[acb], list[acb]]
 
 
 @dataclass(frozen=True, eq=False)
 class PlanarBlocks:
-    """The planar maps of a normal form for one eps, in doubles.
+    """The planar maps of a normal form at one eps, in doubles.
 
-    Real blocks, `reals` of them, come first, by increasing root; then one block for each root with positive imaginary
-    part. `coefficients` has a row (a, b, c, d) of complex numbers for each. `into` is the 2m x 2m matrix that takes x
-    to the rows, `out` the one that takes them back.
+    The `reals` real blocks come first, by increasing root; then one block for each root with positive imaginary part.
+    `coefficients` has a row (a, b, c, d) of complex numbers for each block. `into` is the 2m x 2m matrix that maps x to
+    the rows of the blocks, and `out` is its inverse.
 
     >>> from flint import fmpq_poly
     >>> from kahanmaps.family.random_members import random_member_with_chi
@@ -81,16 +81,16 @@ class PlanarBlocks:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The roots as short text; a complex one stands for itself and its conjugate."""
-        found = []
+        """The roots as short text; a complex root represents itself and its conjugate."""
+        labels = []
         for root in self.roots:
             real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # a ball around 0, rounded
-            found.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
-        return tuple(found)
+            labels.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
+        return tuple(labels)
 
     def integrals(self, z: FloatArray) -> NDArray[np.complex128]:
-        """The integrals h/(1 + eps^2 D) at the states z (rows, ...): an array (blocks, ...)."""
-        found = np.empty((len(self.kappa), *z.shape[1:]), dtype=np.complex128)
+        """Return the integrals h/(1 + eps^2 D) at the states z (rows, ...) as an array (blocks, ...)."""
+        integrals = np.empty((len(self.kappa), *z.shape[1:]), dtype=np.complex128)
         with np.errstate(all="ignore"):
             for r, (coefficients, kappa) in enumerate(zip(self.coefficients, self.kappa, strict=True)):
                 if r < self.reals:
@@ -101,11 +101,11 @@ class PlanarBlocks:
                     U, V = z[at] + 1j * z[at + 1], z[at + 2] + 1j * z[at + 3]
                     a, b, c, d = coefficients
                 A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
-                found[r] = kappa * (((A * U + 2.0 * B * V) * U + C * V * V) / ((1.0 + B) * (1.0 - B) + A * C))
-        return found
+                integrals[r] = kappa * (((A * U + 2.0 * B * V) * U + C * V * V) / ((1.0 + B) * (1.0 - B) + A * C))
+        return integrals
 
     def distances(self, z: FloatArray, base: NDArray[np.complex128]) -> FloatArray:
-        """How far the block integrals at the states z (rows, ...) are from `base`: an array (blocks, ...)."""
+        """Return the distances (blocks, ...) of the block integrals at the states z (rows, ...) from `base`."""
         with np.errstate(all="ignore"):
             distance: FloatArray = np.abs(self.integrals(z) - base)
         distance[np.isnan(distance)] = np.inf
@@ -113,13 +113,13 @@ class PlanarBlocks:
 
 
 def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
-    """The blocks of a normal form for an exact eps (half the time step; negative for the inverse map).
+    """Return the blocks of a normal form at an exact eps (half the time step; negative for the inverse map).
 
-    Raises InputError where eps is 0 or a number leaves the range of doubles.
+    Raises InputError if eps is 0 or a number is out of the range of doubles.
     """
     epsilon = rational(eps)
     if epsilon == 0:
-        raise InputError("found eps = 0, for which the Kahan map is the identity")
+        raise InputError("found eps = 0, expected another number: the Kahan map is the identity at eps = 0")
     for bits in _BITS:
         with ctx.workprec(bits), suppress(_Unclear):
             return _Blocks(form, epsilon).to_floats()
@@ -127,20 +127,20 @@ def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
 
 
 def require_same_system(form: NormalForm, map_: MapFamily) -> None:
-    """Raises InputError where the normal form is that of another map."""
+    """Raise InputError if the normal form is that of another map."""
     theirs = CubicHamiltonian(form.H, standard_structure(form.dim)).system
     if not isinstance(map_, KahanFamily) or theirs.dim != map_.dim or theirs.renamed(map_.variables) != map_.system:
         raise InputError(
-            "the normal form belongs to another system: take normal_form(member) of the member that gave it"
+            "the normal form belongs to another system: pass normal_form(member) of the member with this system"
         )
 
 
 class _Unclear(Exception):
-    """The working precision does not decide a sign, or leaves a ball too wide to be rounded."""
+    """The working precision does not determine a sign or a rounded value."""
 
 
 class _Blocks:
-    """The same in balls of the working precision."""
+    """The computation of the blocks in balls of the working precision."""
 
     def __init__(self, form: NormalForm, eps: fmpq) -> None:
         self.form = form
@@ -153,38 +153,38 @@ class _Blocks:
         self.discriminant = (
             b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d
         ) % form.chi
-        found: Any = form.chi.complex_roots()  # the stub has forgotten the multiplicities
-        roots = [root for root, _ in found]
+        pairs: Any = form.chi.complex_roots()  # the type stub omits the multiplicities
+        roots = [root for root, _ in pairs]
         real = sorted((r for r in roots if r.imag.is_zero()), key=lambda r: float(r.real.mid()))
         upper = [r for r in roots if not r.imag.is_zero() and r.imag > 0]
         self.roots = real + sorted(upper, key=lambda r: (float(r.real.mid()), float(r.imag.mid())))
 
     def to_floats(self) -> PlanarBlocks:
-        """Each number as a double. Raises _Unclear where the precision is too low for that."""
+        """Round all numbers to doubles. Raises _Unclear if the precision is too low."""
         coefficients, kappas = [], []
         into: list[list[float]] = []
         out: list[list[float]] = []
         for root in self.roots:
             numbers, kappa, into_uv, out_uv = self._block(root)
             real = root.imag.is_zero()
-            parts = _doubles([part for entry in numbers for part in (entry.real, entry.imag)])
+            parts = _round_to_doubles([part for entry in numbers for part in (entry.real, entry.imag)])
             coefficients.append([complex(x, y) for x, y in zip(parts[::2], parts[1::2], strict=True)])
-            kappas.append(complex(*_doubles([kappa.real, kappa.imag])))
+            kappas.append(complex(*_round_to_doubles([kappa.real, kappa.imag])))
             for row, column in zip(into_uv, out_uv, strict=True):
-                into.append(_doubles([entry.real for entry in row]))
-                out.append(_doubles([entry.real if real else 2 * entry.real for entry in column]))
+                into.append(_round_to_doubles([entry.real for entry in row]))
+                out.append(_round_to_doubles([entry.real if real else 2 * entry.real for entry in column]))
                 if not real:
-                    into.append(_doubles([entry.imag for entry in row]))
-                    out.append(_doubles([-2 * entry.imag for entry in column]))
+                    into.append(_round_to_doubles([entry.imag for entry in row]))
+                    out.append(_round_to_doubles([-2 * entry.imag for entry in column]))
         tables = [np.array(coefficients), np.array(kappas), np.array(into), np.ascontiguousarray(np.array(out).T)]
         if not all(np.isfinite(table).all() for table in tables):
-            raise InputError("the normal form leaves the range of machine floats: use exact arithmetic")
+            raise InputError("the normal form exceeds the range of floating-point numbers: use exact arithmetic")
         reals = sum(1 for root in self.roots if root.imag.is_zero())
         roots = tuple(complex(float(root.real.mid()), float(root.imag.mid())) for root in self.roots)
         return PlanarBlocks(reals, tables[0], tables[1], tables[2], tables[3], roots)
 
     def _block(self, root: acb) -> tuple[list[acb], acb, list[list[acb]], list[list[acb]]]:
-        """a, b, c, d; kappa; the rows of U and V over x; the columns of x over U and V."""
+        """Return (a, b, c, d); kappa; U and V as forms in x; the columns of x in terms of U and V."""
         cubic = [_value(coefficient, root) for coefficient in self.form.coefficients]
         rows = [[_value(element[k], root) for element in self.inverse] for k in (0, 1)]
         kind, frame = self._frame(root, cubic, rows)
@@ -204,7 +204,7 @@ class _Blocks:
         kappa = 1 / (24 * self.eps**3 * det * scale_U * scale_V)
         step = 2 * self.eps
         into = [[step * (f * x + g * y) for x, y in zip(*rows, strict=True)] for f, g in frame]
-        # Lagrange's polynomial chi(t)/((t - root) chi'(root)) is 1 at this root and 0 at the others.
+        # The Lagrange polynomial chi(t)/((t - root) chi'(root)) is 1 at this root and 0 at the others.
         slope, carry = _value(self.form.chi.derivative(), root), acb(0)
         lagrange: list[acb] = []
         for coefficient in reversed(self.form.chi.coeffs()[1:]):
@@ -215,14 +215,17 @@ class _Blocks:
             [sum((arb(s) * l for s, l in zip(row[half], lagrange, strict=True)), acb(0)) for row in S]
             for half in (slice(0, m), slice(m, None))
         )
-        back = _inverse(frame)
-        out = [[(x * back[0][k] + y * back[1][k]) / step for x, y in zip(x_u, x_v, strict=True)] for k in (0, 1)]
+        inverse_frame = _inverse(frame)
+        out = [
+            [(x * inverse_frame[0][k] + y * inverse_frame[1][k]) / step for x, y in zip(x_u, x_v, strict=True)]
+            for k in (0, 1)
+        ]
         return numbers, kappa, into, out
 
     def _frame(self, root: acb, cubic: list[acb], rows: list[list[acb]]) -> tuple[str, Frame]:
-        """The kind of h and two linear forms in u and v, still without scale, that make it so."""
+        """Return the kind of h and two linear forms in u and v, not yet scaled, that bring it to canonical form."""
         if self._vanishes(self.discriminant, root):
-            return GENERAL, self._upright(rows)
+            return GENERAL, self._orthonormal_frame(rows)
         if root.imag.is_zero() and _value(self.discriminant, root).real < 0:
             a, b, c, d = cubic
             kind, lines = CUBES, _factors([3 * a * c - b * b, 9 * a * d - b * c, 3 * b * d - c * c])
@@ -231,24 +234,24 @@ class _Blocks:
         if root.imag.is_zero():  # then the factors are real
             lines = [[acb(entry.real) for entry in line] for line in lines]
         pairs = [(lines[i], lines[j]) for i in range(len(lines)) for j in range(i)]
-        sine, frame = max(((_sine(pair, rows), pair) for pair in pairs), key=lambda found: found[0])
-        return (kind, frame) if sine > _OBLIQUE else (GENERAL, self._upright(rows))
+        sine, frame = max(((_sine(pair, rows), pair) for pair in pairs), key=lambda candidate: candidate[0])
+        return (kind, frame) if sine > _MIN_SINE else (GENERAL, self._orthonormal_frame(rows))
 
-    def _upright(self, rows: list[list[acb]]) -> Frame:
-        """Two forms of length 1 and at right angles as forms in x."""
+    def _orthonormal_frame(self, rows: list[list[acb]]) -> Frame:
+        """Return two linear forms in u and v that are orthonormal as forms in x."""
         one, zero = acb(1), acb(0)
         length = acb(_inner(rows[0], rows[0]).real.sqrt())
         slant = _inner(rows[1], rows[0]) / _inner(rows[0], rows[0]).real
-        rest = [y - slant * x for x, y in zip(*rows, strict=True)]
-        height = acb(_inner(rest, rest).real.sqrt())
+        remainder = [y - slant * x for x, y in zip(*rows, strict=True)]
+        height = acb(_inner(remainder, remainder).real.sqrt())
         return [one / length, zero], [-slant / height, one / height]
 
     def _vanishes(self, element: fmpq_poly, root: acb) -> bool:
-        """Whether an element of K is 0 at the root, exactly."""
+        """Return whether an element of K is exactly 0 at the root."""
         value = _value(element, root)
         if not value.contains(acb(0)):
             return False
-        common = element.gcd(self.form.chi)  # 0 at the root if anything is: the roots of chi are simple
+        common = element.gcd(self.form.chi)  # vanishes at the root iff the element does: the roots of chi are simple
         if common.degree() < 1 or not _value(common, root).contains(acb(0)):
             raise _Unclear
         if common.degree() < self.form.chi.degree() and _value(self.form.chi / common, root).contains(acb(0)):
@@ -257,7 +260,7 @@ class _Blocks:
 
 
 def _factors(form: list[acb]) -> list[list[acb]]:
-    """Linear factors f u + g v, without scale, of a binary form without repeated factors (u^k first)."""
+    """Return the linear factors f u + g v, up to scale, of a binary form without repeated factors (u^k first)."""
     for p, q in _ROTATIONS:
         # u = p u' - q v', v = q u' + p v'
         turned = _transformed(form, ([acb(p), acb(-q)], [acb(q), acb(p)]))
@@ -272,7 +275,7 @@ def _factors(form: list[acb]) -> list[list[acb]]:
 
 
 def _transformed(form: list[acb], matrix: Frame) -> list[acb]:
-    """The binary form with (u, v) = matrix (u', v')."""
+    """Return the binary form after the substitution (u, v) = matrix (u', v')."""
     degree, (u, v) = len(form) - 1, (acb_poly(row) for row in matrix)  # with u' = 1
     total = sum((u ** (degree - k) * v**k * coefficient for k, coefficient in enumerate(form)), acb_poly([]))
     return [total[k] for k in range(degree + 1)]
@@ -285,11 +288,11 @@ def _inverse(frame: Frame) -> Frame:
 
 
 def _sine(frame: Frame, rows: list[list[acb]]) -> float:
-    """The sine of the angle between two forms in u and v, as forms in x."""
-    one, two = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
-    size = abs(_inner(one, two))
+    """Return the sine of the angle between two forms in u and v, regarded as forms in x."""
+    first, second = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
+    size = abs(_inner(first, second))
     # Not size**2: in python-flint 0.9.0 every power but the 0th of an arb with the midpoint 0 and a radius is nan.
-    cosine = size * size / (_inner(one, one).real * _inner(two, two).real)
+    cosine = size * size / (_inner(first, first).real * _inner(second, second).real)
     if not cosine.is_finite():
         raise _Unclear
     return float((1 - cosine).mid()) ** 0.5 if cosine < 1 else 0.0
@@ -308,15 +311,15 @@ def _value(polynomial: fmpq_poly, at: acb) -> acb:
     return acb_poly(polynomial)(at)
 
 
-def _doubles(row: Sequence[arb]) -> list[float]:
-    """The entries as doubles; what is beyond doubt negligible beside the largest is 0."""
+def _round_to_doubles(row: Sequence[arb]) -> list[float]:
+    """Round the entries to doubles; entries surely negligible compared with the largest become 0."""
     largest = max((abs(entry) for entry in row), key=lambda entry: entry.mid())
-    found = []
+    doubles = []
     for entry in row:
         if entry.is_zero() or abs(entry) * arb(2) ** _NEGLIGIBLE < largest:
-            found.append(0.0)
-        elif entry.rel_accuracy_bits() >= _GOOD_BITS:
-            found.append(float(entry.mid()))
+            doubles.append(0.0)
+        elif entry.rel_accuracy_bits() >= _MIN_ACCURACY:
+            doubles.append(float(entry.mid()))
         else:
             raise _Unclear
-    return found
+    return doubles

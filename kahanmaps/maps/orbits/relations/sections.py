@@ -1,7 +1,7 @@
 """Sections of a line bundle on an elliptic curve at n T, as forms in the terms of the sequences W and U.
 
-Of degree d are products of d - 1 terms of W near n and one of U, whose zeros have a given sum. A basis is made of the
-even functions A = W(n)^2 and B = W(n + 1) W(n - 1), and two products that are not.
+Sections of degree d are products of d - 1 terms of W near n and one of U. A basis consists of the monomials in the even
+functions A = W(n)^2 and B = W(n + 1) W(n - 1), each multiplied by one of two products that are not even.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _PRIME = 2**61 - 1
 
 
 def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> list[Any]:
-    """A basis of the sections at n, see `exponents`."""
+    """Return the values at n of the basis of the sections that `exponents` describes."""
     square, outer = W[n] * W[n], W[n + 1] * W[n - 1]
     first, second = U[n], U[n + 1] * W[n - 1]
     first, second = (first, second * W[n]) if degree % 2 else (first * W[n], second)
@@ -27,34 +27,37 @@ def forms(degree: int, W: Mapping[int, Any], U: Mapping[int, Any], n: int) -> li
 
 
 def exponents(degree: int) -> list[tuple[int, int, int]]:
-    """0 for U(n) or 1 for U(n + 1) W(n - 1), and powers of W(n)^2 and W(n + 1) W(n - 1), in a basis of the sections.
+    """Return the triples (k, i, j) of a basis of the sections of a degree.
 
-    One of the first two is to be multiplied by W(n), the second for odd degree.
+    k is 0 for U(n) and 1 for U(n + 1) W(n - 1); i and j are the exponents of W(n)^2 and W(n + 1) W(n - 1). The products
+    with k = 0 (for odd degree, k = 1) have another factor W(n).
     """
     tops = ((degree - 1) // 2, (degree - 2) // 2)
     return [(k, top - j, j) for k, top in enumerate(tops) for j in range(top + 1)]
 
 
 def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[fmpq]) -> fmpq:
-    """A number in which all primes stand that all coordinates may have in common at one n. Raises ArithmeticError.
+    """Return a number divisible by all primes that all coordinates may have in common at some n.
 
-    A common prime of all coordinates is one of all products of a coordinate and a section psi(n) that depends on n T
-    alone. Where these products span the forms of their degree, the index of what they span has all such primes, as
-    those forms have none in common beyond the primes of the first terms.
+    A common prime of all coordinates divides all products of a coordinate and a section psi(n) that depends only on
+    n T. If these products span the forms of their degree, such primes divide the index of their lattice: the only
+    common primes of the forms are those of the first terms. Raises ArithmeticError if the products do not span.
     """
-    for more in (0, *range(2, degree + 1)):
-        length = degree + more
-        if table.nrows() * max(more, 1) < length:
+    for extra_degree in (0, *range(2, degree + 1)):
+        length = degree + extra_degree
+        if table.nrows() * max(extra_degree, 1) < length:
             continue
         basis, products, factor = [], [], fmpq(1)
         terms = around(W, length // 2 + 3), around(U, length // 2 + 3, W)
         for n in range(-(length // 2), length - length // 2):
             values = (fmpq_mat(table) * fmpq_mat(degree, 1, forms(degree, *terms, n))).entries()
-            below, one = _primitive(forms(length, *terms, n))
-            above, another = _primitive([value * psi for value in values for psi in _of_multiples(more, terms[0], n)])
-            basis.append(one)
-            products.append(another)
-            factor *= above / below
+            scale_of_basis, basis_row = _primitive(forms(length, *terms, n))
+            scale_of_products, product_row = _primitive(
+                [value * psi for value in values for psi in _of_multiples(extra_degree, terms[0], n)]
+            )
+            basis.append(basis_row)
+            products.append(product_row)
+            factor *= scale_of_products / scale_of_basis
         columns = pivots(echelon([[int(x % _PRIME) for x in row] for row in products], _PRIME))
         if len(columns) == length:
             chosen = fmpz_mat([[row[k] for k in columns] for row in products])
@@ -63,7 +66,7 @@ def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[f
 
 
 def _primitive(row: Sequence[fmpq]) -> tuple[fmpq, Sequence[fmpz]]:
-    """A row as a number times integers without a common factor, much shorter ones. Raises ArithmeticError for 0."""
+    """Write a row as a number times integers without a common factor. Raises ArithmeticError for a row of zeros."""
     integers = primitive_integers(tuple(row))
     for value, integer in zip(row, integers, strict=True):
         if integer:
@@ -72,7 +75,7 @@ def _primitive(row: Sequence[fmpq]) -> tuple[fmpq, Sequence[fmpz]]:
 
 
 def _of_multiples(degree: int, W: Mapping[int, fmpq], n: int) -> list[fmpq]:
-    """A basis of the sections of a degree other than 1 whose zeros have the sum 0."""
+    """Return a basis at n of the sections of a degree other than 1 that depend only on n T (W alone)."""
     square, outer, third = W[n] * W[n], W[n + 1] * W[n - 1], W[n - 1] ** 2 * W[n + 2]
 
     def even(top: int) -> list[fmpq]:

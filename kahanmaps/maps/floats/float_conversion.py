@@ -1,4 +1,4 @@
-"""The road from exact numbers to machine numbers, and back."""
+"""Conversion between exact numbers and floating-point numbers (doubles)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ FloatArray = NDArray[np.float64]
 
 
 def to_float(value: fmpq) -> float:
-    """The double nearest to a rational number. Raises InputError where it lies outside the range of doubles."""
+    """Return the double nearest to a rational number. Raises InputError if it is out of the range of doubles."""
     try:
         nearest = int(value.p) / int(value.q)
     except OverflowError as error:
-        raise InputError("found a number beyond the range of machine floats (1.8e308): use exact arithmetic") from error
+        raise InputError(
+            "found a number beyond the range of floating-point numbers (1.8e308): use exact arithmetic"
+        ) from error
     return nearest
 
 
 def to_floats(values: Sequence[Any]) -> FloatArray:
-    """Exact numbers rounded to doubles, each to the nearest.
+    """Round exact numbers to the nearest doubles.
 
     >>> to_floats(["1/3", "2"])
     array([0.33333333, 2.        ])
@@ -38,7 +40,7 @@ def to_floats(values: Sequence[Any]) -> FloatArray:
 
 
 def start_rows(starts: Any) -> FloatArray:
-    """One start or many as rows of doubles: of numbers of any kind, or of text.
+    """Convert one initial point or several to rows of doubles; entries may be numbers of any kind, or text.
 
     >>> start_rows(["1/2", 0]), start_rows([[1, 2.5]])
     (array([[0.5, 0. ]]), array([[1. , 2.5]]))
@@ -50,18 +52,18 @@ def start_rows(starts: Any) -> FloatArray:
     except (TypeError, ValueError):
         rows = starts if all(isinstance(row, list | tuple) for row in starts) else [starts]
     if len({len(row) for row in rows}) != 1:
-        raise InputError("found starts of different lengths, expected as many coordinates in each")
+        raise InputError("found initial points of different lengths, expected the same number of coordinates in each")
     return np.array([[x if isinstance(x, float) else to_float(rational(x)) for x in row] for row in rows])
 
 
 def exact(value: float) -> fmpq:
-    """The rational number that a finite double is."""
+    """Return the rational number that equals a finite double."""
     numerator, denominator = value.as_integer_ratio()
     return fmpq(numerator, denominator)
 
 
 class _Floats:
-    """Machine numbers, as far as evaluating a rational function, and printing a point, need a field."""
+    """Floating-point numbers with the part of the interface of a field that evaluation and printing need."""
 
     zero = 0.0
     one = 1.0
@@ -72,7 +74,7 @@ class _Floats:
 
     @staticmethod
     def value(polynomial: Any, point: Sequence[float]) -> None:
-        """None: there is no other way than term by term."""
+        """Return None: a polynomial is evaluated term by term."""
 
     @staticmethod
     def is_zero(value: float) -> bool:
@@ -91,13 +93,16 @@ FLOATS: Any = _Floats()
 
 
 def float_function(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
-    """The rational function in double precision; None where the denominator is 0 or the value is no finite number."""
+    """Return a function that evaluates a rational function in double precision.
+
+    Its value is None where the denominator is 0 or the result is not finite.
+    """
 
     def value(point: Sequence[float]) -> float | None:
         try:
-            found: float | None = function.value(_Floats, point)
+            result: float | None = function.value(_Floats, point)
         except (OverflowError, ZeroDivisionError):
             return None
-        return found if found is not None and isfinite(found) else None
+        return result if result is not None and isfinite(result) else None
 
     return value

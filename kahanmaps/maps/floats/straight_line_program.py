@@ -1,20 +1,20 @@
-"""A step of a map as straight-line code: a list of operations on floating-point numbers, written for the map at hand.
+"""Straight-line programs for steps of maps in floating-point numbers.
 
-`Code` records what is done with its values. Coefficients are folded in: nothing is multiplied by 0 or 1, nothing is
-computed twice, and what does not depend on each other stays apart. The list is run in two ways, with the same numbers
-to the last bit: as a Python function of floats or of whole numpy arrays (`Code.function`), and as machine code for
-vectors of orbits (machine_code.py).
+`StraightLineProgram` records the operations on its values. Coefficients are folded in: there are no multiplications by
+0 or 1, and no common subexpressions are computed twice. A program is run in two ways, with the same results to the last
+bit: as a Python function of floats or of numpy arrays (`StraightLineProgram.function`), and as machine code for vectors
+of orbits (machine_code.py).
 
-`solve` writes the solution of M y = r for a matrix whose zeros are known. Rows and columns with a single entry are
-solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a normal form are such
-blocks, with complex entries at a complex root), larger ones by Gaussian elimination.
+`solve` writes a program for the solution of M y = r, where the zeros of M are known. Rows and columns with a single
+entry are solved by substitution, blocks of two rows by Cramer's rule with one division (the planes of a normal form are
+such blocks, with complex entries at a complex root), larger blocks by Gaussian elimination.
 
 Pivots. A step is *near-singular* if a pivot, or the determinant of a block of two rows, is at most 2^-40 of the numbers
-that it is made of: then at most 13 of its 53 bits are left. An elimination takes the diagonal in an order that fills in
-little, and is right as long as no row is subtracted more than 8 times from another. There are two versions of each
-step. The *fast* one says in which orbits all pivots are far from 0, no row had to be exchanged and all numbers are
-finite; the *careful* one, for the others, exchanges rows and says what happened. Where the fast one is content the two
-give the same numbers.
+from which it was computed: then at most 13 of its 53 bits are correct. An elimination takes pivots on the diagonal, in
+an order with little fill-in; this is stable as long as no row is subtracted more than 8 times from another. Each step
+has two versions. The *fast* one reports in which orbits all pivots are far from 0, no rows need to be exchanged and all
+numbers are finite. The *careful* one, for all other orbits, exchanges rows and reports the status. Where the fast
+version is valid, both give the same numbers.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 NEAR = 2.0**-40
-MUCH = 8.0  # times the pivot row, at most, is subtracted from another row
+MAX_FACTOR = 8.0  # of the pivot row when it is subtracted from another row
 LARGEST = float(np.finfo(np.float64).max)
 MAX_OPERATIONS = 4000  # of a fast step; longer ones take too long to be compiled
 
@@ -33,13 +33,13 @@ _SYMBOLS = {"add": "+", "sub": "-", "mul": "*", "div": "/", "gt": ">", "le": "<=
 
 
 class TooManyOperations(Exception):
-    """A step has more operations than are worth being written out."""
+    """A step has too many operations for a straight-line program."""
 
 
-class Code:
-    """Operations in the order in which they are done; number k of them is value `inputs + k`.
+class StraightLineProgram:
+    """A list of operations in the order of execution; operation number k has the value number `inputs + k`.
 
-    >>> code = Code(2)
+    >>> code = StraightLineProgram(2)
     >>> x, y = code.arguments
     >>> code.outputs = [(x + 0.0) * y, y * x - 1.0]
     >>> code.function(float)(3.0, 5.0)
@@ -57,7 +57,7 @@ class Code:
         self.arguments = [Value(self, k) for k in range(inputs)]
 
     def emit(self, name: str, *operands: Any) -> Value:
-        """The value of an operation, which is recorded unless it is there already."""
+        """Return the value of an operation, and record the operation unless it was recorded before."""
         keys = tuple(x.number if isinstance(x, Value) else ("constant", float(x)) for x in operands)
         key = (name, tuple(sorted(keys, key=repr)) if name in ("add", "mul", "and", "or") else keys)
         if key not in self._known:
@@ -68,13 +68,13 @@ class Code:
         return self._known[key]
 
     def function(self, kind: type) -> Callable[..., tuple[Any, ...]]:
-        """A Python function from the inputs to the outputs: of floats, or of arrays (`kind` is np.ndarray)."""
+        """Compile the program to a Python function of floats, or of arrays (`kind` is np.ndarray)."""
         last = {
             x.number: k for k, (_, operands) in enumerate(self.operations) for x in operands if isinstance(x, Value)
         }
         last |= {x.number: len(self.operations) for x in self.outputs if isinstance(x, Value)}
         names = {k: f"v{k}" for k in range(self.inputs)}
-        unused: list[str] = []  # names whose arrays can go, so that the processor's cache holds the others
+        unused: list[str] = []  # names that are reused, so that fewer arrays have to fit into the processor's cache
 
         def text(x: Any) -> str:
             return names[x.number] if isinstance(x, Value) else repr(x) if isinstance(x, bool) else f"({float(x)!r})"
@@ -95,17 +95,17 @@ class Code:
             dying = {
                 v.number for v in operands if isinstance(v, Value) and last[v.number] == k and v.number >= self.inputs
             }
-            places = [names[number] for number in sorted(dying)]
+            free_names = [names[number] for number in sorted(dying)]
             if kind is not float and name in ("add", "sub", "mul", "div") and isinstance(operands[0], Value):
                 if name in ("add", "mul") and operands[0].number not in dying:
                     x.reverse()
-                if x[0] in places:  # in place
-                    places.remove(x[0])
+                if x[0] in free_names:  # in place
+                    free_names.remove(x[0])
                     names[self.inputs + k] = x[0]
                     lines.append(f"    {x[0]} {_SYMBOLS[name]}= {x[1]}")
-                    unused += places
+                    unused += free_names
                     continue
-            unused += places
+            unused += free_names
             names[self.inputs + k] = unused.pop() if unused else f"v{self.inputs + k}"
             lines.append(f"    {names[self.inputs + k]} = {right}")
         lines.append(f"    return ({''.join(f'{text(x)}, ' for x in self.outputs)})")
@@ -113,14 +113,14 @@ class Code:
         if kind is float:
             functions = {"max": max, "min": min}
         exec("\n".join(lines), functions)
-        found: Callable[..., tuple[Any, ...]] = functions["step"]
-        return found
+        function: Callable[..., tuple[Any, ...]] = functions["step"]
+        return function
 
 
 class Value:
-    """A number, or a truth value, in a `Code`; Python's floats and bools stand for constants."""
+    """A number or a truth value in a program; constants are Python floats and bools."""
 
-    def __init__(self, code: Code, number: int) -> None:
+    def __init__(self, code: StraightLineProgram, number: int) -> None:
         self.code, self.number = code, number
 
     def __neg__(self) -> Any:
@@ -185,7 +185,7 @@ class Value:
 
 
 def _negated(x: Any) -> Any:
-    """y where x has been computed as -y, else None."""
+    """Return y if x was computed as -y, else None."""
     if not isinstance(x, Value) or x.number < x.code.inputs:
         return None
     name, operands = x.code.operations[x.number - x.code.inputs]
@@ -218,36 +218,36 @@ class ComplexPair:
     __radd__ = __add__
 
     def norm(self) -> Any:
-        """x^2 + y^2."""
+        """Return x^2 + y^2."""
         return self.x * self.x + self.y * self.y
 
 
 def is_zero(x: Any) -> bool:
-    """Whether this is the constant 0."""
+    """Return whether this is the constant 0."""
     return isinstance(x, float | int) and x == 0.0
 
 
-def select(condition: Any, one: Any, other: Any) -> Any:
-    """One number where the condition holds and the other elsewhere."""
+def select(condition: Any, if_true: Any, if_false: Any) -> Any:
+    """Return `if_true` where the condition holds and `if_false` elsewhere."""
     if isinstance(condition, bool):
-        return one if condition else other
-    same = one is other or (isinstance(one, float) and isinstance(other, float) and one == other)
-    return one if same else condition.code.emit("select", condition, one, other)
+        return if_true if condition else if_false
+    same = if_true is if_false or (isinstance(if_true, float) and isinstance(if_false, float) and if_true == if_false)
+    return if_true if same else condition.code.emit("select", condition, if_true, if_false)
 
 
 def extreme(name: str, x: Any, y: Any) -> Any:
-    """The larger ("max") or smaller ("min") of two numbers >= 0; where one is no number, either."""
+    """Return the larger ("max") or smaller ("min") of two numbers >= 0; either of them if one is NaN."""
     values = [v for v in (x, y) if isinstance(v, Value)]
     if len(values) == 1 and (0.0 if name == "max" else np.inf) in (x, y):
         return values[0]
     return values[0].code.emit(name, x, y) if values else max(x, y) if name == "max" else min(x, y)
 
 
-class StepFindings:
-    """What is asked of the numbers on the way through a step.
+class StepChecks:
+    """The checks on the intermediate numbers of a step.
 
-    `good` says that all is as usual, of a fast step; `near`, `zero` and `finite` belong to a careful one: whether a
-    pivot was small, whether one was 0 and whether all numbers were finite.
+    For a fast step, `good` is true if its result is valid. For a careful step, `near` is true if a pivot was small,
+    `zero` if a pivot was 0, and `finite` if all numbers were finite.
     """
 
     def __init__(self, careful: bool) -> None:
@@ -258,12 +258,12 @@ class StepFindings:
         self.finite: Any = True
         self._sum: Any = 0.0
 
-    def pivot(self, pivot: Any, least: Any) -> None:
-        """A number that is divided by, which is small up to `least` in absolute value."""
+    def pivot(self, pivot: Any, threshold: Any) -> None:
+        """Check a divisor: it is small if its absolute value is at most `threshold`."""
         if isinstance(pivot, float):  # a coefficient: 0 if the matrix is singular everywhere
             self.zero, self.good = self.zero | (pivot == 0.0), self.good & (pivot != 0.0)
             return
-        usual = abs(pivot) > least
+        usual = abs(pivot) > threshold
         if self.careful:
             self.near, self.zero = self.near | ~usual, self.zero | pivot.code.emit("eq", pivot, 0.0)
         else:
@@ -271,7 +271,7 @@ class StepFindings:
         self.number(pivot)
 
     def number(self, x: Any) -> None:
-        """A number that should be finite. A sum of all says so if it is; if not, the careful step looks at each."""
+        """Check that a number is finite. A fast step checks the sum of all numbers, a careful step each of them."""
         if isinstance(x, Value):
             if self.careful:
                 self.finite = self.finite & (abs(x) <= LARGEST)
@@ -279,7 +279,7 @@ class StepFindings:
                 self._sum = x + self._sum
 
     def outputs(self) -> list[Any]:
-        """The truth values of a step: `good`, or whether it was near-singular, singular, and an overflow."""
+        """Return the truth values of a step: `good`, or whether it was near-singular, singular, an overflow."""
         if not self.careful:
             return [self.good & (abs(self._sum) <= LARGEST) if isinstance(self._sum, Value) else self.good]
         singular = self.zero
@@ -291,84 +291,84 @@ def _negation(x: Any) -> Any:
     return not x if isinstance(x, bool) else ~x
 
 
-def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], asked: StepFindings) -> list[Any]:
-    """The solution y of M y = r, the rows being those of (M | r); any numbers where M is singular.
+def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
+    """Write the solution y of M y = r, given the rows of (M | r); the numbers are arbitrary if M is singular.
 
-    `bound` gives a number that no entry of M exceeds, which is needed for fast eliminations only.
+    `bound` returns an upper bound of the entries of M, which only fast eliminations need.
     """
     n = len(rows)
     matrix = [{j: x for j, x in enumerate(row[:n]) if not is_zero(x)} for row in rows]
-    right, left, found = [row[n] for row in rows], set(range(n)), [0.0] * n
-    # A row with one entry comes first. A column with one entry comes last: the other rows do not need its unknown.
+    rhs, remaining, solution = [row[n] for row in rows], set(range(n)), [0.0] * n
+    # A row with one entry is solved first. A column with one entry is solved last: no other row needs its unknown.
     after: list[tuple[int, int]] = []
-    while left:
-        single = next((i for i in sorted(left) if len(matrix[i]) == 1), None)
+    while remaining:
+        single = next((i for i in sorted(remaining) if len(matrix[i]) == 1), None)
         if single is not None:
-            left.remove(single)
+            remaining.remove(single)
             ((j, pivot),) = matrix[single].items()
-            asked.pivot(pivot, NEAR)
-            found[j] = right[single] / pivot
-            for k in left:
+            checks.pivot(pivot, NEAR)
+            solution[j] = rhs[single] / pivot
+            for k in remaining:
                 if j in matrix[k]:
-                    right[k] = right[k] - matrix[k].pop(j) * found[j]
+                    rhs[k] = rhs[k] - matrix[k].pop(j) * solution[j]
             continue
         columns: dict[int, list[int]] = {}
-        for i in sorted(left):
+        for i in sorted(remaining):
             for j in matrix[i]:
                 columns.setdefault(j, []).append(i)
         alone = next((j for j in sorted(columns) if len(columns[j]) == 1), None)
         if alone is None:
             break
         after.append((columns[alone][0], alone))
-        left.remove(columns[alone][0])
-    while left:  # blocks of rows that have unknowns in common
+        remaining.remove(columns[alone][0])
+    while remaining:  # connected blocks: rows with common unknowns
         block: set[int] = set()
-        more = {min(left)}
-        while more != block:
-            block, unknowns = more, {j for i in more for j in matrix[i]}
-            more = {i for i in left if unknowns & matrix[i].keys()} | block
-        left -= block
+        component = {min(remaining)}
+        while component != block:
+            block, unknowns = component, {j for i in component for j in matrix[i]}
+            component = {i for i in remaining if unknowns & matrix[i].keys()} | block
+        remaining -= block
         order = sorted(unknowns)
         if len(order) != len(block):  # singular everywhere
-            asked.pivot(0.0, NEAR)
+            checks.pivot(0.0, NEAR)
             continue
-        square = [[*(matrix[i].get(j, 0.0) for j in order), right[i]] for i in sorted(block)]
-        values = solve_two(square, asked) if len(square) == 2 else _eliminate(square, bound, asked)
+        square = [[*(matrix[i].get(j, 0.0) for j in order), rhs[i]] for i in sorted(block)]
+        values = solve_two(square, checks) if len(square) == 2 else _eliminate(square, bound, checks)
         for j, value in zip(order, values, strict=True):
-            found[j] = value
+            solution[j] = value
     for i, j in reversed(after):
-        asked.pivot(matrix[i][j], NEAR)
-        total = right[i]
+        checks.pivot(matrix[i][j], NEAR)
+        total = rhs[i]
         for k, entry in matrix[i].items():
-            total = total if k == j else total - entry * found[k]
-        found[j] = total / matrix[i][j]
-    return found
+            total = total if k == j else total - entry * solution[k]
+        solution[j] = total / matrix[i][j]
+    return solution
 
 
-def solve_two(rows: Sequence[Sequence[Any]], asked: StepFindings) -> list[Any]:
-    """Cramer's rule for two equations, whose entries may be complex (`Pair`)."""
+def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
+    """Write the solution of two equations by Cramer's rule; the entries may be complex (`ComplexPair`)."""
     (a, b, r), (c, d, s) = rows
     product = b * c
     det = a * d - product
     if isinstance(det, ComplexPair):
         norm = det.norm()
-        asked.pivot(norm, NEAR**2 + NEAR**2 * product.norm())
+        checks.pivot(norm, NEAR**2 + NEAR**2 * product.norm())
         share = _inverse(norm)
         inverse: Any = ComplexPair(det.x * share, -(det.y * share))
     else:
-        asked.pivot(det, NEAR + NEAR * abs(product))
+        checks.pivot(det, NEAR + NEAR * abs(product))
         inverse = _inverse(det)
     return [(d * r - b * s) * inverse, (a * s - c * r) * inverse]
 
 
-def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: StepFindings) -> list[Any]:
-    """Gaussian elimination; the careful one exchanges rows where a pivot is small."""
-    n, M = len(rows), [[*row, 1.0] for row in rows]  # with the sizes of the rows behind the right-hand side
+def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], checks: StepChecks) -> list[Any]:
+    """Write a Gaussian elimination; the careful version exchanges rows if a pivot is small."""
+    n, M = len(rows), [[*row, 1.0] for row in rows]  # the last column contains the sizes of the rows
     order = _pivots([{j for j in range(n) if not is_zero(row[j])} for row in rows])
     if len(order) < n:  # singular everywhere
-        asked.pivot(0.0, NEAR)
+        checks.pivot(0.0, NEAR)
         return [0.0] * n
-    for row in M if asked.careful else ():
+    for row in M if checks.careful else ():
         for x in row[:n]:
             row[-1] = extreme("max", row[-1], abs(x))
     inverses: list[Any] = []
@@ -376,16 +376,16 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: StepFindi
     for step, (i, j) in enumerate(order):
         columns = [*(c for _, c in order[step + 1 :]), n]
         later = [k for k, _ in order[step + 1 :]]
-        for k in later if asked.careful else ():
-            swap = abs(M[k][j]) > MUCH * abs(M[i][j])
+        for k in later if checks.careful else ():
+            swap = abs(M[k][j]) > MAX_FACTOR * abs(M[i][j])
             for c in (j, *columns, n + 1):
-                one, other = M[i][c], M[k][c]
-                M[i][c], M[k][c] = select(swap, other, one), select(swap, one, other)
+                entry, other = M[i][c], M[k][c]
+                M[i][c], M[k][c] = select(swap, other, entry), select(swap, entry, other)
         inverses.append(_inverse(M[i][j]))
-        if asked.careful:
-            asked.pivot(M[i][j], NEAR * M[i][n + 1])
+        if checks.careful:
+            checks.pivot(M[i][j], NEAR * M[i][n + 1])
         else:
-            asked.number(M[i][j])
+            checks.number(M[i][j])
             smallest = extreme("min", smallest, abs(M[i][j]))
         for k in later:
             if not is_zero(M[k][j]):
@@ -393,22 +393,22 @@ def _eliminate(rows: list[list[Any]], bound: Callable[[], Any], asked: StepFindi
                 factors = extreme("max", factors, abs(factor))
                 for c in columns:
                     M[k][c] = M[k][c] - factor * M[i][c]
-    if not asked.careful:
-        asked.good = asked.good & (smallest > NEAR * bound()) & (factors <= MUCH)
-    found: list[Any] = [0.0] * n
+    if not checks.careful:
+        checks.good = checks.good & (smallest > NEAR * bound()) & (factors <= MAX_FACTOR)
+    solution: list[Any] = [0.0] * n
     for (i, j), inverse in zip(reversed(order), reversed(inverses), strict=True):
-        found[j] = M[i][n] * inverse
+        solution[j] = M[i][n] * inverse
         for k, _ in order:
             if k == i:
                 break
-            M[k][n] = M[k][n] - M[k][j] * found[j]
-    return found
+            M[k][n] = M[k][n] - M[k][j] * solution[j]
+    return solution
 
 
 def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
-    """Row and column of each pivot: on the diagonal where it can be, and such that few zeros are lost (Markowitz).
+    """Return row and column of each pivot, on the diagonal if possible, with little fill-in (Markowitz).
 
-    There are fewer than rows where the zeros alone make the matrix singular.
+    The result has fewer pivots than rows if the pattern of zeros makes the matrix singular.
     """
     rows, order = {i: set(row) for i, row in enumerate(pattern)}, []
     while rows:
@@ -416,11 +416,11 @@ def _pivots(pattern: list[set[int]]) -> list[tuple[int, int]]:
         for row in rows.values():
             for j in row:
                 counts[j] = counts.get(j, 0) + 1
-        places = [(i, j) for i, row in rows.items() for j in row]
-        places = [(i, j) for i, j in places if i == j] or places
-        if not places:
+        candidates = [(i, j) for i, row in rows.items() for j in row]
+        candidates = [(i, j) for i, j in candidates if i == j] or candidates
+        if not candidates:
             break
-        i, j = min(places, key=lambda place: ((len(rows[place[0]]) - 1) * (counts[place[1]] - 1), place))
+        i, j = min(candidates, key=lambda entry: ((len(rows[entry[0]]) - 1) * (counts[entry[1]] - 1), entry))
         pivot = rows.pop(i)
         order.append((i, j))
         for row in rows.values():

@@ -1,9 +1,8 @@
-"""Float orbits: the Kahan map in machine numbers.
+"""Orbits in floating-point numbers, one at a time.
 
-A second implementation, apart from the exact one and tested against it. The only road from exact numbers to machine
-numbers is `to_floats`. What users need is gathered here. `steps` says what a step is, `straight_line` how it is written
-out, `machine_code` compiles it, `blocks` is the normal form in doubles, `ensemble` advances many orbits, `stream`
-writes them.
+This implementation is independent of the exact one and tested against it. Exact numbers are converted only by
+`to_floats`. The modules of this folder: `steps` defines a step, `straight_line_program` its operations, `machine_code`
+compiles them, `planar_blocks` is the normal form in doubles, `ensemble` advances many orbits, `npy_file` stores them.
 """
 
 from __future__ import annotations
@@ -17,7 +16,6 @@ import numpy as np
 
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.floats.doubles import FLOATS, FloatArray, float_function, to_float, to_floats
 from kahanmaps.maps.floats.ensemble import (
     SAMPLED,
     Drift,
@@ -25,7 +23,8 @@ from kahanmaps.maps.floats.ensemble import (
     Function,
     require_every,
 )
-from kahanmaps.maps.floats.stream import NpyFile
+from kahanmaps.maps.floats.float_conversion import FLOATS, FloatArray, float_function, to_float, to_floats
+from kahanmaps.maps.floats.npy_file import NpyFile
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
@@ -45,14 +44,21 @@ __all__ = [
 
 
 class FloatOrbit:
-    """The orbit of `start` in double precision: iterate over (step, x), then look at `end`.
+    """The orbit of an initial point in double precision: iterate over (step, x), then read `end`.
 
-    `start` holds exact numbers, `eps` is half the time step, `steps` how many steps to take (None: no limit), `every`
-    says which of them are delivered, `backward` steps by the inverse map. With `form`, the normal form of the system,
-    steps are much faster and lose fewer digits. `kernel` is "numpy" or "numba"; by default numba, if it is installed,
-    for more than 20,000 steps. Points are computed some ahead of the one delivered; what the attributes say about
-    near-singular steps and drift is about what was computed. See FloatEnsemble for many orbits, and for `integrals` and
-    `sampled`.
+    Args:
+        system: a map, or a quadratic system, which stands for its Kahan map.
+        eps: an exact number, half the time step.
+        start: the initial point, exact numbers.
+        steps: the number of steps; None for no limit.
+        backward: step by the inverse map.
+        form: the normal form of the system, by which steps are much faster and lose fewer digits.
+        kernel: "numpy" or "numba"; by default numba, if installed, for more than 20,000 steps.
+        every: deliver only the points whose step is a multiple of this number.
+        integrals, sampled: see FloatEnsemble.
+
+    Points are computed in portions, ahead of the one delivered; near-singular steps and drift refer to all points
+    computed so far.
 
     >>> orbit = FloatOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/2", [1], 4, every=2)
     >>> [(step, float(x[0])) for step, x in orbit]
@@ -93,7 +99,7 @@ class FloatOrbit:
             self.start[None],
             backward=backward,
             form=form,
-            kernel=choose_kernel(kernel, long=steps is None or steps > _LONG),
+            kernel=choose_kernel(kernel, is_long=steps is None or steps > _MIN_COMPILED_STEPS),
             threads=1,
             integrals=integrals,
             sampled=sampled,
@@ -103,44 +109,46 @@ class FloatOrbit:
 
     @property
     def kernel(self) -> str:
-        """What computes: "numpy generic", "numba normal form, 1 thread"."""
+        """Kernel and method: "numpy generic", "numba normal form, 1 thread"."""
         return self._ensemble.kernel
 
     @property
     def near_singular(self) -> int:
-        """How many near-singular steps were taken (see steps.py)."""
+        """The number of near-singular steps (see steps.py)."""
         return int(self._ensemble.near_singular[0])
 
     @property
     def near_singular_at(self) -> int | None:
-        """The index of the point from which the first of them was taken."""
+        """The index of the point before the first near-singular step; None if there was none."""
         return int(self._ensemble.near_singular_at[0]) if self.near_singular else None
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """Of the block integrals h/(1 + eps^2 D), by root of chi, and of the functions that are watched."""
+        """The drift of the block integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
         return tuple(drift.of(0) for drift in self._ensemble.drift)
 
     def interrupt(self) -> None:
-        """Ask a running orbit to end after the step in flight."""
+        """Stop a running orbit after the current step."""
         self._interrupted = True
 
     def __iter__(self) -> Iterator[tuple[int, FloatArray]]:
-        reached = -self.every
+        step = -self.every
         for _, points in self.portions():
             for x in points:
-                reached += self.every
-                yield reached, x
+                step += self.every
+                yield step, x
                 if self._interrupted:
-                    self.end = OrbitEnd("interrupted", reached, f"interrupted after step {reached}")
+                    self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}")
                     return
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
-        """The same in portions: the step reached, and the points (count, dim) delivered on the way."""
-        if self.end is not None or self._ensemble.step:  # an ensemble would go on from where the last walk was
+        """Yield the step reached and the points (count, dim) since the previous portion."""
+        if (
+            self.end is not None or self._ensemble.step
+        ):  # start again: an ensemble would continue the previous iteration
             self._ensemble = self._fresh()
         ensemble = self._ensemble
-        for x in ensemble.records(_FOR_EVER if self.steps is None else self.steps, self.every):
+        for x in ensemble.records(_NO_LIMIT if self.steps is None else self.steps, self.every):
             points = x[:, 0]
             yield ensemble.step, points[~np.isnan(points).any(axis=1)]
             if ensemble.failed_at[0] >= 0:
@@ -151,15 +159,15 @@ class FloatOrbit:
         self.end = ensemble.end(0)
 
 
-_LONG = 20_000  # steps, from which on compiling pays
-_FOR_EVER = 1 << 62
+_MIN_COMPILED_STEPS = 20_000  # compiling pays for more steps
+_NO_LIMIT = 1 << 62
 
 
 def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:
-    """Walk an orbit into a .npy file of shape (points, dim): the start and every `orbit.every`-th iterate.
+    """Write an orbit to a .npy file of shape (points, dim): the initial point and every `orbit.every`-th iterate.
 
-    `progress` is called with the index of the step reached, about ten times a second; `orbit.interrupt()` ends the walk
-    after the portion in hand.
+    `progress` is called with the current step about ten times a second; `orbit.interrupt()` stops after the current
+    portion.
     """
     with NpyFile(path, (orbit.dim,)) as file:
         for step, x in orbit.portions():
@@ -167,5 +175,5 @@ def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int
             if progress is not None:
                 progress(step)
     if orbit.end is None:
-        raise AssertionError("an orbit has run out of portions without an end")
+        raise AssertionError("the portions of an orbit ended without a status")
     return orbit.end

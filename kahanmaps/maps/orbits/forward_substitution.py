@@ -1,0 +1,109 @@
+"""Forward substitution for maps with a triangular equation, such as explicit maps: fractions in, fractions out.
+
+Each row of M x~ = r contains one unknown that does not occur in the rows solved before it. The entries of a row are
+homogenized in each pair (p_k, q_k) separately, where x_k = p_k/q_k in lowest terms. These integers are shorter than
+those over a common denominator of all coordinates, since only the coordinates that occur in the row enter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flint import fmpz, fmpz_mat
+
+from kahanmaps.maps.orbits.integer_point import Fraction, FractionsPoint, IntegerPoint
+
+Exponents = Sequence[tuple[int, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """A row of the equation: the exponents of p_k and q_k in each monomial, and the coefficients of the entries."""
+
+    unknown: int
+    known: tuple[int, ...]
+    powers: tuple[tuple[tuple[int, int, int], ...], ...]
+    entries: fmpz_mat  # rows: the coefficient of the unknown, those of the known coordinates, the right side
+    divisors: tuple[int, ...]  # the coordinates that divide every entry of M in the row
+
+    def solved(self, point: Sequence[Fraction], solved: Sequence[Fraction]) -> Fraction | None:
+        """Return the unknown; None if its coefficient is 0."""
+        monomials = []
+        for powers in self.powers:
+            total = fmpz(1)
+            for x, of_p, of_q in powers:
+                p, q = point[x]
+                total *= (p**of_p if of_p else 1) * (q**of_q if of_q else 1)
+            monomials.append(total)
+        denominator_form, *others, numerator = (self.entries * fmpz_mat(len(monomials), 1, monomials)).entries()
+        if denominator_form == 0 or any(point[x][0] == 0 for x in self.divisors):
+            return None
+        denominator = fmpz(1)
+        for k, entry in zip(self.known, others, strict=True):
+            # numerator/denominator - entry p/q; all gcds are gcds of short numbers
+            p, q = solved[k]
+            common = entry.gcd(q)
+            p, q = entry // common * p, q // common
+            shared = denominator.gcd(q)
+            numerator = numerator * (q // shared) - p * (denominator // shared)
+            common_again = numerator.gcd(shared)
+            numerator, denominator = numerator // common_again, denominator // shared * (q // common_again)
+        common = numerator.gcd(denominator_form) if denominator_form > 0 else -numerator.gcd(denominator_form)
+        return numerator // common, denominator * (denominator_form // common)
+
+
+@dataclass(frozen=True)
+class ForwardSubstitution:
+    """The step of a map whose equation is triangular: the rows in the order in which they are solved."""
+
+    rows: Sequence[_Row]
+
+    def step(self, point: IntegerPoint) -> IntegerPoint | None:
+        """Return the image, or None if the map is not defined at the point."""
+        coordinates = point.lowest_terms()
+        image = list(coordinates)
+        for row in self.rows:
+            value = row.solved(coordinates, image)
+            if value is None:
+                return None
+            image[row.unknown] = value
+        return FractionsPoint(image)
+
+
+def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> ForwardSubstitution | None:
+    """Order the rows of (M | r) for forward substitution; return None if the equation is not triangular.
+
+    `forms` has one row of coefficients for each entry of (M | r), and one column for each monomial in `exponents`.
+    """
+    table = forms.tolist()
+    rows = [table[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
+    solved: list[_Row] = []
+    remaining = list(range(n))
+    while remaining:
+        solved_unknowns = {row.unknown for row in solved}
+        used = {i: [j for j in range(n) if any(rows[i][j])] for i in remaining}
+        i = next((i for i in remaining if len(set(used[i]) - solved_unknowns) == 1), None)
+        if i is None:
+            return None
+        unknown = next(j for j in used[i] if j not in solved_unknowns)
+        others = tuple(j for j in used[i] if j in solved_unknowns)
+        entries = [rows[i][j] for j in (unknown, *others, n)]
+        terms = [k for k in range(len(exponents)) if any(entry[k] for entry in entries)]
+        min_exponents = [min(exponents[k][x] for k in terms) for x in range(n)]
+        shifted = [[exponents[k][x] - min_exponents[x] for x in range(n)] for k in terms]
+        max_exponents = [max(powers[x] for powers in shifted) for x in range(n)]
+        in_matrix = [k for k in terms if any(entry[k] for entry in entries[:-1])]
+        row = _Row(
+            unknown,
+            others,
+            tuple(
+                tuple((x, e, max_exponents[x] - e) for x, e in enumerate(powers) if max_exponents[x])
+                for powers in shifted
+            ),
+            fmpz_mat([[entry[k] for k in terms] for entry in entries]),
+            tuple(x for x in range(n) if min(exponents[k][x] for k in in_matrix) > 0),
+        )
+        solved.append(row)
+        remaining.remove(i)
+    return ForwardSubstitution(solved)
