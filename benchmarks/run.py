@@ -327,10 +327,10 @@ GROUPS = {
         "the flow, and are what one would use instead."
     ),
     bench_degrees.GROUP: (
-        "Time relative to kahanmaps, which walks two lines with different primes, compares them, and explains the\n"
-        "degrees by the singularities: a constant cost, most of the time where iterates are few. The second row is\n"
-        "the lines alone, which is what the peers do, modulo 2^61 - 1. Polynomials with gcds are what kahanmaps does\n"
-        "itself up to dimension 5; in dimension 6 it takes power series."
+        "Time relative to kahanmaps, which walks two lines with different primes, compares them, and derives the\n"
+        "degrees from the singularity patterns: a constant cost, most of the time where iterates are few. The second\n"
+        "row is the lines alone, which is what the peers do, modulo 2^61 - 1. Polynomials with gcds are what\n"
+        "kahanmaps does itself up to dimension 5; in dimension 6 it takes power series."
     ),
     bench_analysis.PROCESSES: (
         "No peer; `kahanmaps analyze NAME`, from the start of Python, on two processors. How fast these are,\n"

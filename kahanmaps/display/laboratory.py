@@ -41,8 +41,8 @@ _ROWS = 60  # of a table in a notebook
 _TEXT = 300
 _LENGTHS_SHOWN = 12
 WORDS = (
-    "proved: an identity of rational functions, or a theorem; supported: true at random points; explained: follows "
-    "from singularities that were measured; measured: modulo primes or along orbits, which is evidence"
+    "proved: an identity of rational functions, or a theorem; supported: true at random points; derived: follows "
+    "exactly from the measured singularity patterns; measured: modulo primes or along orbits, which is evidence"
 )
 
 
@@ -259,7 +259,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
         yield (f"# {run.word.text}",)
     yield "denominator", run.denominator
     for found in run.hypersurfaces:
-        kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
+        kind = f"degree {found.degree}" + (", factor of the denominator" if found.is_pole else "")
         kind += " in all" if found.polynomial == "?" else ""
         kind += "" if found.stage is None else f", of map {found.stage + 1}"
         outcome = found.status + (f": {found.note}" if found.note else "")
@@ -272,7 +272,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
         if found.steps:
             ranks = " ".join(str(step.rank) for step in found.steps)
             poles = " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
-            yield f"  ranks {ranks}", f"poles {poles}"
+            yield f"  ranks {ranks}", f"pole orders {poles}"
 
 
 # -- symmetries

@@ -30,10 +30,11 @@ class Conclusion:
     defined) or "undecided".
 
     `sense` says more exactly what is meant: "superintegrable" (one integral less than the dimension, proved),
-    "Liouville integrable" (proved), "integrable in the sense of complexity", "not integrable", "confining and not
-    integrable", else the kind. `ground` is what the verdict rests on: "proved", "explained" (by the patterns of
-    singularities), "measured" or "estimated"; empty where there is no verdict. `integrals` is the number of independent
-    integrals known or shown by orbits, `growth` the kind of degree growth.
+    "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable",
+    "confining and not integrable", else the kind. `ground` is how the verdict is known: "proved", "derived" (from the
+    measured singularity patterns), "measured" or "estimated"; empty where there is no verdict.
+    `integrals` is the number of independent integrals that are known or shown by orbits, `growth` the kind of growth of
+    the degrees.
     """
 
     kind: str
@@ -153,7 +154,7 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
     if facts.growth is not Growth.BOUNDED:
         return None
     bounded = f"The degrees of the iterates are bounded{facts.basis}"
-    sentence = f"{bounded}: the map is linearisable in the sense of complexity; {facts.integrals}."
+    sentence = f"{bounded}: the map is linearisable in the sense of bounded degrees; {facts.integrals}."
     return _Verdict("linearisable", sentence, ground=facts.grown)
 
 
@@ -194,16 +195,17 @@ def _on_curves(facts: _Facts) -> _Verdict | None:
 
 
 def _by_growth(facts: _Facts) -> _Verdict | None:
-    """Exponential and polynomial growth, measured or explained."""
+    """Exponential and polynomial growth, measured or derived."""
     count, integrals = facts.count, facts.integrals
     exact = facts.growth is Growth.EXPONENTIAL  # else the phrase says that it is estimated
     if exact or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
-        sentence = f"Not integrable in the sense of complexity: {facts.phrase}{facts.basis if exact else ''}{although}."
+        growth = f"{facts.phrase}{facts.basis if exact else ''}"
+        sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{although}."
         ground = facts.grown if exact else Certainty.ESTIMATED
         return _Verdict("not integrable", sentence, _confining(facts.found), ground)
     if facts.growth in _POLYNOMIAL:
-        sentence = f"Integrable in the sense of complexity: {facts.phrase}{facts.basis}; {integrals}."
+        sentence = f"Integrable in the sense of zero algebraic entropy: {facts.phrase}{facts.basis}; {integrals}."
         return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.grown))
     return None
 
@@ -222,7 +224,7 @@ _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
 def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tuple[str, Certainty | None]:
     if liouville:
         return "Liouville integrable", Certainty.PROVED
-    return "integrable in the sense of complexity", ground
+    return "integrable in the sense of zero algebraic entropy", ground
 
 
 def _confining(found: Findings) -> str:
@@ -278,6 +280,6 @@ def doubt_of_heights(found: Findings) -> str:
     steps = max(len(orbit.growth.heights) for orbit in found.heights.orbits) - 1
     last = max(found.degrees.patterns.lengths, default=0) if found.degrees.patterns is not None else 0
     if kind is not Growth.UNDECIDED and last > steps // 2:
-        late = f"the singularities show something new up to step {last} and the orbits have {counted(steps, 'step')}"
+        late = f"orbits of {counted(steps, 'step')} are too short, singularity patterns settle only at step {last}"
         return f"{reason}: {late}" if reason else late
     return reason

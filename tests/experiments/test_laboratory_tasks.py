@@ -65,8 +65,8 @@ def test_the_whole_report_is_kept_if_asked_for():
 # Known answers
 
 GROWING = of_rhs("x")  # det(I - eps f') = 1 - eps vanishes identically at eps = 1
-QUADRATIC = {"growth": "quadratic", "dynamical_degree": "1", "power": 2, "status": "explained"}
-EXPONENTIAL = {"growth": "exponential", "dynamical_degree": "2", "power": 0, "status": "explained"}
+QUADRATIC = {"growth": "quadratic", "dynamical_degree": "1", "power": 2, "status": "derived"}
+EXPONENTIAL = {"growth": "exponential", "dynamical_degree": "2", "power": 0, "status": "derived"}
 BOUNDED = {"growth": "bounded", "dynamical_degree": "1", "power": 0, "status": "recurrence"}
 INTEGRABLE = {
     "status": "complete",

@@ -233,9 +233,9 @@ def test_a_verdict_says_in_which_sense_and_on_what_ground(name, sense, ground):
 def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     found = analysis_of("lotka_volterra")
     unproved = replace(found, degrees=replace(found.degrees, enclosure=None))
-    assert (unproved.conclusion.sense, unproved.conclusion.ground) == ("not integrable", "explained")
-    unexplained = replace(unproved, degrees=replace(unproved.degrees, patterns=None))
-    assert (unexplained.conclusion.kind, unexplained.conclusion.ground) == ("not integrable", "measured")
+    assert (unproved.conclusion.sense, unproved.conclusion.ground) == ("not integrable", "derived")
+    underived = replace(unproved, degrees=replace(unproved.degrees, patterns=None))
+    assert (underived.conclusion.kind, underived.conclusion.ground) == ("not integrable", "measured")
     estimated = replace(unproved, degrees=replace(unproved.degrees, patterns=Patterns((30,), None, True)))
     assert (estimated.conclusion.kind, estimated.conclusion.ground) == ("not integrable", "estimated")
     # A proof of entropy beside an integral is a contradiction, and no verdict.

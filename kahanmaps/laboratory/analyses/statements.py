@@ -163,7 +163,7 @@ def of_growth(found: Findings) -> Iterator[Statement]:
             yield Statement(status, f"degrees of the iterates: {shown}{more}")
         yield Statement(degrees.known, degrees.growth_text)
         if degrees.recurrence is not None:
-            known = MEASURED if degrees.explained is None else Certainty.EXPLAINED
+            known = MEASURED if degrees.derived is None else Certainty.DERIVED
             yield Statement(known, f"recurrence: {degrees.recurrence.text}")
             if degrees.recurrence.closed_form_text:
                 yield Statement(known, f"d_n = {degrees.recurrence.closed_form_text}")
@@ -172,7 +172,7 @@ def of_growth(found: Findings) -> Iterator[Statement]:
     if heights is not None:
         doubt = doubt_of_heights(found)
         status = UNDECIDED if doubt or heights.kind is Growth.UNDECIDED else MEASURED
-        yield Statement(status, f"{heights.text}, but {doubt}" if doubt else heights.text)
+        yield Statement(status, f"{heights.text}; inconclusive: {doubt}" if doubt else heights.text)
 
 
 def of_singularities(found: Findings) -> Iterator[Statement]:

@@ -92,7 +92,7 @@ class DegreeGrowth(Printed):
         return find_recurrence(self.degrees)
 
     @cached_property
-    def explained(self) -> Recurrence | None:
+    def derived(self) -> Recurrence | None:
         """The recurrence that follows from the singularities, where they are known and the measured degrees agree."""
         if self.patterns is None or not self.patterns.series or self.disagreement is not None:
             return None
@@ -111,17 +111,23 @@ class DegreeGrowth(Printed):
         """Why the recurrence that fits may be that of other maps; empty where there is none, or it is confirmed."""
         if self.disagreement is not None:
             return (
-                f"the singularities do not explain the degree of iterate {self.disagreement} (another --seed or --eps)"
+                f"the measured degree of iterate {self.disagreement} contradicts the singularity patterns; "
+                "try another --seed or --eps"
             )
-        if self.fitted is None or self.patterns is None or self.explained is not None:
+        if self.fitted is None or self.patterns is None or self.derived is not None:
             return ""
         if self.patterns.running:
             return self.patterns.running
         if not self.patterns.lengths and any(d != self.degrees[1] ** n for n, d in enumerate(self.degrees)):
-            return "degrees drop where no contracted hypersurface meets points without a value (another --seed)"
+            return (
+                "degrees drop although no exceptional hypersurface is mapped into the indeterminacy locus; "
+                "try another --seed"
+            )
         if len(self.degrees) < (needed := self.patterns.terms_needed(self.fitted.order)):
             last = max(self.patterns.lengths)
-            return f"after a pattern of {last} steps {needed - 1} iterates are needed (--effort, --max-degree)"
+            return (
+                f"a singularity pattern of {last} steps calls for {needed - 1} iterates; raise --effort or --max-degree"
+            )
         return ""
 
     @property
@@ -130,8 +136,8 @@ class DegreeGrowth(Printed):
 
         None also where it is not confirmed by terms beyond the last confinement, or singularities are undecided.
         """
-        if self.proof is None or self.explained is not None:
-            return self.explained or (None if self.unconfirmed else self.fitted)
+        if self.proof is None or self.derived is not None:
+            return self.derived or (None if self.unconfirmed else self.fitted)
         found = self.fitted
         if found is None or found.rate is None or (found.growth, found.power) != (self.proof.growth, self.proof.power):
             return None
@@ -215,8 +221,8 @@ class DegreeGrowth(Printed):
         """How the growth is known; the bounds of `enclosure` are proved whatever this says."""
         if self.proof is not None:
             return Certainty.PROVED
-        if self.explained is not None:
-            return Certainty.EXPLAINED
+        if self.derived is not None:
+            return Certainty.DERIVED
         if self.recurrence is not None or self.ended == Ended.CONSTANT:
             return Certainty.MEASURED
         return Certainty.ESTIMATED if self.looks_exponential else Certainty.UNDECIDED
@@ -241,10 +247,10 @@ class DegreeGrowth(Printed):
             if self.recurrence.closed_form_text:
                 lines.append(("closed form", self.recurrence.closed_form_text))
         if self.patterns is not None:
-            if self.explained is not None:
+            if self.derived is not None:
                 lines.append(("generating function", self.patterns.series_text))
             lines.append(("singularities", self.patterns.text))
-            lines += [("contracted", text) for text in self.patterns.sentences]
+            lines += [("exceptional hypersurface", text) for text in self.patterns.sentences]
             lines += [("note", told) for told in (self.patterns.word_text,) if told]
         if self.enclosure is not None:
             lines.append(("proved", self.enclosure.text))
@@ -419,12 +425,14 @@ class _Search:
             return
         known = self.patterns
         enough = found is not None and found.checked >= max(6, found.order)
-        explained = self.result(Ended.TERMS, "").explained
-        if explained is not None:
+        derived = self.result(Ended.TERMS, "").derived
+        if derived is not None:
             last = max(known.lengths, default=0) if known is not None else 0
-            same = found is not None and found.characteristic == explained.characteristic
+            same = found is not None and found.characteristic == derived.characteristic
             if (enough and same) or size > 2 * last + _AGREEING or self.degrees[-1] > _LARGE:
-                raise Stopped(Ended.EXPLAINED, "the singularities explain the degrees, and those measured agree")
+                raise Stopped(
+                    Ended.DERIVED, "the degrees are derived from the singularity patterns, and the measured ones agree"
+                )
             return
         if found is None or not enough:
             return

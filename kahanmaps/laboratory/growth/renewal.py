@@ -139,7 +139,7 @@ def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
     """The recurrence of the coefficients of a fraction, as that of the terms that were `measured` and more.
 
     >>> recurrence_of((fmpz_poly([1]), fmpz_poly([1, -2])), [1, 2, 4]).text
-    'a(n) = 2*a(n-1) for n >= 1, explained by the singularities; 3 measured terms agree'
+    'a(n) = 2*a(n-1) for n >= 1, derived from the singularity patterns; 3 measured terms agree'
     """
     above, below = series
     order = max(int(below.degree()), int(above.degree()) + 1)

@@ -37,7 +37,7 @@ _CHECKED = 4  # further orders have to follow a recurrence than tell it
 _FREE_STEPS = 100  # for which a hypersurface is followed that is one again
 
 
-_SHOWN = 6  # events in words
+_SHOWN = 6  # events in a sentence
 Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 
 
@@ -72,22 +72,20 @@ class OrbitData:
 
     @property
     def sentences(self) -> list[str]:
-        """In words: at which steps powers are divided out, which lowers degrees, and which hypersurfaces are met."""
+        """Two phrases: at which steps the degree drops, and in which exceptional hypersurfaces the images lie."""
         rows = self.rows[: self.settled_at]
-        costs = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
-        meets = [
-            f"C{j} at step {t}" + (f" (order {nu})" if nu > 1 else "")
+        drops = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
+        incidences = [
+            f"C{j} at step {t}" + (f" (multiplicity {nu})" if nu > 1 else "")
             for t, row in enumerate(rows, 1)
             for j, nu in enumerate(row[1:], 1)
             if nu
         ]
         if self.beyond:
-            meets.append(f"then {', '.join(f'C{k + 1}' for k in self.beyond)} for ever, which lowers no degree")
-        told = []
-        for verb, events in (("costs", costs), ("meets", meets)):
-            more = ", ..." if len(events) > _SHOWN else ""
-            told.append(f"{verb} {', '.join(events[:_SHOWN]) or 'nothing'}{more}")
-        return told
+            names = ", ".join(f"C{k + 1}" for k in self.beyond)
+            incidences.append(f"{names} at all later steps, which lowers no degree")
+        lowers = f"lowers the degree by {_shortened(drops)}" if drops else "lowers no degree"
+        return [lowers, f"its image lies in {_shortened(incidences) or 'no exceptional hypersurface'}"]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -120,6 +118,10 @@ class OrbitData:
         below = fmpz_poly(characteristic.coeffs()[::-1])
         above = (below * fmpz_poly(entries[:order])).truncate(order)
         return fmpz_poly([0, 1]) * above, below
+
+
+def _shortened(events: Sequence[str]) -> str:
+    return ", ".join(events[:_SHOWN]) + (", ..." if len(events) > _SHOWN else "")
 
 
 NO_ORBIT_DATA = OrbitData(())

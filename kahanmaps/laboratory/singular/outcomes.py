@@ -152,8 +152,8 @@ class SingularityOutcome(StrEnum):
 
 CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = SingularityOutcome
 NO_POINT = "no point was followed"
-BUDGET_SPENT = "the budget was spent before two points were followed (--effort)"
-POINTS_DIFFER = "the orders along two curves through it modulo different primes are not the same (another --seed)"
+BUDGET_SPENT = "work limit reached before two points of it were followed; raise --effort"
+POINTS_DIFFER = "its multiplicities along two curves modulo different primes differ; try another --seed"
 
 
 @dataclass(frozen=True)
@@ -190,21 +190,27 @@ class Hypersurface:
     generic: str = ""
 
     def sentence(self, at: str) -> str:
-        """A sentence: what it is (`at` which eps), when it comes back, what it costs, which of C1, C2, ... it meets."""
+        """Describe its pattern: where its images lie, when they lower the degree, and whether it is confined.
+
+        `at` names the eps of the polynomial, where that is not the one over Q[eps].
+        """
         text, most = (self.generic, 2 * _LONGEST) if self.generic else (self.polynomial, _LONGEST)
         cut = text if len(text) <= most else f"{text[:most]} ..."
         name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
         if self.orders.returns:
             after, other = self.orders.returns
-            outcome = f"comes back as C{other + 1} after {counted(after, 'step')}"
+            outcome = f"mapped onto C{other + 1} after {counted(after, 'step')}"
         elif self.confined_at is not None:
-            outcome = f"a hypersurface again after {counted(self.confined_at, 'step')}"
+            outcome = f"confined after {counted(self.confined_at, 'step')}"
         elif self.orders.recurrences:
-            outcome = f"its orders repeat after {counted(self.orders.settled_at, 'step')}"
+            outcome = f"its multiplicities satisfy a recurrence of order {self.orders.settled_at}"
         else:
-            outcome = f"followed for {counted(self.followed, 'step')}"
+            outcome = f"not confined within {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
-        parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted{by}", outcome]
+        parts = [
+            f"{name}, degree {self.degree}{', a factor of the denominator' if self.is_pole else ''}: contracted{by}",
+            outcome,
+        ]
         return "; ".join([", ".join(parts), *self.orders.sentences])
 
     def to_json(self) -> dict[str, Any]:

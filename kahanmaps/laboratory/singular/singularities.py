@@ -78,8 +78,8 @@ _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random ones, where det dPhi is looked at
 _MAX_DEGREE = 20_000  # of a composition
-_STOPPED = "the budget was spent before all singularities were followed (--effort)"
-_DIFFERENT = "the singularities at two values of eps differ (--eps)"
+_STOPPED = "work limit reached before all singularities were traced; raise --effort"
+_DIFFERENT = "the singularities at the two values of eps differ; choose one with --eps"
 
 
 class TooLongFormula(InputError):
@@ -340,7 +340,7 @@ class Patterns:
         if self.running:
             return self.running
         longest = max(self.lengths, default=0)
-        ends = f"nothing new after step {longest}" if longest else "none that lowers degrees"
+        ends = f"all singularity patterns have settled by step {longest}" if longest else "none lowers the degree"
         return f"{ends}; {self.limit}" if self.limit else ends
 
     def to_json(self) -> dict[str, Any]:
