@@ -42,7 +42,7 @@ def mistakes(heading: str) -> list[tuple[str | int, ...]]:
     return [(text, int(column), *words) for column, text, *words in rows]
 
 
-def error(text: str, limits: ExpressionLimits | None = None) -> ExpressionError:
+def error_of(text: str, limits: ExpressionLimits | None = None) -> ExpressionError:
     """The error that a text meets as a rational function of x, y, z."""
     with pytest.raises(ExpressionError) as caught:
         parse_rational_function(text, NAMES, {"a": THIRD}, limits=limits or ExpressionLimits())
@@ -220,7 +220,7 @@ def test_arithmetic_of_texts_is_arithmetic_of_functions(left: RationalFunction, 
     ],
 )
 def test_a_mistake_is_named_at_its_column(text: str, column: int | None, message: str):
-    error = error(text)
+    error = error_of(text)
     assert error.column == column
     assert message in error.message
 
@@ -256,7 +256,7 @@ HOSTILE = {
 )
 def test_a_hostile_text_is_refused(name: str):
     text = HOSTILE[name]
-    error = error(text)
+    error = error_of(text)
     assert error.text == text
     assert len(str(error)) < 400
 
@@ -278,7 +278,7 @@ def test_a_hostile_text_is_refused(name: str):
 )
 def test_every_limit_has_two_sides(limits: ExpressionLimits, good: str, bad: str):
     parse_rational_function(good, NAMES, limits=limits)
-    error(bad, limits)
+    error_of(bad, limits)
 
 
 # Products.
