@@ -15,7 +15,7 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.findings import Findings
+from kahanmaps.laboratory.analysis_result import AnalysisResult
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
@@ -53,47 +53,47 @@ class _Verdict(NamedTuple):
 
 
 class _Facts:
-    """What was found, and the phrases that several verdicts have in common."""
+    """What was result, and the phrases that several verdicts have in common."""
 
-    def __init__(self, found: Findings) -> None:
-        degrees = found.degrees
-        self.found, self.degrees, self.count = found, degrees, found.integral_count
+    def __init__(self, result: AnalysisResult) -> None:
+        degrees = result.degrees
+        self.result, self.degrees, self.count = result, degrees, result.integral_count
         self.growth = degrees.growth if degrees is not None else Growth.UNKNOWN
         self.grown = degrees.known if degrees is not None else Certainty.MEASURED
         self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
         # How many integrals there are; where that is a lower bound, the sentence says so.
-        where = f" in dimension {found.dim}"
+        where = f" in dimension {result.dim}"
         number = counted(self.count, "independent integral") if self.count else "no integral"
-        self.integrals = number + where if found.count_is_exact else f"at least {number}{where}"
-        if not found.integrals_were_counted:
+        self.integrals = number + where if result.count_is_exact else f"at least {number}{where}"
+        if not result.integrals_were_counted:
             self.integrals = "the integrals were not counted"
-        elif not self.count and found.integrals is not None and not found.count_is_exact:
-            degree = found.integrals.profile.degree
+        elif not self.count and result.integrals is not None and not result.count_is_exact:
+            degree = result.integrals.profile.degree
             self.integrals = f"no integral{where} up to degree {degree} (relations along orbits)"
-        period = found.integrals.profile.period if found.integrals is not None else None
+        period = result.integrals.profile.period if result.integrals is not None else None
         self.closes = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
-        self.is_linear = found.file.is_quadratic and found.file.system.degree <= 1
+        self.is_linear = result.file.is_quadratic and result.file.system.degree <= 1
         self.liouville = ""  # by what the map is Liouville integrable, proved
-        if found.dim > 2 and not self.is_linear:
-            for one in reversed(found.poisson.tensors if found.poisson is not None else ()):
+        if result.dim > 2 and not self.is_linear:
+            for one in reversed(result.poisson.tensors if result.poisson is not None else ()):
                 proved = (one.verdict, one.jacobi, one.involution)
                 if one.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in proved):
                     self.liouville = f"with the Poisson tensor {one.name}"
-            if isinstance(found.normal_form, SystemNormalForm):
+            if isinstance(result.normal_form, SystemNormalForm):
                 self.liouville = "as a member of the commuting family"
 
 
-def conclude(found: Findings) -> Conclusion:
+def conclude(result: AnalysisResult) -> Conclusion:
     """The verdict on what was found: the first of `_RULES` that says something."""
-    facts = _Facts(found)
+    facts = _Facts(result)
     verdict = next(said for rule in _RULES if (said := rule(facts)))
     sentence = verdict.sentence
-    if found.eps is not None:
-        sentence += f" All this at eps = {found.eps} only: other eps may differ."
-    if found.symbols:
-        parts = "integrals" if found.densities is None else "integrals and densities"
-        sentence += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
+    if result.eps is not None:
+        sentence += f" All this at eps = {result.eps} only: other eps may differ."
+    if result.symbols:
+        parts = "integrals" if result.densities is None else "integrals and densities"
+        sentence += f" The {parts} are for every {', '.join(result.symbols)}, all else is for the given values."
     if facts.liouville:
         sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
     sense, ground, growth = (
@@ -116,7 +116,7 @@ def _nowhere_defined(facts: _Facts) -> _Verdict | None:
 def _linear(facts: _Facts) -> _Verdict | None:
     if not facts.is_linear:
         return None
-    eps, B = facts.found.eps, facts.found.file.system.B
+    eps, B = facts.result.eps, facts.result.file.system.B
     if eps is not None and (QQ.identity(B.nrows()) - B * eps).det() == 0:
         return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Certainty.PROVED)
     proof = None if facts.degrees is None else facts.degrees.proof
@@ -128,7 +128,7 @@ def _linear(facts: _Facts) -> _Verdict | None:
 
 
 def _contradictory(facts: _Facts) -> _Verdict | None:
-    if not (said := contradictions(facts.found)):
+    if not (said := contradictions(facts.result)):
         return None
     sentence = f"The findings do not agree: {'; '.join(said)}. {_capital(facts.integrals)}."
     return _Verdict("undecided", sentence, ground=None)
@@ -136,9 +136,9 @@ def _contradictory(facts: _Facts) -> _Verdict | None:
 
 def _not_birational(facts: _Facts) -> _Verdict | None:
     """What degrees and closed orbits mean is known of birational maps; a constant map needs no theorem."""
-    if not facts.found.defect or facts.growth is Growth.ZERO:
+    if not facts.result.defect or facts.growth is Growth.ZERO:
         return None
-    return _Verdict("undecided", f"{_capital(facts.found.defect)}; {facts.phrase}.", ground=None)
+    return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.phrase}.", ground=None)
 
 
 def _linearisable(facts: _Facts) -> _Verdict | None:
@@ -160,33 +160,33 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
 
 def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
     """Where a dynamical degree above 1 is proved."""
-    found = facts.found
+    result = facts.result
     if facts.degrees is None or facts.degrees.enclosure is None:
         return None
     bound = f"the dynamical degree is at least {facts.degrees.enclosure.lower}"
-    where = "" if found.eps is not None or not found.file.map.has_eps else ", for all but finitely many eps"
+    where = "" if result.eps is not None or not result.file.map.has_eps else ", for all but finitely many eps"
     sentence = (
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
         f"function is an integral; {facts.phrase}{facts.basis}."
     )
-    return _Verdict("not integrable", sentence, _confining(found), Certainty.PROVED)
+    return _Verdict("not integrable", sentence, _confining(result), Certainty.PROVED)
 
 
 def _on_curves(facts: _Facts) -> _Verdict | None:
     """Where the orbits lie on curves, proved; or not, of maps whose growth is not known."""
-    found, proved = facts.found, 0
-    if found.integrals is not None:  # independent ones
-        proved = sum(verdict is Certainty.PROVED for _, verdict in found.integrals.formulas)
-        proved = max(proved, 0 if found.integrals.symbols else found.integrals.by_theorems)
-    if found.dim > 1 and proved >= found.dim - 1:
-        sense = "superintegrable" if found.dim > 2 else "integrable"
-        genus = found.pencil.genus if found.pencil is not None else None
-        if genus is None and found.dim == 2:  # the growth tells it where it was not computed
+    result, proved = facts.result, 0
+    if result.integrals is not None:  # independent ones
+        proved = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
+        proved = max(proved, 0 if result.integrals.symbols else result.integrals.by_theorems)
+    if result.dim > 1 and proved >= result.dim - 1:
+        sense = "superintegrable" if result.dim > 2 else "integrable"
+        genus = result.pencil.genus if result.pencil is not None else None
+        if genus is None and result.dim == 2:  # the growth tells it where it was not computed
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
         sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
         return _Verdict("integrable", sentence, sense, Certainty.PROVED)
-    on_curves = orbits_lie_on_curves(found)
+    on_curves = orbits_lie_on_curves(result)
     if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
         return None
     curves = ", so that orbits lie on curves" if on_curves else ""
@@ -203,7 +203,7 @@ def _by_growth(facts: _Facts) -> _Verdict | None:
         growth = f"{facts.phrase}{facts.basis if exact else ''}"
         sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{although}."
         ground = facts.grown if exact else Certainty.ESTIMATED
-        return _Verdict("not integrable", sentence, _confining(facts.found), ground)
+        return _Verdict("not integrable", sentence, _confining(facts.result), ground)
     if facts.growth in _POLYNOMIAL:
         sentence = f"Integrable in the sense of zero algebraic entropy: {facts.phrase}{facts.basis}; {integrals}."
         return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.grown))
@@ -227,9 +227,9 @@ def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tup
     return "integrable in the sense of zero algebraic entropy", ground
 
 
-def _confining(found: Findings) -> str:
+def _confining(result: AnalysisResult) -> str:
     """In which sense a map is not integrable: confinement is no proof of integrability."""
-    confined = {run.verdict for run in found.singularities} == {CONFINED}
+    confined = {run.verdict for run in result.singularities} == {CONFINED}
     return "confining and not integrable" if confined else "not integrable"
 
 
@@ -237,37 +237,37 @@ def _capital(sentence: str) -> str:
     return sentence[0].upper() + sentence[1:]
 
 
-def orbits_lie_on_curves(found: Findings) -> bool:
+def orbits_lie_on_curves(result: AnalysisResult) -> bool:
     """Whether dim - 1 independent integrals are proved or supported: then degrees grow quadratically at most.
 
     For the map acts on each of the curves, which have genus 0 or 1 where it has infinite order.
     """
-    return found.integrals is not None and len(found.integrals.integrals) >= found.dim - 1 >= 1
+    return result.integrals is not None and len(result.integrals.integrals) >= result.dim - 1 >= 1
 
 
-def contradictions(found: Findings) -> list[str]:
+def contradictions(result: AnalysisResult) -> list[str]:
     """What excludes each other among integrals, closed orbits and degrees: sentences, none where all agree."""
-    growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-    period = found.integrals.profile.period if found.integrals is not None else None
+    growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
+    period = result.integrals.profile.period if result.integrals is not None else None
     said = []
-    if growth is Growth.EXPONENTIAL and orbits_lie_on_curves(found):
+    if growth is Growth.EXPONENTIAL and orbits_lie_on_curves(result):
         said.append("the degrees seem to grow exponentially, which they cannot where integrals leave curves only")
-    elif growth is Growth.EXPONENTIAL and isinstance(found.normal_form, SystemNormalForm):
+    elif growth is Growth.EXPONENTIAL and isinstance(result.normal_form, SystemNormalForm):
         said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
-    if found.degrees is not None and found.degrees.enclosure is not None and orbits_lie_on_curves(found):
+    if result.degrees is not None and result.degrees.enclosure is not None and orbits_lie_on_curves(result):
         said.append("positive algebraic entropy is proved, which excludes an integral")
-    if found.pencil is not None and (impossible := found.pencil.against(growth)):
+    if result.pencil is not None and (impossible := result.pencil.against(growth)):
         said.append(impossible)
     if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL):
         said.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
     return said
 
 
-def doubt_of_heights(found: Findings) -> str:
+def doubt_of_heights(result: AnalysisResult) -> str:
     """Why the growth of heights is no finding beside that of the degrees; empty where the two go together."""
-    if found.heights is None or found.degrees is None:
+    if result.heights is None or result.degrees is None:
         return ""
-    kind, growth = found.heights.kind, found.degrees.growth
+    kind, growth = result.heights.kind, result.degrees.growth
     bounded = growth in (Growth.ZERO, Growth.BOUNDED)
     if bounded and kind in (Growth.QUADRATIC, Growth.EXPONENTIAL):
         reason = "the degrees are bounded"
@@ -277,8 +277,8 @@ def doubt_of_heights(found: Findings) -> str:
         reason = "the degrees grow exponentially"
     else:
         reason = ""
-    steps = max(len(orbit.growth.heights) for orbit in found.heights.orbits) - 1
-    last = max(found.degrees.patterns.lengths, default=0) if found.degrees.patterns is not None else 0
+    steps = max(len(orbit.growth.heights) for orbit in result.heights.orbits) - 1
+    last = max(result.degrees.patterns.lengths, default=0) if result.degrees.patterns is not None else 0
     if kind is not Growth.UNDECIDED and last > steps // 2:
         late = f"orbits of {counted(steps, 'step')} are too short, singularity patterns settle only at step {last}"
         return f"{reason}: {late}" if reason else late

@@ -111,7 +111,7 @@ def test_mistakes_and_interrupts_are_not_swallowed(monkeypatch, error):
 
     monkeypatch.setattr(table, "linear_symmetries", fails)
     with pytest.raises(error):
-        analyze(load("nahm_tetrahedral"), parts=[part for part in ANALYSES if part.name == "symmetries"])
+        analyze(load("nahm_tetrahedral"), analyses=[step for step in ANALYSES if step.name == "symmetries"])
 
 
 # The flow beside the map
@@ -130,7 +130,7 @@ def lines_of(found, title):
     return [line.text for name, lines in found.sections if name == title for line in lines]
 
 
-QUICK_PARTS = [
+QUICK_STEPS = [
     part for part in ANALYSES if part.name in ("the commuting family", "a larger algebra", "fixed points", "symmetries")
 ]
 
@@ -144,7 +144,7 @@ LOST = [
 
 @pytest.mark.parametrize(("eps", "expected"), [(None, KEPT), ("1/2", KEPT), ("1", LOST)])
 def test_what_is_said_of_hyperplanes_holds_at_the_eps_in_force(eps, expected):
-    found = analyze(load("lotka_volterra"), eps=eps, parts=QUICK_PARTS)
+    found = analyze(load("lotka_volterra"), eps=eps, analyses=QUICK_STEPS)
     assert [line for line in lines_of(found, "structure") if "invariant" in line] == expected
 
 
@@ -165,7 +165,7 @@ NONE = "at eps = 1 det(I - eps f'(x)) is 0 at all of them: the map has no value 
     ],
 )
 def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expected):
-    found = analyze(given, eps=eps, parts=QUICK_PARTS)
+    found = analyze(given, eps=eps, analyses=QUICK_STEPS)
     assert lines_of(found, "vector field")[-1].startswith(expected)
 
 
@@ -183,7 +183,7 @@ SINGULAR = "at eps = 1 the map is not invertible: det(I + eps f'(x)) is 0 at all
     ],
 )
 def test_of_a_map_that_is_not_birational_symmetries_and_hyperplanes_are_those_of_the_flow(rhs, eps, defect):
-    found = analyze(system("x y", *rhs), eps=eps, parts=QUICK_PARTS)
+    found = analyze(system("x y", *rhs), eps=eps, analyses=QUICK_STEPS)
     assert found.defect == defect
     assert (f"of the vector field only: {defect}" in lines_of(found, "symmetry")) == bool(defect)
     (planes,) = [line for line in lines_of(found, "structure") if line.startswith("the lines")]
@@ -194,7 +194,7 @@ def test_of_a_map_that_is_not_birational_symmetries_and_hyperplanes_are_those_of
 
 @pytest.mark.parametrize(("eps", "kind"), [("1", "singular"), ("1/2", "linear"), (None, "linear")])
 def test_a_linear_system_has_a_linear_map_where_it_has_one(eps, kind):
-    found = analyze(system("x y", "x", "-y"), eps=eps, parts=QUICK_PARTS)
+    found = analyze(system("x y", "x", "-y"), eps=eps, analyses=QUICK_STEPS)
     assert found.conclusion.kind == kind
 
 

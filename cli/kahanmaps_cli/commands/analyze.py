@@ -58,7 +58,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     with SearchProgress({**options, "quiet": quiet}) as search:
         report.progress = search
         try:
-            lib.analyze(file, **asked, progress=search, reached=report)
+            lib.analyze(file, **asked, progress=search, on_result=report)
         except KeyboardInterrupt:
             if report.found is None:
                 raise

@@ -80,17 +80,17 @@ def command(system: str | None, **options: Any) -> int:
 
             symbols, eps = symbols_and_eps(options)
             asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
-            reached: list[lib.Analysis] = []
+            results: list[lib.Analysis] = []
             try:
-                lib.analyze(opt.load_system(system, options), **asked, progress=search, reached=reached.append)
+                lib.analyze(opt.load_system(system, options), **asked, progress=search, on_result=results.append)
                 search("the page")
-                html = lib.report_html(reached[-1], explore=options["explore"], **how)
+                html = lib.report_html(results[-1], explore=options["explore"], **how)
             except lib.TimeLimit:
-                if not reached:
+                if not results:
                     raise
-                reached[-1].interrupt("stopped (--seconds)")
-                html = lib.report_html(reached[-1], **{**how, "pictures": False}, left_out=[search.ending])
-            status = 3 if search.is_over or reached[-1].conclusion.kind == "undecided" else 0
+                results[-1].interrupt("stopped (--seconds)")
+                html = lib.report_html(results[-1], **{**how, "pictures": False}, left_out=[search.ending])
+            status = 3 if search.is_over or results[-1].conclusion.kind == "undecided" else 0
         else:
             # For verify, and where one is to be drawn, a member of the family.
             draws = not is_named and (is_drawn or options["source"] == "verify")

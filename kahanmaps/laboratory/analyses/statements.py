@@ -10,8 +10,8 @@ from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.analysis_result import AnalysisResult, Statement
 from kahanmaps.laboratory.conclusion import doubt_of_heights
-from kahanmaps.laboratory.findings import Findings, Statement
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, under_map
 from kahanmaps.laboratory.singular.outcomes import SingularityOutcome
 from kahanmaps.laboratory.symmetry.commuting import CommutingField
@@ -26,12 +26,12 @@ _FIELDS = 6  # that are listed one by one
 _LONG = 300  # characters of a sentence with a formula
 
 
-def of_vector_field(found: Findings) -> Iterator[Statement]:
+def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
     """div f and the fixed points, the first of them only where there are many."""
-    search = found.fixed_points
+    search = result.fixed_points
     if search is None:
         return
-    divergence = format_polynomial(found.file.system.divergence)
+    divergence = format_polynomial(result.file.system.divergence)
     yield Statement(PROVED, f"div f = {divergence}{': the flow preserves volume' if divergence == '0' else ''}")
     yield from (Statement(PROVED, one.text) for one in search.found[:_POINTS])
     if len(search.found) > _POINTS:
@@ -43,23 +43,23 @@ def of_vector_field(found: Findings) -> Iterator[Statement]:
         yield Statement(PROVED, "f = 0 has no solution, not over the complex numbers either: no fixed point")
     else:
         # Fixed points of the flow are those of the map where det(I - eps f'(x)) is not 0.
-        known = [one.are_fixed_by_map(found.eps) for one in search.found]
+        known = [one.are_fixed_by_map(result.eps) for one in search.found]
         lost = [one.where for one, is_fixed in zip(search.found, known, strict=True) if is_fixed is False]
         where = "" if all(known) else " where det(I - eps f'(x)) is not 0"
         if lost:
-            where += f"; at eps = {found.eps} it is 0 at the {', the '.join(lost)}, where the map has no value"
+            where += f"; at eps = {result.eps} it is 0 at the {', the '.join(lost)}, where the map has no value"
         multiplier = "an eigenvalue lambda of f' becomes the multiplier (1 + eps*lambda)/(1 - eps*lambda) of the map"
         text = f"flow and map have the same fixed points{where}; {multiplier}"
         if len(lost) == len(known):
-            text = f"at eps = {found.eps} det(I - eps f'(x)) is 0 at all of them: the map has no value there"
+            text = f"at eps = {result.eps} det(I - eps f'(x)) is 0 at all of them: the map has no value there"
         yield Statement(NOTE, text)
-    if found.equivalent is not None:
-        yield Statement(PROVED, found.equivalent.text)
+    if result.equivalent is not None:
+        yield Statement(PROVED, result.equivalent.text)
 
 
-def of_integrals(found: Findings) -> Iterator[Statement]:
+def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
     """Formulas, what is measured along orbits, relations there, and the curves of a planar integral."""
-    if (search := found.integrals) is not None:
+    if (search := result.integrals) is not None:
         texts = [(one, one.short_text) for one in search.integrals] + [(one, one.text) for one in search.in_iterates]
         yield from (Statement(one.verdict, f"{one.name} = {text}  [{one.origin}]") for one, text in texts)
         for timed in search.time_dependent:
@@ -89,25 +89,27 @@ def of_integrals(found: Findings) -> Iterator[Statement]:
             yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relations)}")
             if not profile.agree:
                 yield Statement(NOTE, "the orbits that were compared do not agree")
-        yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations)
-        if integrals := list(dict.fromkeys(name for relation in found.relations for name in relation.integrals)):
+        yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in result.relations)
+        if integrals := list(dict.fromkeys(name for relation in result.relations for name in relation.integrals)):
             text = "are constant on each orbit and differ between orbits, so they are integrals"
             if len(integrals) == 1:
                 text = "is constant on each orbit and differs between orbits, so it is an integral"
             yield Statement(NOTE, f"{_listed(integrals)} {text}")
-        if functions := list(dict.fromkeys(name for relation in found.relations for name in relation.functions_of_eps)):
+        if functions := list(
+            dict.fromkeys(name for relation in result.relations for name in relation.functions_of_eps)
+        ):
             depend = "depends" if len(functions) == 1 else "depend"
             yield Statement(NOTE, f"{_listed(functions)} {depend} on eps only")
         if search.reason and profile.nullities:
             yield Statement(NOTE, search.reason)
-    if isinstance(found.normal_form, SystemNormalForm):
-        number = counted(found.normal_form.form.m, "independent integral")
+    if isinstance(result.normal_form, SystemNormalForm):
+        number = counted(result.normal_form.form.m, "independent integral")
         yield Statement(PROVED, f"{number}, as a member of the commuting family")
-    if found.pencil is not None:
-        growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-        against = found.pencil.against(growth)
-        follows = f"but {against}" if against else found.pencil.motion(growth)
-        text = "; ".join(filter(None, [found.pencil.text, follows]))
+    if result.pencil is not None:
+        growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
+        against = result.pencil.against(growth)
+        follows = f"but {against}" if against else result.pencil.motion(growth)
+        text = "; ".join(filter(None, [result.pencil.text, follows]))
         yield Statement(UNDECIDED if against else MEASURED, text)
 
 
@@ -116,15 +118,15 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names) if len(names) <= _NAMES else f"{names[0]}, ..., {names[-1]}"
 
 
-def of_densities(found: Findings) -> Iterator[Statement]:
+def of_densities(result: AnalysisResult) -> Iterator[Statement]:
     """The densities, or why none was found."""
-    search = found.densities
+    search = result.densities
     if search is None:
         return
     if search.densities:
         yield from (Statement(one.verdict, f"dx/phi is invariant, phi = {one.text}") for one in search.shown)
         if len(search.densities) > 1:
-            names = [] if found.integrals is None else [one.name for one in found.integrals.integrals]
+            names = [] if result.integrals is None else [one.name for one in result.integrals.integrals]
             times = f"any function of {_listed(names)}" if names else "any integral"
             yield Statement(NOTE, f"so is dx/phi for this phi times {times}")
     else:
@@ -134,17 +136,17 @@ def of_densities(found: Findings) -> Iterator[Statement]:
         yield Statement(search.anti_invariant.verdict, text)
 
 
-def of_flow(found: Findings) -> Iterator[Statement]:
+def of_flow(result: AnalysisResult) -> Iterator[Statement]:
     """A line for each thing kept, deformed or lost."""
-    if found.flow is not None:
-        yield from (Statement(Certainty(known), text) for known, text in found.flow.lines())
+    if result.flow is not None:
+        yield from (Statement(Certainty(known), text) for known, text in result.flow.lines())
 
 
-def of_poisson_tensors(found: Findings) -> Iterator[Statement]:
+def of_poisson_tensors(result: AnalysisResult) -> Iterator[Statement]:
     """The tensor of a member of the family, and those found."""
-    search = found.poisson
-    if isinstance(found.normal_form, SystemNormalForm) and found.normal_form.form.m > 1:
-        text = f"with {found.normal_form.form.m} integrals in involution, as a member of the commuting family"
+    search = result.poisson
+    if isinstance(result.normal_form, SystemNormalForm) and result.normal_form.form.m > 1:
+        text = f"with {result.normal_form.form.m} integrals in involution, as a member of the commuting family"
         yield Statement(PROVED, f"J - eps^2 f'(x)^2 J is an invariant Poisson tensor, {text}")
     if search is not None:
         yield from (Statement(one.verdict, f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors)
@@ -152,9 +154,9 @@ def of_poisson_tensors(found: Findings) -> Iterator[Statement]:
             yield Statement(NOTE, search.note)
 
 
-def of_growth(found: Findings) -> Iterator[Statement]:
+def of_growth(result: AnalysisResult) -> Iterator[Statement]:
     """Degrees with their recurrence, then heights."""
-    degrees, heights = found.degrees, found.heights
+    degrees, heights = result.degrees, result.heights
     if degrees is not None:
         shown = ", ".join(map(str, degrees.degrees[1 : _DEGREES + 1]))
         more = ", ..." if len(degrees.degrees) > _DEGREES + 1 else ""
@@ -170,32 +172,32 @@ def of_growth(found: Findings) -> Iterator[Statement]:
         if degrees.enclosure is not None:
             yield Statement(PROVED, degrees.enclosure.text)
     if heights is not None:
-        doubt = doubt_of_heights(found)
+        doubt = doubt_of_heights(result)
         status = UNDECIDED if doubt or heights.kind is Growth.UNDECIDED else MEASURED
         yield Statement(status, f"{heights.text}; inconclusive: {doubt}" if doubt else heights.text)
 
 
-def of_singularities(found: Findings) -> Iterator[Statement]:
+def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
     """The outcome at all values of eps, where they agree."""
-    if not found.singularities:
+    if not result.singularities:
         return
-    verdicts = {run.verdict for run in found.singularities}
-    values = ", ".join(format_number(run.eps) for run in found.singularities)
+    verdicts = {run.verdict for run in result.singularities}
+    values = ", ".join(format_number(run.eps) for run in result.singularities)
     if len(verdicts) > 1:
         yield Statement(UNDECIDED, f"the eps {values} disagree: {', '.join(sorted(verdicts))}")
         return
-    first = min(found.singularities, key=lambda run: run.followed or 0)
-    at = f" (eps = {values})" if found.file.map.has_eps else ""
+    first = min(result.singularities, key=lambda run: run.followed or 0)
+    at = f" (eps = {values})" if result.file.map.has_eps else ""
     status = UNDECIDED if first.verdict == SingularityOutcome.UNDECIDED else MEASURED
     yield Statement(status, f"{first.text}{at}")
-    ends = [h.confined_at for run in found.singularities for h in run.hypersurfaces if h.confined_at is not None]
+    ends = [h.confined_at for run in result.singularities for h in run.hypersurfaces if h.confined_at is not None]
     if ends:
         yield Statement(MEASURED, f"the last confinement comes after {counted(max(ends), first.unit)}")
 
 
-def of_symmetries(found: Findings) -> Iterator[Statement]:
+def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
     """Groups with their generators."""
-    search = found.symmetries
+    search = result.symmetries
     if search is None:
         return
     told = []
@@ -209,51 +211,51 @@ def of_symmetries(found: Findings) -> Iterator[Statement]:
         told.append(f"{search.group_text}, generated by {generators}")
     if search.group_of != MATRICES:
         told += [f"{one.kind} {one.text}" for one in search.others]
-    if found.defect:
-        yield Statement(NOTE, f"of the vector field only: {found.defect}")
+    if result.defect:
+        yield Statement(NOTE, f"of the vector field only: {result.defect}")
     yield from (Statement(PROVED, text) for text in told)
     yield from (Statement(UNDECIDED, text) for text in search.undecided)
-    if not (found.defect or told or search.undecided):
+    if not (result.defect or told or search.undecided):
         yield Statement(NOTE, "no affine symmetry of the kinds searched, apart from the identity")
 
 
-def of_structure(found: Findings) -> Iterator[Statement]:
+def of_structure(result: AnalysisResult) -> Iterator[Statement]:
     """H, invariant hyperplanes, the commuting family and the normal form."""
-    structures = found.hamiltonian
+    structures = result.hamiltonian
     if structures is not None and structures.hamiltonian is not None:
         H = format_polynomial(structures.hamiltonian.H)
         kind = "the standard J" if structures.hamiltonian.is_standard else "a constant skew J"
         yield Statement(PROVED, f"Hamiltonian with {kind}, H = {H}")
     elif structures is not None and structures.proved:
         yield Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}")
-    if found.file.is_quadratic:
-        yield from _hyperplanes(found)
-    if found.normal_form is not None and found.normal_form.text:
-        text = f"belongs to the commuting family: {found.normal_form.text}"
-        centre = f"({', '.join(map(format_number, found.centre))})" if found.centre and any(found.centre) else ""
-        if found.normal_form.T is not None or centre:
-            moved = "y" if found.normal_form.T is None else "T y"
+    if result.file.is_quadratic:
+        yield from _hyperplanes(result)
+    if result.normal_form is not None and result.normal_form.text:
+        text = f"belongs to the commuting family: {result.normal_form.text}"
+        centre = f"({', '.join(map(format_number, result.centre))})" if result.centre and any(result.centre) else ""
+        if result.normal_form.T is not None or centre:
+            moved = "y" if result.normal_form.T is None else "T y"
             text += f", in coordinates y with x = {' + '.join(filter(None, [centre, moved]))}"
         yield Statement(PROVED, text)
-    if found.tensor is not None:
-        text = "" if found.defect else ": the map is that over K, and inherits what it has (docs/beyond.md)"
-        yield Statement(PROVED, f"{found.tensor.text}{text}")
-    if isinstance(found.normal_form, SystemNormalForm):
-        form = found.normal_form.form
+    if result.tensor is not None:
+        text = "" if result.defect else ": the map is that over K, and inherits what it has (docs/beyond.md)"
+        yield Statement(PROVED, f"{result.tensor.text}{text}")
+    if isinstance(result.normal_form, SystemNormalForm):
+        form = result.normal_form.form
         text = f"normal form: the planar map of h(X, Y) = {form.h_text} over Q[t]/({form.chi_text}), a block for each"
         yield Statement(PROVED, f"{text} root t")
 
 
-def _hyperplanes(found: Findings) -> Iterator[Statement]:
+def _hyperplanes(result: AnalysisResult) -> Iterator[Statement]:
     """Those that the flow keeps, by what becomes of them under the map at the eps in force."""
-    system, eps = found.file.system, found.eps
+    system, eps = result.file.system, result.eps
     fates: dict[str, list[str]] = {}
     for one in affine_darboux(system).functions:
-        fate = "not birational" if found.defect else "invariant"
-        if eps is not None and not found.defect:
+        fate = "not birational" if result.defect else "invariant"
+        if eps is not None and not result.defect:
             fate = under_map(system, one.function, eps)
         fates.setdefault(fate, []).append(f"{format_polynomial(one.function)} = 0")
-    kind = {1: "point", 2: "line", 3: "plane"}.get(found.dim, "hyperplane")
+    kind = {1: "point", 2: "line", 3: "plane"}.get(result.dim, "hyperplane")
     for fate, planes in fates.items():
         are, it = f"the {kind} {planes[0]} is", "it"
         if len(planes) > 1:
@@ -268,13 +270,13 @@ def _hyperplanes(found: Findings) -> Iterator[Statement]:
         yield Statement(PROVED, f"{are} invariant{of_map[fate]}")
 
 
-def of_commuting_systems(found: Findings) -> Iterator[Statement]:
+def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
     """The g that commute, with g there is -g."""
-    if isinstance(found.normal_form, SystemNormalForm) and (m := found.normal_form.form.m) > 1:
+    if isinstance(result.normal_form, SystemNormalForm) and (m := result.normal_form.form.m) > 1:
         text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
-        split = all(factor.degree == 1 for factor in factors_of_chi(found.normal_form.form.A))
+        split = all(factor.degree == 1 for factor in factors_of_chi(result.normal_form.form.A))
         yield Statement(PROVED, text if split else f"{text} over the splitting field of chi")
-    search = found.commuting
+    search = result.commuting
     if search is None:
         return
     if search.every_g_commutes:
