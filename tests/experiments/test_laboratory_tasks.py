@@ -106,7 +106,7 @@ COUNTED = {"status": "complete", "reason": ""}
             RIVALS,
             {"over": "a", "terms": 2, "primes": "11,13,17"},
             {"status": "complete", "growth": "linear", "integrable": ["-1"], "components": 1, "confirmed": 1,
-             "left": 0, "generic": [2, 4]},
+             "unassigned": 0, "generic": [2, 4]},
         ),
     ],
 )  # fmt: skip

@@ -16,7 +16,7 @@ from kahanmaps_cli.screen.progress import Progress
     "scan",
     scan_options,
     window_option("A0,A1,B0,B1"),
-    click.option("--modulo", type=int, metavar="P", help="The slow members modulo P, one of the primes, instead."),
+    click.option("--modulo", type=int, metavar="P", help="The special members modulo P, one of the primes, instead."),
 )
 def command(options: dict[str, Any], progress: Progress) -> Drawn:
     """The plane of two parameters: where degrees grow more slowly.
@@ -31,7 +31,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawn:
     A colour for each kind of growth; marks are points, lines are curves. The
     conditions of those that do not grow exponentially are written beside them,
     as far as there is room. With --modulo P
-    the plane over GF(P): all slow members that were seen.
+    the plane over GF(P): all special members that were seen.
 
     Exit status: 0 done, 2 usage error, 3 the budget was spent, 130 interrupted
     (the picture is written if something was found).
