@@ -13,6 +13,7 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
+import numpy as np
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 from helpers import fraction, rationals
 from hypothesis import strategies as st
@@ -29,7 +30,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 # Short orbits: every claim is decided at random points as well.
 QUICK = Settings(steps=2)
 
-Rows = list[list[Any]]
+Rows = np.ndarray[Any, Any]  # of Fractions: numpy adds and multiplies them as Python does
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def texts(values: Sequence[Fraction]) -> tuple[str, ...]:
     return tuple(str(value) for value in values)
 
 
-def solve_by_elimination(matrix: Rows, right: list[Any]) -> list[Any] | None:
+def solve_by_elimination(matrix: Sequence[Sequence[Any]], right: Sequence[Any]) -> list[Any] | None:
     """The solution of a linear system, None where the matrix is singular."""
     n = len(matrix)
     rows = [[*row, entry] for row, entry in zip(matrix, right, strict=True)]
@@ -106,54 +107,24 @@ def solve_by_elimination(matrix: Rows, right: list[Any]) -> list[Any] | None:
 def determinant(matrix: Rows) -> Any:
     """The determinant, by expansion along the first row."""
     if len(matrix) == 1:
-        return matrix[0][0]
-    total: Any = Fraction(0)
-    for j, entry in enumerate(matrix[0]):
-        if not _vanishes(entry):
-            minor = [row[:j] + row[j + 1 :] for row in matrix[1:]]
-            total = total + (-1) ** j * entry * determinant(minor)
-    return total
-
-
-def times(*matrices: Rows) -> Rows:
-    """The product of matrices."""
-    left = matrices[0]
-    for right in matrices[1:]:
-        columns = list(zip(*right, strict=True))
-        left = [[dot(row, column) for column in columns] for row in left]
-    return left
-
-
-def dot(left: Sequence[Any], right: Sequence[Any]) -> Any:
-    """The sum of the products of entries."""
-    return sum((a * b for a, b in zip(left, right, strict=True)), Fraction(0))
-
-
-def transposed(matrix: Rows) -> Rows:
-    return [list(column) for column in zip(*matrix, strict=True)]
-
-
-def combined_rows(left: Rows, factor: Any, right: Rows) -> Rows:
-    """left + factor right."""
-    return [[a + factor * b for a, b in zip(one, other, strict=True)] for one, other in zip(left, right, strict=True)]
+        return matrix[0, 0]
+    minors = (determinant(np.delete(matrix[1:], j, axis=1)) for j in range(len(matrix)))
+    return sum(((-1) ** j * matrix[0, j] * minor for j, minor in enumerate(minors)), Fraction(0))
 
 
 def unit(n: int) -> Rows:
-    return [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
+    return np.eye(n, dtype=object)
 
 
 def rows_of(matrix: fmpq_mat) -> Rows:
-    """A rational matrix as rows of Fractions."""
-    return [[fraction(entry) for entry in row] for row in matrix.tolist()]
+    """A rational matrix as an array of Fractions."""
+    return np.array([[fraction(entry) for entry in row] for row in matrix.tolist()], dtype=object)
 
 
 def slope(system: QuadraticSystem, x: Sequence[Any]) -> Rows:
     """f'(x)."""
-    n = system.dim
-    return [
-        [sum((2 * fraction(system.Q[i][j, k]) * x[k] for k in range(n)), fraction(system.B[i, j])) for j in range(n)]
-        for i in range(n)
-    ]
+    at, linear = np.array([*x], dtype=object), rows_of(system.B)
+    return np.array([2 * rows_of(Q) @ at for Q in system.Q]) + linear
 
 
 def kahan_step(system: QuadraticSystem, eps: Fraction, x: Sequence[Any]) -> tuple[Any, ...] | None:
@@ -182,7 +153,7 @@ def kahan_jacobian(system: QuadraticSystem, eps: Fraction, x: Sequence[Fraction]
         if image is None:
             return None
         columns.append([entry.b for entry in image])
-    return transposed(columns)
+    return np.array(columns, dtype=object).T
 
 
 def polynomial_value(polynomial: fmpq_mpoly, point: Sequence[Any]) -> Any:
@@ -207,18 +178,18 @@ def modified_value(hamiltonian: CubicHamiltonian, eps: Fraction, x: Sequence[Fra
     """H + (2 eps/3) grad H^T (I - eps f')^{-1} f, as the formula stands."""
     system = hamiltonian.system
     f = [polynomial_value(component, x) for component in system.rhs]
-    matrix = combined_rows(unit(system.dim), -eps, slope(system, x))
+    matrix = unit(system.dim) - eps * slope(system, x)
     solution = solve_by_elimination(matrix, f)
     if solution is None:
         return None
     grad = [polynomial_value(component, x) for component in hamiltonian.gradient]
-    return polynomial_value(hamiltonian.H, x) + Fraction(2, 3) * eps * dot(grad, solution)
+    return polynomial_value(hamiltonian.H, x) + Fraction(2, 3) * eps * np.dot(grad, solution)
 
 
 def tensor(hamiltonian: CubicHamiltonian, eps: Fraction, x: Sequence[Fraction]) -> Rows:
     """J - eps^2 f'(x)^2 J."""
     J, jacobian = rows_of(hamiltonian.J), slope(hamiltonian.system, x)
-    return combined_rows(J, -(eps**2), times(jacobian, jacobian, J))
+    return J - eps**2 * (jacobian @ jacobian @ J)
 
 
 def verify_witness(witness: Witness | None, left: Sequence[Fraction], right: Sequence[Fraction]) -> None:

@@ -6,11 +6,13 @@ import json
 import os
 import pty
 import re
+import shlex
 import signal
 import struct
 import subprocess
 import sys
 import termios
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -86,6 +88,17 @@ def shell(script: str, folder: Path, stdin: bytes = b"", **more: str) -> Outcome
         ["bash", "-c", _PRELUDE + script], cwd=folder, input=stdin, capture_output=True, env=environment(**more)
     )
     return Outcome(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+def interrupted(line: str, path: Path, number: int) -> Outcome:
+    """Run a command in a process of its own, and send it a signal once more than 2000 bytes are in its file."""
+    command = [*COMMAND, *shlex.split(line), "-o", str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while not path.exists() or path.stat().st_size < 2000:
+            time.sleep(0.02)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=100)
+    return Outcome(process.returncode, out, err)
 
 
 def terminal(*arguments: str, columns: int = 80, **more: str) -> Outcome:

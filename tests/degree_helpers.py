@@ -6,6 +6,9 @@ from typing import Any
 from flint import fmpq, nmod_poly
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -41,6 +44,12 @@ def polynomial_degrees(system: QuadraticSystem, count: int, seed: int, eps: Any 
         X = [entry // common for entry in image]
         found.append(max(entry.degree() for entry in X))
     return found
+
+
+def by_formulas(variables: str, image: str) -> ImplicitMap:
+    """The map that formulas in some variables and eps give, "x,y" and "y; (1 + y)/x"."""
+    names = variables.split(",")
+    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image.split(";")])
 
 
 def determinant(rows: list[list[nmod_poly]]) -> nmod_poly:

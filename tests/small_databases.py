@@ -4,6 +4,8 @@ import io
 import os
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 from kahanmaps.experiments.results import store as store_module
 from kahanmaps.experiments.results.export import write_jsonl
 from kahanmaps.experiments.results.records import Outcome, Record, Task, TaskLimits
-from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.results.store import Store, StoreError
 
 # For hundreds of small databases: a disk that others use makes each wait to be synchronised.
 MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
@@ -59,6 +61,23 @@ def exported(path: Path) -> str:
     with Store.open(path, readonly=True) as store:
         write_jsonl(store.rows(), stream, stable=True)
     return stream.getvalue()
+
+
+def recorded(path: Path | str) -> int:
+    """How many tasks have a record in a database, 0 while there is none."""
+    try:
+        with Store.open(path, readonly=True) as store:
+            return sum(experiment.tasks - experiment.missing for experiment in store.status())
+    except StoreError:
+        return 0
+
+
+def until(holds: Callable[[], object], seconds: float = 100.0) -> None:
+    """Wait until something holds."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from kahanmaps.errors import (
 
 
 @pytest.mark.parametrize("text", ["x" * 200_000, "x " * 100_000, "x\n" * 200_000, "0" * 1001])
-def test_a_long_message_is_cut_and_its_length_is_told(text):
+def test_a_long_message_is_cut_and_its_length_is_reported(text):
     found = bounded(f"found {text}, expected less")
     assert len(found) < 1200
     assert max(map(len, found.split("\n"))) <= 1000

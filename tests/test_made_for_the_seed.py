@@ -90,9 +90,6 @@ def test_claims_made_of_the_primes_of_others_are_refuted(seed):
         N, M = primes_of(integral) or N + 1, primes_of(commuting) or M + 1
 
 
-# What the hash is of
-
-
 def claimed(text: str) -> ClaimedIntegral:
     return ClaimedIntegral("I", parse_rational_function(text, ["x", "y", "eps"]))
 
@@ -121,9 +118,6 @@ def test_identities_that_differ_in_anything_have_points_of_their_own(kind):
     identities = LIKE_EACH_OTHER[kind]
     assert len({identity.seed(0) for identity in identities}) == len(identities)
     assert identities[0].seed(0) != identities[0].seed(1)
-
-
-# The hash itself
 
 
 @pytest.mark.parametrize(

@@ -19,17 +19,7 @@ PICTURES = sorted(path for path in (DOCS / "pictures").iterdir() if path.suffix 
 def test_the_metadata_hold_the_command_and_the_system(tmp_path, kind):
     picture = tmp_path / f"é <&> (1).{kind}"
     words = [
-        "plot",
-        "portrait",
-        "harmonic",
-        "--eps",
-        "1/20",
-        "--start",
-        "1,2",
-        "--steps",
-        "3",
-        "-q",
-        "-o",
+        *["plot", "portrait", "harmonic", "--eps", "1/20", "--start", "1,2", "--steps", "3", "-q", "-o"],
         str(picture),
     ]
     assert main(words) == 0

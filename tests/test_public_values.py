@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from helpers import together
 
 import kahanmaps as km
 from kahanmaps.errors import InputError
@@ -59,7 +60,7 @@ def test_systems_maps_and_orbits_are_copied_and_pickled(again):
     assert np.array_equal(again(floats).x, floats.x)
 
 
-@pytest.mark.parametrize("name", [*km.__all__, "map", "plot"])
+@together("name", [*km.__all__, "map", "plot"])
 def test_public_names_are_the_same_after_a_pickle(name):
     value = getattr(km, name)
     again = pickle.loads(pickle.dumps(value))

@@ -94,15 +94,3 @@ def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
 def test_a_page_that_fetches_or_complains_is_seen(tmp_path):
     assert dumped(tmp_path, FETCHING)[1] == ["http://localhost:9/x.png"]
     assert "undefined_name" in dumped(tmp_path, COMPLAINING)[2][0]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("scheme", "is_dark"), [(0, True), (1, False)])
-def test_the_page_is_light_or_dark_as_its_reader_is_and_not_blank(tmp_path, html, scheme, is_dark):
-    image = pytest.importorskip("matplotlib.image")
-    page, png = tmp_path / "page.html", tmp_path / "page.png"
-    page.write_text(html)
-    browse(page, f"--screenshot={png}", "--window-size=800,1200", f"--blink-settings=preferredColorScheme={scheme}")
-    grey = image.imread(png)[:, :, :3].mean(axis=2)
-    assert (grey[5, 5] < 0.2) == is_dark
-    assert (abs(grey - grey[5, 5]) > 0.3).mean() > 0.01, "no letters"

@@ -53,9 +53,6 @@ def dual_matrices(draw, field, rows, columns):
     return field.matrix(rows, columns, [field.dual(*entry) for entry in entries])
 
 
-# Derivatives.
-
-
 @over_all_bases
 @some
 @given(p=polynomials, q=polynomials, x=rationals(9))
@@ -67,8 +64,6 @@ def test_the_slope_of_a_rational_function_is_its_derivative(base, p, q, x):
         expected = (p.derivative()(x) * q(x) - p(x) * q.derivative()(x)) / q(x) ** 2
         assert field.equal(at(p, moving) / at(q, moving), field.dual(p(x) / q(x), expected))
 
-
-# Numbers on both sides.
 
 x = D.dual(2, 3)
 MIXED = [  # result, value, slope
@@ -85,9 +80,6 @@ MIXED = [  # result, value, slope
 @pytest.mark.parametrize(("result", "value", "slope"), MIXED)
 def test_numbers_on_either_side_are_constants(result, value, slope):
     assert (result.value, result.slope) == (value, slope)
-
-
-# Matrices.
 
 
 @over_all_bases

@@ -91,7 +91,7 @@ def test_a_denominator_that_the_prime_divides_is_refused_with_the_prime(prime):
 @over_exact_fields
 @some
 @given(number=rationals(10**20))
-def test_an_exact_element_comes_back_from_its_text(field, number):
+def test_a_printed_exact_element_parses_back(field, number):
     assume(field.convert(number.q) != 0)
     element = field.convert(number)
     assert field.convert(field.format(element)) == element

@@ -48,7 +48,7 @@ def test_products_are_branched_on_though_combinations_of_them_are_none():
     assert [component.values for component in found.components] == wanted
 
 
-def test_solutions_outside_the_rationals_are_told():
+def test_irrational_solutions_are_reported():
     found = solve(x**2 - 2, y, z)
     assert (found.components, found.irrational, found.complete) == ([], ["x^2 - 2"], True)
     # x^2 = y, y^2 = 2 x: (0, 0) and three conjugate points with x^3 = 2

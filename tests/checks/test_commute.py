@@ -227,7 +227,7 @@ def test_variables_are_matched_by_name_where_the_names_agree(names):
     assert pair(f, QuadraticSystem.from_text(["a", "b"], ["a*b", "b^2+a"])).verdict is REFUTED
 
 
-def test_a_start_at_which_the_map_has_no_value_is_told():
+def test_an_indeterminate_initial_point_is_reported():
     # x' = x^2 at eps = 1/10: det = 1 - 2 eps x vanishes at x = 5.
     f = system_of("x", "x^2")
     report = pair(f, f, Settings(eps="1/10", start=(5,), steps=3, orbit_is_asked=True))
@@ -252,6 +252,6 @@ def test_a_start_at_which_the_map_has_no_value_is_told():
         (file_of(LOTKA_VOLTERRA), file_of(FORCED_PLANE), 1, 0, "eps2 = 0"),
     ],
 )
-def test_what_cannot_be_compared_is_told(f, g, eps, eps2, message):
+def test_maps_that_cannot_be_compared_are_refused(f, g, eps, eps2, message):
     with pytest.raises(InputError, match=message):
         check_commute(f, g, Settings(eps=eps), eps2=eps2)

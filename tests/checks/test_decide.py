@@ -82,7 +82,7 @@ TRUE = identity_of(square_left, square_right)
 
 
 @pytest.mark.parametrize("error_bits", [1, 100, 300])
-def test_as_many_points_are_tried_as_the_bound_needs_and_all_are_told(error_bits):
+def test_as_many_points_are_tried_as_the_bound_needs_and_all_are_reported(error_bits):
     identity, fields = counted(TRUE)
     data = decide(identity, 0, error_bits).evidence.data
     assert len(fields) == data["points"] == math.ceil(error_bits / -log2_error(*TRUE.bound))

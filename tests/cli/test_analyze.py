@@ -162,7 +162,7 @@ def test_seconds_end_a_process_at_any_load():
 
 
 @pytest.mark.usefixtures("one_process")
-def test_sections_are_told_as_soon_as_they_are_final(kahanmaps, monkeypatch):
+def test_sections_are_reported_as_soon_as_they_are_final(kahanmaps, monkeypatch):
     told = []
     monkeypatch.setattr("kahanmaps_cli.commands.analyze.tell", lambda text, **_: told.append(text.strip()))
     seen = {}

@@ -8,7 +8,6 @@ import re
 import shutil
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
@@ -17,6 +16,7 @@ from pathlib import Path
 import pytest
 from cli_helpers import COMMAND, environment, shell
 from helpers import quick
+from small_databases import recorded, until
 
 import kahanmaps as km
 from kahanmaps.experiments.running.local import LocalWorkers
@@ -171,7 +171,7 @@ def test_a_task_can_be_redone_from_what_show_prints(batch):
     assert again == data["result"]
 
 
-def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):
+def test_different_results_of_one_task_are_reported_and_those_of_the_target_are_kept(batch):
     from kahanmaps.experiments.results.records import Outcome as Word
     from kahanmaps.experiments.results.records import Record, Task, TaskLimits
     from kahanmaps.experiments.results.store import Store
@@ -198,32 +198,15 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     """Start a batch in a process of its own and wait until it is at work; it ends with the test."""
     with ExitStack() as processes:
 
-        def run(*words: str) -> subprocess.Popen[str]:
-            process = subprocess.Popen(
-                [*COMMAND, "batch", "run", *words],
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-                env=environment(),
-            )
+        def run(*words: str, tasks: int = 4) -> subprocess.Popen[str]:
+            command, pipe = [*COMMAND, "batch", "run", *words], subprocess.PIPE
+            process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment())
             processes.callback(process.communicate)
             processes.callback(process.kill)
-            deadline = time.monotonic() + 100
-            while time.monotonic() < deadline and _stored() < 4:
-                time.sleep(0.02)
+            until(lambda: recorded("study.db") >= tasks)
             return process
 
         yield run
-
-
-def _stored() -> int:
-    from kahanmaps.experiments.results.store import Store, StoreError
-
-    try:
-        with Store.open("study.db", readonly=True) as store:
-            return sum(one.tasks - one.missing for one in store.status())
-    except StoreError:
-        return 0
 
 
 @pytest.mark.parametrize("number", quick([signal.SIGINT, signal.SIGTERM], [signal.SIGINT]))
@@ -263,36 +246,28 @@ def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batc
     done = batch("run", spec, "--json")
     assert done.status == 3
     assert (done.json["done"], done.json["missing"]) == ({"ok": 2, "lost": 1}, 1)
-    assert done.json["experiments"][0]["outcomes"] == {"ok": 2}
     assert "1 task lost, without a result: what did them was killed, or could not be run, 5 times" in done.err
     assert "(the child was killed by signal 9 (SIGKILL), from outside or for want of memory)" in done.err
     assert "1 task without a result yet; to continue: kahanmaps batch run study.toml --db study.db" in done.err
     assert "failed" not in done.err
-    assert [line.split("\t")[1:4] for line in batch("status", "--db", "study.db").out.splitlines()] == [
-        ["tasks", "missing", "ok"],
-        ["3", "1", "2"],
-    ]
-    lines = [json.loads(line) for line in batch("export", "--db", "study.db", "--jsonl").out.splitlines()]
+    assert [row[1:4] for row in batch("status --db study.db").rows] == [["tasks", "missing", "ok"], ["3", "1", "2"]]
+    lines = batch("export --db study.db --jsonl").records
     assert [line["number"] for line in lines if line["record"] == "result"] == [0, 2]
     (group,) = batch("summary", "--db", "study.db", "--json").json["groups"]
     assert (group["tasks"], group["missing"], sum(group["outcomes"].values())) == (3, 1, 2)
     again = batch("run", spec, "--jsonl")
     assert again.status == 3
-    (record,) = map(json.loads, again.out.splitlines())
+    (record,) = again.records
     assert (record["outcome"], record["result"]) == ("lost", None)
-    shown = batch("show", record["key"], "--db", "study.db")
-    assert "outcome\tnone yet" in shown.out
+    assert "outcome\tnone yet" in batch("show", record["key"], "--db", "study.db").out
 
 
-def test_a_second_ctrl_c_is_immediate(batch):
+def test_a_second_ctrl_c_is_immediate(start):
     Path("study.toml").write_text(PAUSE.replace("steps = 30", "steps = 600000"))
-    process = subprocess.Popen(
-        [*COMMAND, "batch", "run", "study.toml", "-j", "2"], stderr=subprocess.PIPE, text=True, env=environment()
-    )
+    process = start("study.toml", "-j", "2", tasks=0)
     threads = Path(f"/proc/{process.pid}/task")
     # Two workers, and the process in which Python keeps account of its semaphores.
-    while sum(len(file.read_text().split()) for file in threads.glob("*/children")) < 3:
-        time.sleep(0.02)
+    until(lambda: sum(len(file.read_text().split()) for file in threads.glob("*/children")) == 3)
     process.send_signal(signal.SIGINT)
     assert any("finishing 2 tasks in flight" in line for line in process.stderr or ())
     assert process.poll() is None  # waits for them

@@ -20,9 +20,6 @@ def image(kahanmaps, system, point, eps):
     return kahanmaps(command).records[-2]["x"]
 
 
-# Doing it again
-
-
 def test_a_witness_of_an_integral_is_verified_by_an_orbit(kahanmaps):
     claim = claims(kahanmaps("check-integrals euler_top --integral s=x1-x2/3 --json").json)["s is conserved"]
     witness = claim["witness"]
@@ -42,9 +39,6 @@ def test_a_witness_of_maps_that_do_not_commute_is_verified_by_orbits(kahanmaps):
     assert claim["witness"]["right"] == {"is": "Phi_f(Phi_g(x))", "value": g_first}
 
 
-# check-commute
-
-
 def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanmaps):
     linear = "check-commute \"x' = a*y; y' = -x\" \"x' = 3*a*y; y' = -3*x\" --json -p"
     assert kahanmaps(linear, "'a=root of t^2 - 2'").json["verdict"] == "proved"
@@ -53,9 +47,6 @@ def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanm
     assert same["document"]["parameters"]["a1"] == same["other_document"]["parameters"]["a1"] == "3"
     assert kahanmaps("check-commute euler_top euler_top -p a1=3").err.startswith("-p a1: set in both systems")
     assert "both" not in kahanmaps("check-commute euler_top euler_top -p a1=3 -q").err
-
-
-# check-integrals
 
 
 @pytest.mark.parametrize(

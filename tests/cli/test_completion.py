@@ -80,9 +80,6 @@ def test_nothing_that_computes_is_loaded():
     assert done.stderr == "[]\n"
 
 
-# The scripts
-
-
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
 def test_bash_completes_with_the_script(tmp_path):
     # The script calls `kahanmaps` through env, so it has to be a program.

@@ -18,7 +18,7 @@ def test_an_inline_system_becomes_a_system_file(kahanmaps, tmp_path):
     assert kahanmaps("convert", path, "--to toml -p a=1").out != path.read_text()
 
 
-def test_a_file_is_written_whole_and_told_on_standard_error(kahanmaps, tmp_path):
+def test_a_file_is_written_whole_and_named_on_standard_error(kahanmaps, tmp_path):
     path = tmp_path / "top.jl"
     outcome = kahanmaps("convert euler_top --to julia -o", path)
     assert (outcome.status, outcome.out) == (0, "")

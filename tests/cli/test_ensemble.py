@@ -5,21 +5,14 @@ Starts come from text, .npy files, standard input or a seed; whatever is wrong w
 """
 
 import io
-import json
 import os
-import shlex
 import signal
-import subprocess
-import time
 
 import numpy as np
 import pytest
-from cli_helpers import COMMAND
+from cli_helpers import interrupted
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
-
-
-# Starts
 
 
 STARTS = [[1.0, 0.5, -2.0], [0.25, 3.0, 1.0]]
@@ -55,9 +48,6 @@ def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
     assert drawn("--seed 3")[0].tolist() == pytest.approx([-0.828701666, -0.526379, 0.602548930], abs=1e-6)
 
 
-# Orbits
-
-
 def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     command = ("ensemble", pair, "--random 5 --eps 1/10 --steps 20 --kernel numpy --json")
     chosen, generic = kahanmaps(*command).json, kahanmaps(*command, "--method generic").json
@@ -70,9 +60,6 @@ def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     assert generic["drift"] == []
 
 
-# The file
-
-
 def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_path):
     path = tmp_path / "x.npy"
     for more in ("", " --integral F1"):
@@ -83,26 +70,13 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
         assert two.dtype == np.float64
 
 
-# Interrupts
-
-
 def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     path = tmp_path / "x.npy"
-    words = f"{TOP} --steps {10**9} --random 5 --every 10 -o {path} --json"
-    process = subprocess.Popen(
-        [*COMMAND, *shlex.split(words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    while not path.exists() or path.stat().st_size < 2000:  # the first records are in the file
-        time.sleep(0.02)
-    process.send_signal(signal.SIGTERM)
-    out, err = process.communicate(timeout=60)
-    found = json.loads(out)
-    assert (process.returncode, found["status"]) == (130, "interrupted")
-    assert f"interrupted after step {found['steps_taken']}" in err
+    outcome = interrupted(f"{TOP} --steps {10**9} --random 5 --every 10 --json", path, signal.SIGTERM)
+    found = outcome.json
+    assert (outcome.status, found["status"]) == (130, "interrupted")
+    assert f"interrupted after step {found['steps_taken']}" in outcome.err
     assert np.load(path).shape == tuple(found["output"]["shape"]) == (found["steps_taken"] // 10 + 1, 5, 3)
-
-
-# Wrong use
 
 
 def npy(array) -> bytes:

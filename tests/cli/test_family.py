@@ -22,18 +22,12 @@ DRAWN = [
 ]
 
 
-# new
-
-
 @pytest.mark.parametrize(("options", "m"), DRAWN)
 def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
     path = tmp_path / "drawn.toml"
     assert kahanmaps(f"family new {options} -o", path).status == 0
     shown = kahanmaps("family show", path, "--json").json
     assert (shown["system"], shown["m"], shown["dim"]) == ("drawn", m, 2 * m)
-
-
-# show
 
 
 def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path):
@@ -43,9 +37,6 @@ def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path):
     outcome = kahanmaps("family show", tmp_path / "a.toml", "--normal-form --json")
     assert (outcome.status, outcome.out) == (2, "")
     assert "chi has the repeated factor (t - 1)" in outcome.err
-
-
-# show: members that do not say so
 
 
 @pytest.fixture
@@ -69,9 +60,6 @@ def test_a_member_that_does_not_say_so_is_found(kahanmaps, pair, forgetful, whic
     assert (shown["found"]["generic"], shown["found"]["dimension"], shown["found"]["standard"]) == (True, 2, True)
     assert shown["hamiltonians"][0] == member["hamiltonians"][0]
     assert [factor["factor"] for factor in shown["factors"]] == ["t - 1", "t - 2"]
-
-
-# associated
 
 
 def test_the_associated_systems_are_written_as_files(kahanmaps, pair, tmp_path):
@@ -104,9 +92,6 @@ def test_files_stay_in_their_folder_whatever_the_name_of_the_system(kahanmaps, t
     assert kahanmaps("family associated", tmp_path / "a.toml", "--write-to", folder).status == 0
     assert len(list(folder.iterdir())) == 2
     assert sorted(path.name for path in tmp_path.rglob("*.toml") if path.parent != folder) == ["a.toml"]
-
-
-# tensor
 
 
 def test_a_system_over_an_algebra_is_written_over_Q_with_what_it_inherits(kahanmaps, tmp_path):

@@ -91,9 +91,6 @@ def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way
     assert "it would be written over" in outcome.err
 
 
-# Whole files
-
-
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_an_npz_file_is_the_old_one_or_the_new_one_whatever_ends_the_orbit(tmp_path, number):
     target = tmp_path / "orbit.npz"
@@ -114,8 +111,6 @@ def test_an_npz_file_is_the_old_one_or_the_new_one_whatever_ends_the_orbit(tmp_p
         assert list(tmp_path.iterdir()) == [target]
         assert json.loads(str(np.load(target)["meta"]))["end"]["status"] == "interrupted"
 
-
-# Damaged files
 
 READERS = {
     "starts.npy": lambda path: read_starts(path, ["x", "y"]),
@@ -153,9 +148,6 @@ def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name):
         assert is_read_or_refused(READERS[name], path)
 
 
-# Readers that leave
-
-
 @pytest.fixture
 def unread(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], int]:
     """Run a command whose standard output is a pipe that nobody reads any longer: its exit status."""
@@ -189,9 +181,6 @@ def unread(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], int]:
 def test_a_reader_that_has_left_changes_no_exit_status(kahanmaps, unread, least_folder, line, status):
     Path("FAILS").write_text('[experiments.a]\ntask = "check-integrals"\nsystem = "lorenz"\n')
     assert (kahanmaps(line).status, unread(line)) == (status, status)
-
-
-# Disks and limits
 
 
 def source_of(words: str, name: str) -> str:

@@ -38,7 +38,7 @@ def test_what_seconds_stopped_says_so_and_nothing_is_begun_after_it(kahanmaps, m
         assert (outcome.out.count("# p = "), outcome.out.count("time limit")) == (3, 1)
 
 
-def test_p_is_a_parameter_and_a_prime_is_told_how_to_be_typed(kahanmaps):
+def test_p_sets_a_parameter_and_the_error_names_the_option_for_a_prime(kahanmaps):
     outcome = kahanmaps("cycles weierstrass -p 31")
     assert outcome.status == 2
     assert "found '31', expected NAME=VALUE (the prime of cycles is --prime 31)" in outcome.err
@@ -74,7 +74,7 @@ def test_starts_from_a_file(kahanmaps, tmp_path):
 # heights
 
 
-def test_eps_that_disagree_are_told(monkeypatch):
+def test_values_of_eps_that_disagree_are_reported(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.DEFAULT_EPS", (1, 2))
     from kahanmaps.systems.quadratic import QuadraticSystem
 

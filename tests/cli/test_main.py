@@ -68,7 +68,7 @@ def test_an_internal_error_names_the_file_that_was_being_read(kahanmaps, monkeyp
     assert f"Either {path}, which was being read, is damaged, or this is a bug in kahanmaps" in outcome.err
 
 
-def test_ctrl_c_while_libraries_are_loaded_is_told_without_a_traceback():
+def test_ctrl_c_while_libraries_are_loaded_is_reported_without_a_traceback():
     script = """
 import builtins, os, signal, sys
 from kahanmaps_cli import __main__
@@ -86,7 +86,7 @@ sys.exit(__main__.main())
 
 
 @pytest.mark.parametrize("megabytes", [100, 250])
-def test_want_of_memory_is_told_and_never_ends_with_the_status_of_a_refuted_claim(tmp_path, megabytes):
+def test_lack_of_memory_is_reported_and_never_ends_with_the_status_of_a_refuted_claim(tmp_path, megabytes):
     # OpenBLAS ends the process with 1 where it finds no memory; at 100 MB numpy itself cannot be loaded.
     script = f"ulimit -v {megabytes * 1000}; $KAHANMAPS_PYTHON -m kahanmaps_cli orbit"
     outcome = shell(f"{script} harmonic --start 1,2 --eps 1/10 --steps 1 --arithmetic float", tmp_path)

@@ -8,13 +8,11 @@ import csv
 import json
 import shlex
 import signal
-import subprocess
-import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cli_helpers import COMMAND, shell, terminal
+from cli_helpers import interrupted, shell, terminal
 
 from kahanmaps.version import __version__
 
@@ -167,13 +165,8 @@ def test_npz_is_refused_on_a_terminal():
 
 def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(tmp_path):
     path = tmp_path / "orbit.jsonl"
-    words = f"{TOP} --steps {10**12} --arithmetic mod:10007 --every 100 -o {path}"
-    process = subprocess.Popen([*COMMAND, *shlex.split(words)], stderr=subprocess.PIPE, text=True)
-    while not path.exists() or not path.stat().st_size:  # the first records are in the file
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=100)
-    assert process.returncode == 130
+    line = f"{TOP} --steps {10**12} --arithmetic mod:10007 --every 100"
+    assert interrupted(line, path, signal.SIGINT).status == 130
     records = [json.loads(line) for line in path.read_text().splitlines()]
     steps = [record["step"] for record in records[1:-1]]
     end = records[-1]

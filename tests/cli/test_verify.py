@@ -21,9 +21,6 @@ def expected(m, *sections):
     return [c.key for c in claims() if not c.variation and c.makes_sense(m) and (not sections or c.section in sections)]
 
 
-# JSON
-
-
 def test_without_options_a_random_member_with_m_3_is_drawn_and_everything_is_verified(once):
     outcome = once("verify --json")
     assert outcome.status == 0
@@ -41,9 +38,6 @@ def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, once, t
     assert again["claims"] == first["claims"]
 
 
-# What to verify
-
-
 def test_controls_are_refuted_and_that_is_success(once):
     outcome = once(f"{QUICK} --controls --json")
     assert outcome.status == 0
@@ -52,9 +46,6 @@ def test_controls_are_refuted_and_that_is_success(once):
     assert all(claim["control"] and claim["expected"] == "refuted" for claim in found)
     assert {claim["key"] for claim in found} == set(expected(2, 6))
     assert last["verdict"] == "proved"
-
-
-# Exit statuses
 
 
 def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
@@ -66,9 +57,6 @@ def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
     outcome = kahanmaps("verify --m 2 --section 7 --json")
     assert outcome.status == 1
     assert outcome.json["holds"] is False
-
-
-# What survives
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ def test_a_quotient_is_a_fraction_where_it_is_short_and_has_a_slash_where_it_is_
     assert parse_rational_function(plain, ["x", "y"]) == long
 
 
-def test_what_is_too_long_is_cut_and_its_terms_are_told():
+def test_a_long_formula_is_cut_and_its_number_of_terms_is_reported():
     power = parse_polynomial("(x + y)^40", ["x", "y"])
     assert together(formula(power, characters=60)).endswith(r"+ \cdots\ \text{(41 terms)}")
     assert len(pieces(formula(power, characters=10_000))) == 41

@@ -10,13 +10,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.display.latex import (
-    latex_cut,
-    latex_name,
-    latex_number,
-    latex_polynomial,
-    latex_rational_function,
-)
+from kahanmaps.display.latex import latex_cut, latex_name, latex_number, latex_polynomial, latex_rational_function
 
 NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]
 RING = ring(NAMES)

@@ -1,10 +1,10 @@
 """What notebooks show: well-formed, bounded in size, true, and with nothing in it that a name brought along."""
 
-from functools import cache
 from xml.etree import ElementTree
 
 import pytest
 from flint import fmpq_mat
+from search_helpers import analysis_of
 from small_databases import ok, planned
 
 import kahanmaps as km
@@ -41,9 +41,8 @@ def walked(orbit):
     return orbit
 
 
-@cache
 def analysis():
-    return km.analyze(km.load("lotka_volterra"))
+    return analysis_of("lotka_volterra")
 
 
 WRONG = 'variables = ["x"]\n[system]\nrhs = ["x^2"]\n[integrals]\nI = "x"'

@@ -42,18 +42,12 @@ def findings(file):
     return found
 
 
-# What each file says of itself.
-
-
 @over_the_catalogue
 def test_a_file_has_its_facts_and_reads_back_equal(name):
     file = load(name)
     assert (file.name, parse_system(file.to_toml(), name)) == (name, file)
     assert set(file.catalog["sources"]) <= set(SOURCES)
     assert all(file.catalog[key] for key in ("title", "sources", "convention", "facts"))
-
-
-# What the files claim, decided by the checks.
 
 
 @over_the_smaller_systems
@@ -105,18 +99,12 @@ def test_every_altered_claim_is_refuted_with_a_rational_witness(name):
         assert finding.witness.left != finding.witness.right
 
 
-# The members of the family.
-
-
 @pytest.mark.parametrize("name", ["paper_m2", "paper_m3", "paper_m3_irreducible"])
 def test_the_maps_of_a_member_commute_and_the_control_does_not(name):
     report = check_commute(load(name), settings=Settings(steps=2))
     assert report.verdict is Certainty.PROVED
     (control,) = [finding for finding in report.findings if finding.control]
     assert control.verdict is Certainty.REFUTED
-
-
-# Degrees.
 
 
 CLOSED_FORMS = {

@@ -93,7 +93,7 @@ def test_the_dimensions_of_the_relations_are_those_that_are_stated(name):
 
 
 @pytest.mark.parametrize("name", quick(map_names(), ["lyness", "mcmillan"]))
-def test_the_analysis_that_is_told_nothing_finds_the_verdict(name):
+def test_the_blind_analysis_gives_the_stated_verdict(name):
     known = FILES[name].catalog
     found = analyze(FILES[name])
     assert found.conclusion.kind == known["verdict"]

@@ -178,14 +178,14 @@ LARGE = {
 
 
 @together("text, expected, words", wrong_files())
-def test_a_wrong_file_is_told_its_mistakes_by_key(text, expected, words):
+def test_the_mistakes_of_a_wrong_file_are_reported_by_key(text, expected, words):
     found = mistakes(text)
     assert [key for key, _ in found] == expected
     assert [one for one in words if not any(one in sentence for _, sentence in found)] == []
 
 
 @pytest.mark.parametrize(("text", "expected"), LARGE.values(), ids=LARGE)
-def test_what_is_large_or_no_text_is_told_as_well(text, expected):
+def test_files_that_are_too_large_or_no_text_are_refused_by_key(text, expected):
     assert keys(text) == expected
 
 

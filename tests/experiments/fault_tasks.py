@@ -9,8 +9,11 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from flint import fmpz, fmpz_mat
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import task
@@ -60,54 +63,26 @@ def signalled(order: int = 0, seed: int = 0) -> dict[str, Any]:
     return {"lived": True}
 
 
-def _kill(number: int) -> dict[str, Any]:
+def _kill(number: int) -> None:
     print(f"about to die of {number}", file=sys.stderr, flush=True)
     os.kill(os.getpid(), number)
     time.sleep(60)
-    return {}
 
 
-def _segfault() -> dict[str, Any]:
-    ctypes.string_at(0)
-    return {}
-
-
-def _hang() -> dict[str, Any]:
+def _hang() -> None:
     signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # like a long call of FLINT
     while True:
         time.sleep(60)
 
 
-def _python_bomb() -> dict[str, Any]:
+def _exhaust_memory(allocate: Callable[[], Any]) -> None:
     hoard = []
     while True:
-        hoard.append(bytearray(1 << 20))
+        hoard.append(allocate())
 
 
-def _flint_bomb() -> dict[str, Any]:
-    from flint import fmpz_mat
-
-    hoard = []
-    while True:
-        hoard.append(fmpz_mat(3000, 3000))
-
-
-def _gmp_bomb() -> dict[str, Any]:
-    from flint import fmpz
-
-    return {"bits": (fmpz(1) << 400_000_000_000).bit_length()}
-
-
-def _input_error() -> dict[str, Any]:
-    raise InputError("found nothing, expected something")
-
-
-def _bug() -> dict[str, Any]:
-    return {"quotient": 1 // 0}
-
-
-def _not_a_number() -> dict[str, Any]:
-    return {"value": float("nan")}
+def _fail(error: Exception) -> None:
+    raise error
 
 
 def _chatter() -> dict[str, Any]:
@@ -116,82 +91,40 @@ def _chatter() -> dict[str, Any]:
     return {"said": "much"}
 
 
-def _exit() -> dict[str, Any]:
-    os._exit(7)
+class Awkward(Exception):
+    """What `pickle` cannot make again."""
+
+    def __init__(self, reason: str, more: str) -> None:
+        super().__init__(reason)
 
 
-def _large() -> dict[str, Any]:
-    return {"digits": "7" * 3_000_000, "hash_seed": os.environ["PYTHONHASHSEED"]}
-
-
-def _awkward() -> dict[str, Any]:
-    class Awkward(Exception):
-        def __init__(self, reason: str, more: str) -> None:  # what `pickle` cannot make again
-            super().__init__(reason)
-
-    raise Awkward("for a reason", "and more")
-
-
-def _leave() -> dict[str, Any]:
-    sys.exit("I leave")
-
-
-def _exit_0() -> dict[str, Any]:
-    os._exit(0)
-
-
-def _twins() -> dict[str, Any]:
-    os.fork()
-    return {"forked": True}
-
-
-def _reader() -> dict[str, Any]:
-    return {"read": sys.stdin.read()}
-
-
-def _not_plain() -> dict[str, Any]:
-    return {"value": {1, 2}}
-
-
-def _verdict_of_no_text() -> dict[str, Any]:
-    return {"verdict": ["proved"]}
-
-
-def _not_loaded() -> dict[str, Any]:
-    raise ImportError("numbers.so: failed to map segment from shared object")
-
-
-def _openblas() -> dict[str, Any]:
+def _openblas() -> None:
     print("OpenBLAS error: Memory allocation still failed after 10 retries, giving up.", file=sys.stderr, flush=True)
     os._exit(1)
 
 
-def _starter() -> dict[str, Any]:
-    return {"pid": subprocess.Popen(["sleep", "60"]).pid}
-
-
-FAULTS = {
+FAULTS: dict[int, Callable[[], Any]] = {
     1: lambda: _kill(signal.SIGKILL),
     2: lambda: _kill(signal.SIGABRT),
-    3: _segfault,
+    3: lambda: ctypes.string_at(0),
     4: _hang,
-    5: _python_bomb,
-    6: _flint_bomb,
-    7: _gmp_bomb,
-    8: _input_error,
-    9: _bug,
-    10: _not_a_number,
+    5: lambda: _exhaust_memory(lambda: bytearray(1 << 20)),
+    6: lambda: _exhaust_memory(lambda: fmpz_mat(3000, 3000)),
+    7: lambda: fmpz(1) << 400_000_000_000,
+    8: lambda: _fail(InputError("found nothing, expected something")),
+    9: lambda: {"quotient": 1 // 0},
+    10: lambda: {"value": float("nan")},
     11: _chatter,
-    12: _exit,
-    13: _large,
-    14: _awkward,
-    15: _twins,
-    16: _exit_0,
-    17: _reader,
-    18: _not_plain,
-    19: _verdict_of_no_text,
-    20: _starter,
-    21: _not_loaded,
+    12: lambda: os._exit(7),
+    13: lambda: {"digits": "7" * 3_000_000, "hash_seed": os.environ["PYTHONHASHSEED"]},
+    14: lambda: _fail(Awkward("for a reason", "and more")),
+    15: lambda: {"forked": os.fork() >= 0},
+    16: lambda: os._exit(0),
+    17: lambda: {"read": sys.stdin.read()},
+    18: lambda: {"value": {1, 2}},
+    19: lambda: {"verdict": ["proved"]},
+    20: lambda: {"pid": subprocess.Popen(["sleep", "60"]).pid},
+    21: lambda: _fail(ImportError("numbers.so: failed to map segment from shared object")),
     22: _openblas,
-    23: _leave,
+    23: lambda: sys.exit("I leave"),
 }

@@ -13,15 +13,14 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import pytest
-from small_databases import exported
+from small_databases import exported, recorded, until
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Job, Outcome, Task, TaskLimits
-from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running import cluster
 from kahanmaps.experiments.running.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
 from kahanmaps.experiments.running.local import TRIES
@@ -120,14 +119,6 @@ class Machines:
         return ClusterWorkers(str(self.file) if address is None else address, documents, **options)
 
 
-def until(holds, seconds=100.0):
-    """Wait until something holds."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
-
-
 @contextmanager
 def machines_in(folder, threads=0):
     """A scheduler, and a worker with so many threads that is started at the same time."""
@@ -179,9 +170,8 @@ def assert_exactly_once(records, jobs):
 @pytest.fixture
 def workers(shared):
     """An executor on the shared scheduler, closed afterwards."""
-    opened = shared.workers()
-    yield opened
-    opened.close()
+    with closing(shared.workers()) as opened:
+        yield opened
 
 
 # What goes out and what comes back
@@ -198,11 +188,8 @@ def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
     tasks = [Task("test", {"document": name, "parameters": {}}, {}) for name in ("first", "second")]
     tasks.append(Task("test", {"family": {"m": 2}}, {}))
     tasks.append(Task("test", {"document": "first", "parameters": {}}, {"other": {"document": "third"}}))
-    workers = shared.workers(texts.__getitem__)
-    try:
+    with closing(shared.workers(texts.__getitem__)) as workers:
         found = {record.key: record.result["documents"] for record in done(workers, [Job(task) for task in tasks])}
-    finally:
-        workers.close()
     assert [found[task.key] for task in tasks] == [
         {"first": "one = 1"},
         {"second": "two = 2"},
@@ -251,11 +238,8 @@ def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, mon
     limits = TaskLimits(time=0.05)
     good = jobs_of(12, limits=limits)
     bad = jobs_of(1, limits=limits, sleep=600, claim=0)
-    workers = shared.workers()
-    try:
+    with closing(shared.workers()) as workers:
         records = done(workers, [*good[:8], *bad, *good[8:]])
-    finally:
-        workers.close()
     assert_exactly_once(records, good + bad)
     (hung,) = [record for record in records if not record.is_ok]
     assert (hung.key, hung.outcome) == (bad[0].task.key, Outcome.LOST)
@@ -266,46 +250,37 @@ def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, mon
 
 
 def test_a_module_that_the_workers_lack_is_one_error_and_not_a_record_for_each_task(shared):
-    workers = shared.workers(command=[sys.executable, "-S", "-m", "no_such_module"])
-    try:
-        with pytest.raises(WorkersUnfit, match="No module named no_such_module"):
-            done(workers, jobs_of(3))
-    finally:
-        workers.close()
+    command = [sys.executable, "-S", "-m", "no_such_module"]
+    with closing(shared.workers(command=command)) as workers, pytest.raises(WorkersUnfit, match="no_such_module"):
+        done(workers, jobs_of(3))
 
 
 # Workers and schedulers that come and go
 
 
-def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own):
+def test_every_record_is_returned_once_although_a_worker_and_its_nanny_are_killed(own):
     first = own.worker()
     own.worker()
-    workers = own.workers(group_seconds=0.5)
     jobs = jobs_of(60, sleep=0.05)
 
     def kill(records):
         if len(records) > 10 and first in own.running:
             own.kill(first)
 
-    try:
+    with closing(own.workers(group_seconds=0.5)) as workers:
         records = done(workers, jobs, meanwhile=kill)
-    finally:
-        workers.close()
     assert_exactly_once(records, jobs)
     assert all(record.is_ok for record in records)
 
 
-def test_a_scheduler_that_is_killed_is_told_at_once_and_holds_nobody_up(own):
+def test_a_killed_scheduler_is_reported_at_once_without_waiting(own):
     own.worker(nanny=False)
-    workers = own.workers()
-    try:
+    with closing(own.workers()) as workers:
         workers.submit(jobs_of(1, sleep=600)[0])
         assert workers.wait(0.5) == []
         own.kill(own.scheduler)
         with pytest.raises(ClusterLost, match=r"what was recorded is safe; run the same command again"):
             workers.wait(100)
-    finally:
-        workers.close()
 
 
 # Batches
@@ -341,19 +316,10 @@ def study(monkeypatch, tmp_path):
         command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "study.toml", "--db", "away.db", "-q"]
         command += ["--scheduler", str(machines.file), "--group-seconds", "0.3"]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        until(lambda: recorded() >= number or process.poll() is not None, 60)
+        until(lambda: recorded("away.db") >= number or process.poll() is not None, 60)
         return process
 
     return start
-
-
-def recorded():
-    """How many tasks have a record."""
-    try:
-        with Store.open("away.db", readonly=True) as store:
-            return sum(one.tasks - one.missing for one in store.status())
-    except InputError:  # there is none yet
-        return 0
 
 
 @pytest.mark.usefixtures("study")
@@ -369,10 +335,10 @@ def test_what_is_killed_on_a_cluster_changes_nothing(own, study):
     batch = study(own, 20)
     own.kill(first)  # a worker with its nanny, in the middle of its groups
     own.worker(1)
-    until(lambda: recorded() >= 60, 60)
+    until(lambda: recorded("away.db") >= 60, 60)
     batch.send_signal(signal.SIGKILL)  # the coordinator
     batch.communicate()
-    assert 60 <= recorded() < 316
+    assert 60 <= recorded("away.db") < 316
     batch = study(own, 0)
     _, err = batch.communicate(timeout=100)
     assert batch.returncode == 3, err  # some tasks fail, as meant
@@ -383,7 +349,7 @@ def test_what_is_killed_on_a_cluster_changes_nothing(own, study):
 # Before there is a cluster
 
 
-def test_an_address_where_nobody_listens_is_told_in_a_sentence():
+def test_an_address_where_no_scheduler_answers_is_refused_in_a_sentence():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
@@ -399,12 +365,12 @@ def test_an_address_where_nobody_listens_is_told_in_a_sentence():
         ("udp://127.0.0.1:8786", "no dask scheduler answers"),
     ],
 )
-def test_an_address_that_cannot_be_one_is_told_in_a_sentence(address, sentence):
+def test_a_malformed_address_is_refused_in_a_sentence(address, sentence):
     with pytest.raises(InputError, match=sentence):
         ClusterWorkers(address, str, connect_seconds=0.3)
 
 
-def test_a_missing_installation_is_told_with_the_command_that_repairs_it(monkeypatch):
+def test_a_missing_installation_is_reported_with_the_command_that_repairs_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install 'kahanmaps\[cluster\]'"):
         ClusterWorkers("tcp://127.0.0.1:8786", str)

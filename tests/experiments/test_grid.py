@@ -15,9 +15,6 @@ from kahanmaps.experiments.grid import Grid, RationalRange
 HUGE = 10**18
 
 
-# Ranges of a few values, their ends not always met.
-
-
 def texts(text: str) -> list[str]:
     return [str(value) for value in RationalRange.from_text(text)]
 
@@ -29,9 +26,6 @@ def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
         values.append(first)
         first += step
     return values
-
-
-# Ranges
 
 
 @pytest.mark.parametrize(
@@ -69,7 +63,7 @@ def test_a_range_is_exact(text, values):
         ("0..1 step 1e-5000", "more values than anybody can want"),
     ],
 )  # fmt: skip
-def test_a_wrong_range_is_told_in_a_sentence(text, words):
+def test_a_wrong_range_is_refused_in_a_sentence(text, words):
     with pytest.raises(InputError) as caught:
         RationalRange.from_text(text)
     assert words in str(caught.value)
@@ -86,9 +80,6 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
     found = RationalRange(first, last, step)
     assert len(found) == len(expected)
     assert [fraction(value) for value in found] == expected
-
-
-# Grids
 
 
 def combinations(axes: dict[str, list[int]], zips: list[list[str]]) -> list[dict[str, int]]:

@@ -44,9 +44,6 @@ TOP, LORENZ, RIVALS, WEIERSTRASS, NAHM = map(
 ZERO, LINE, OSCILLATOR = of_rhs("0", "0"), of_rhs("x^2"), of_rhs("y", "-x")
 
 
-# All of them
-
-
 @pytest.mark.parametrize("name", TASKS)
 @pytest.mark.parametrize("system", [ZERO, LINE, OSCILLATOR], ids=["zero", "line", "oscillator"])
 def test_degenerate_systems_have_results_too(name, system):
@@ -61,8 +58,6 @@ def test_the_whole_report_is_kept_if_asked_for():
     assert "report" not in short
     assert long == {**short, "report": json.loads(json.dumps(densities.find_densities(RIVALS).to_json()))}
 
-
-# Known answers
 
 GROWING = of_rhs("x")  # det(I - eps f') = 1 - eps vanishes identically at eps = 1
 QUADRATIC = {"growth": "quadratic", "dynamical_degree": "1", "power": 2, "status": "derived"}
@@ -123,9 +118,6 @@ def test_what_is_missing_has_a_reason(monkeypatch):
     assert "no closed form" in found["reason"]
 
 
-# Singularities, cycles, exponents
-
-
 def test_a_census_is_that_of_the_library():
     found = perform("cycles", WEIERSTRASS, prime=31, eps="1/10", report=True)
     census = cycle_census(WEIERSTRASS.system, "1/10", 31)
@@ -146,9 +138,6 @@ def test_exponents_are_those_of_the_library():
     assert found["sum"] == pytest.approx(-41 / 3, abs=0.05)
 
 
-# What cannot be done
-
-
 @pytest.mark.parametrize(
     ("name", "system", "asked", "words"),
     [
@@ -164,12 +153,9 @@ def test_exponents_are_those_of_the_library():
         ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found 1 steps after 0, expected at least 2"),
     ],
 )
-def test_what_cannot_be_done_is_told_in_a_sentence(name, system, asked, words):
+def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
     with pytest.raises(InputError, match=words):
         perform(name, system, **asked)
-
-
-# Batches
 
 
 @pytest.mark.slow

@@ -114,7 +114,7 @@ def test_an_option_makes_what_the_library_wants(name, canonical, made):
         ("symbolic", 1, "found 1, expected names of parameters in one text"),
     ],
 )
-def test_what_is_no_value_is_told_in_a_sentence(name, value, words):
+def test_an_invalid_value_is_refused_in_a_sentence(name, value, words):
     assert words in refused(name, value)
 
 

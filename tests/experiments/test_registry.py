@@ -84,7 +84,7 @@ def test_a_task_is_done_with_what_its_options_stand_for():
     assert {name: asked[name] for name in expected} == expected
 
 
-def test_an_unknown_task_is_told_with_the_known_ones_and_a_suggestion():
+def test_an_unknown_task_is_refused_with_the_known_ones_and_a_suggestion():
     with pytest.raises(InputError) as caught:
         task_kind("orbot")
     assert str(caught.value).startswith("there is no task 'orbot', expected one of ")
@@ -110,7 +110,7 @@ def test_tasks_of_ones_own_are_brought_in_by_the_environment(modules, monkeypatc
         (TASK.replace("seed", "sed"), "TypeError: task NAME: sed is not an option; did you mean seed"),
     ],
 )
-def test_a_module_that_cannot_be_imported_is_told_in_a_sentence(modules, monkeypatch, text, words):
+def test_a_module_that_cannot_be_imported_is_reported_in_a_sentence(modules, monkeypatch, text, words):
     if text is not None:
         named(modules, monkeypatch, own_one=text)
     monkeypatch.setenv(ENVIRONMENT, "own_one")

@@ -19,7 +19,7 @@ from kahanmaps.experiments.results.store import Merged, Planned, Store, StoreErr
 # Records
 
 
-def test_a_record_comes_back_as_it_was(store):
+def test_a_stored_record_is_read_back_unchanged(store):
     record = Record(
         task(1).key,
         Outcome.OK,

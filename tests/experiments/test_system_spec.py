@@ -61,7 +61,7 @@ def test_signs_pick_an_associated_system():
 # Files
 
 
-def test_every_system_of_the_catalogue_comes_back_equal():
+def test_every_system_of_the_catalogue_reads_back_equal():
     for name in names():
         assert again(load(name)) == load(name)
 

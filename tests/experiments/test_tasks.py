@@ -53,9 +53,6 @@ def normal_form(system: SystemFile) -> Any:
     return system_normal_form(system.system, system.hamiltonian, system.member)
 
 
-# Checks
-
-
 @pytest.mark.parametrize(
     ("name", "system", "asked", "call"),
     [
@@ -99,9 +96,6 @@ def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(na
     assert result.get("doubtful", []) == [json.loads(json.dumps(f.to_json())) for f in doubtful]
 
 
-# Orbits
-
-
 def last_of(system: SystemFile, field: Field, steps: int, start: Any = None) -> str:
     """The last point of an orbit, solved for step by step."""
     walk = Orbit(KahanMap(system.system, "1/10", field), start or start_of(system), steps, max_digits=None)
@@ -132,9 +126,6 @@ def test_a_start_is_drawn_from_the_seed_unless_given(name):
     assert perform(name, MEMBER, eps="1/10", start=point) == drawn
 
 
-# Heights and periods
-
-
 @pytest.mark.parametrize(("system", "steps", "growth"), [(MEMBER, 40, "quadratic"), (LORENZ, 9, "exponential")])
 def test_heights_are_those_of_the_library(system, steps, growth):
     found = height_growth(
@@ -152,9 +143,6 @@ def test_a_period_is_that_of_the_library(prime):
     assert result["period"] == (None if found.period is None else str(found.period))
     assert (result["status"], result["meets_pole"]) == (found.status, found.meets_pole)
     assert result["planes"] == [plane.text for plane in found.planes]
-
-
-# What cannot be done
 
 
 @pytest.mark.parametrize(
@@ -175,6 +163,6 @@ def test_a_period_is_that_of_the_library(prime):
         ("period", MEMBER, {"eps": "1/7", "prime": 7}, "the prime 7 divides the denominator of 1/7"),
     ],
 )
-def test_what_cannot_be_done_is_told_in_a_sentence(name, system, asked, words):
+def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
     with pytest.raises(InputError, match=words):
         perform(name, system, **asked)

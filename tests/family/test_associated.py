@@ -34,8 +34,6 @@ def chi_without(member: FamilyMember, factor: Factor) -> fmpq_poly:
     return prod(others, start=fmpq_poly([1]))
 
 
-# How many there are, and which.
-
 COUNTS = [  # chi, number of irreducible factors r, of rational associated systems 2^(r-1)
     ((t - 1) * (t - 2) * (t - 3), 4),
     (t * (t - 1) * (t - 2) * (t - 3), 8),
@@ -50,9 +48,6 @@ COUNTS = [  # chi, number of irreducible factors r, of rational associated syste
 def test_there_is_one_rational_associated_system_for_every_choice_of_signs_up_to_all(chi, count):
     systems = [g.system for g in random_member_with_chi(chi, 1).associated()]
     assert len(set(systems)) == len(systems) == count
-
-
-# over number fields
 
 
 @pytest.mark.parametrize(

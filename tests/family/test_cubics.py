@@ -36,9 +36,6 @@ def fulfils_the_condition(A, H) -> bool:
     )
 
 
-# Membership.
-
-
 @over_members
 def test_every_element_of_the_basis_fulfils_the_condition(member):
     assert all(fulfils_the_condition(member.A, H) for H in cubic_space(member.A).basis)
@@ -57,17 +54,11 @@ def test_a_cubic_outside_is_refused_with_the_entry_and_both_sides():
         require_member(DIAGONAL, x1 * x2**2)
 
 
-# Chains.
-
-
 @over_members
 def test_each_gradient_of_a_chain_is_a_times_the_one_before(member):
     hamiltonians = chain(member.A, member.H)
     for H, following in pairwise(hamiltonians):
         assert gradient(following) == linear_combinations(member.A, gradient(H))
-
-
-# Dimensions.
 
 
 def blocks(*jordan: tuple[int, int]) -> fmpq_mat:

@@ -63,7 +63,7 @@ SINGULAR = [  # member, point, factor of chi
 
 
 @pytest.mark.parametrize(("member", "x", "factor"), SINGULAR, ids=["m = 1", "first part", "second part"])
-def test_where_the_kahan_map_is_singular_the_planar_step_is_and_tells_the_factor(member, x, factor):
+def test_the_planar_step_is_singular_with_the_kahan_map_and_names_the_factor(member, x, factor):
     form = normal_form(member)
     with pytest.raises(SingularStep):
         KahanMap(member.chosen.system, 1).step(x)

@@ -53,9 +53,6 @@ def involutions(member: FamilyMember) -> set[str]:
     return {str(B) for g in member.associated() for B in (g.B, -g.B)}
 
 
-# A member that forgot its A.
-
-
 @over_generic
 def test_the_splitting_is_found_again(member):
     found = found_in(forgotten(member))
@@ -76,9 +73,6 @@ def test_a_symplectic_disguise_hides_nothing(eigenvalues, seed):
     inverse = S.inv().transpose()
     expected = {str(s * inverse * g.B * S.transpose()) for g in member.associated() for s in (1, -1)}
     assert involutions(found.member) == expected
-
-
-# Nothing to be found.
 
 
 @pytest.mark.parametrize(("n", "seed"), [(4, 0), (4, 1), (6, 2)])
@@ -107,9 +101,6 @@ def test_systems_of_another_kind_are_no_members(H, J, reason):
         structure_space(hamiltonian.H, hamiltonian.J)
 
 
-# All solutions.
-
-
 @pytest.mark.parametrize("n", [4, 6])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
@@ -134,9 +125,6 @@ def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
     assert len(structure_space(H, J)) == n * n - rank(QQ, fmpq_mat(rows))
 
 
-# Repeated roots, and cubics of fewer variables.
-
-
 @pytest.mark.parametrize("power", [2, 3])
 def test_nilpotent_structure_is_found_and_not_generic(power):
     member = random_member_with_chi((t - 5) ** power, 1)
@@ -145,9 +133,6 @@ def test_nilpotent_structure_is_found_and_not_generic(power):
     nilpotent = found.A - QQ.identity(2 * power)
     assert evaluate_at_matrix(t ** (power - 1), nilpotent) != nilpotent * 0 == evaluate_at_matrix(t**power, nilpotent)
     assert found.text == (f"H does not split: A, not scalar, with A Hess(H) = Hess(H) A^T has chi = (t - 1)^{power}")
-
-
-# What was found is checked.
 
 
 def test_a_member_of_another_system_is_refused():

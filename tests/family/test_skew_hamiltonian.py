@@ -25,9 +25,6 @@ def drawn(m: int, seed: int) -> fmpq_mat:
     return random_skew_hamiltonian(m, random.Random(seed))
 
 
-# Recognition.
-
-
 @given(seed=seeds, row=st.integers(0, 3), column=st.integers(0, 3), change=st.integers(-3, 3))
 def test_defects_are_found_exactly_where_the_definition_fails(seed, row, column, change):
     A = drawn(2, seed)
@@ -36,17 +33,12 @@ def test_defects_are_found_exactly_where_the_definition_fails(seed, row, column,
     assert (defects(A) == []) is (A.transpose() * J == J * A)
 
 
-# chi.
-
-
 @over_m
 @given(seed=seeds)
 def test_the_characteristic_polynomial_is_the_square_of_chi(m, seed):
     A = drawn(m, seed)
     assert (chi(A) ** 2, chi(A).degree()) == (A.charpoly(), m)
 
-
-# The order that signs refer to.
 
 ORDERS = [  # chi as a product in some order, the order of its factors
     ((t - 3) * (t + 2) * (t - fmpq(1, 2)), ["t + 2", "t - 1/2", "t - 3"]),  # linear ones by increasing root
@@ -61,9 +53,6 @@ ORDERS = [  # chi as a product in some order, the order of its factors
 @pytest.mark.parametrize(("polynomial", "expected"), ORDERS, ids=lambda value: str(value))
 def test_factors_come_in_the_order_of_the_signs(polynomial, expected):
     assert [str(factor) for factor in factors_of_chi(random_member_with_chi(polynomial, 1).A)] == expected
-
-
-# What chi means for A.
 
 
 DIAGNOSES = [
@@ -82,9 +71,6 @@ DIAGNOSES = [
 def test_the_diagnosis_says_how_chi_factors_and_what_that_means(A, sentence):
     words = diagnosis(A)
     assert [part in words for part in sentence.split(".*")] == [True] * (sentence.count(".*") + 1)
-
-
-# Symplectic matrices.
 
 
 @over_m

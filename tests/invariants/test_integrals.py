@@ -4,17 +4,15 @@ For f = J grad H with any cubic H and any constant skew J, "modified H" is H + (
 f. It is conserved, tends to H with a defect of order eps^2, and is -1/6 of the paper's H~ where that is defined.
 """
 
+import numpy as np
 import pytest
 from check_helpers import (
-    dot,
     exact,
     hamiltonian_of,
     hamiltonians,
     kahan_step,
     modified_value,
     rows_of,
-    times,
-    transposed,
 )
 from flint import fmpq, fmpq_poly
 from helpers import fraction, over_exact_fields, points, rationals
@@ -38,18 +36,12 @@ def with_points(draw, dims=(1, 2, 3), homogeneous=False, standard=False):
     return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
 
 
-# Modified H
-
-
 @given(with_points(), nonzero)
 def test_modified_h_is_what_its_formula_says(drawn, eps):
     hamiltonian, x = drawn
     expected = modified_value(hamiltonian, fraction(eps), exact(*x))
     assume(expected is not None)
     assert fraction(ModifiedHamiltonian(hamiltonian).value(QQ, eps, x)) == expected
-
-
-# The paper's H~
 
 
 @given(with_points(dims=(2, 4), homogeneous=True, standard=True), nonzero)
@@ -71,12 +63,9 @@ def test_an_integral_of_the_commutant_is_what_its_formula_says(power):
     assert image is not None
     matrix = rows_of(standard_structure(6))
     for _ in range(power):
-        matrix = times(matrix, transposed(rows_of(member.A)))
-    expected = dot(exact(*x), [dot(line, image) for line in matrix]) / fraction(eps)
+        matrix = matrix @ rows_of(member.A).T
+    expected = np.dot(exact(*x), matrix @ image) / fraction(eps)
     assert fraction(CommutantIntegral(member.chosen.hamiltonian, member.A, power).value(QQ, eps, x)) == expected
-
-
-# Fields and singular points
 
 
 @over_exact_fields

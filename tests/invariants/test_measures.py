@@ -4,12 +4,7 @@ det dPhi is computed a second time here, from dual numbers: the Kahan step is ta
 """
 
 import pytest
-from check_helpers import (
-    claim,
-    determinant,
-    exact,
-    kahan_jacobian,
-)
+from check_helpers import claim, determinant, exact, kahan_jacobian
 from helpers import fraction, rationals, systems_with_points
 from hypothesis import assume, given
 

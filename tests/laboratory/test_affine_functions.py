@@ -1,33 +1,20 @@
 """Affine integrals and affine Darboux functions: known ones, none too many, and what the Kahan map makes of them."""
 
-from pathlib import Path
-
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 from helpers import EULER_TOP, LORENZ, random_point, systems
 from hypothesis import given
 from hypothesis import strategies as st
 
-import kahanmaps
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations
-from kahanmaps.documents.files import read_system
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.preserve.darboux import affine_functions
-from kahanmaps.laboratory.preserve.darboux.affine_functions import (
-    affine_darboux,
-    affine_integrals,
-    under_map,
-)
+from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, affine_integrals, under_map
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
-
-CATALOG = Path(kahanmaps.__file__).parent / "documents" / "catalog"
-
-
-def catalogue(name: str) -> QuadraticSystem:
-    return read_system(CATALOG / f"{name}.toml").system
 
 
 def darboux(system: QuadraticSystem) -> dict[str, str]:
@@ -38,18 +25,18 @@ def darboux(system: QuadraticSystem) -> dict[str, str]:
 
 
 def test_known_hyperplanes() -> None:
-    assert darboux(catalogue("lotka_volterra")) == {"x": "-y + 1", "y": "x - 1"}
+    assert darboux(load("lotka_volterra").system) == {"x": "-y + 1", "y": "x - 1"}
     # (x1 + x3)' = x2 (x1 + x3), since the coefficients of x1' and x3' are equal.
     assert darboux(EULER_TOP) == {
         "x1 + x3": "x2",
         "x1 - x3": "-x2",
     }
     # H = y (3 x^2 - y^2)/3: the two other lines of the triangle have slopes of sqrt(3).
-    assert darboux(catalogue("nahm_tetrahedral")) == {"y": "-2*x"}
+    assert darboux(load("nahm_tetrahedral").system) == {"y": "-2*x"}
     assert darboux(QuadraticSystem.from_text(["x"], ["x^2 - 1"])) == {"x + 1": "x - 1", "x - 1": "x + 1"}
 
 
-@pytest.mark.parametrize("system", [LORENZ, catalogue("riccati")])
+@pytest.mark.parametrize("system", [LORENZ, load("riccati").system])
 def test_systems_without(system: QuadraticSystem) -> None:
     # Over Q: those of x' = x^2 + x - 1 lie over Q(sqrt(5)), those of the harmonic oscillator over Q(i).
     assert affine_integrals(system) == ()

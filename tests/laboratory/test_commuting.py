@@ -59,7 +59,7 @@ def commute_exactly(f, g, tries=3, seed=0):
 # petrera-suris-2016, Theorem 9: 2^m associated fields; where a block is left out the maps commute as well.
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
 @pytest.mark.parametrize("eigenvalues", [[1, -2], [2, 1, -1]])
-def test_the_theorem_of_the_paper_is_found_without_being_told(eigenvalues, shape):
+def test_the_associated_fields_of_the_paper_are_found_from_the_equations_alone(eigenvalues, shape):
     member = random_member_with_eigenvalues(eigenvalues, seed=7)
     found = commuting_systems(member.chosen.system, shape)
     m = len(eigenvalues)
@@ -81,7 +81,7 @@ def _identity(n):
     return fmpq_mat([[int(i == j) for i in range(n)] for j in range(n)])
 
 
-def test_where_chi_does_not_split_only_the_rational_ones_are_found_and_the_others_told():
+def test_where_chi_does_not_split_only_rational_fields_are_found_and_the_others_reported():
     found = commuting_systems(load("paper_m3_irreducible", {}).system)
     assert (found.dimension, [g.trivial for g in found.solutions], found.complete) == (3, TRIVIAL, True)
     assert found.irrational
@@ -176,7 +176,7 @@ def test_no_budget_is_undecided_and_never_complete():
     assert [g.trivial for g in found.solutions[:3]] == TRIVIAL
 
 
-def test_curved_families_are_told_as_equations():
+def test_curved_families_are_reported_as_equations():
     """x' = x^2, y' = x y: the solutions fill a quadric cone, of which only some planes are linear families."""
     f = system("x y", "x^2", "x*y")
     found = commuting_systems(f, "quadratic")

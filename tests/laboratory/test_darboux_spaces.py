@@ -11,11 +11,7 @@ from kahanmaps.algebra.modular_matrices import combine, rank
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to, monomial_values
-from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
-    DarbouxSpace,
-    darboux_spaces,
-    gradient_rank,
-)
+from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, darboux_spaces, gradient_rank
 
 SMALL = 101
 

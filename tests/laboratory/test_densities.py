@@ -84,7 +84,7 @@ def test_maps_that_are_not_invertible_have_no_density():
     assert "no value anywhere" in find_densities(system("x y", "x", "3*y"), eps=1).reason
 
 
-def test_the_check_by_definition_tells_a_wrong_density():
+def test_the_check_by_definition_refutes_a_wrong_density():
     assert not holds_exactly(load("lotka_volterra"), "x*y + x", "1/10")
 
 

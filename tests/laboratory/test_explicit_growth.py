@@ -1,20 +1,13 @@
 """Growth of maps that are given by formulas: exceptional hypersurfaces by the affine Jacobian, and published rates."""
 
 import pytest
+from degree_helpers import by_formulas
 
-from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import written
 from kahanmaps.laboratory.singular.singularities import singularities
-from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.projective import homogeneous_map
-
-
-def by_formulas(variables: str, image: str):
-    names = variables.split(",")
-    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image.split(";")])
-
 
 DIMENSION_5 = "b; c; d; e; 3/(b*c*d*e) - a - b - c - d - e"
 

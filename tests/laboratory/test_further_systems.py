@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 from analysis_helpers import Answer, differences, residues_of, verdict_of
 from check_helpers import (
-    combined_rows,
     determinant,
     function_value,
     kahan_jacobian,
@@ -101,7 +100,7 @@ def value_at(text, name, x, eps):
     if text == MODIFIED:
         return modified_value(file_of(name).hamiltonian, eps, x)
     if text == DETERMINANT:
-        return determinant(combined_rows(unit(len(x)), -eps, slope(file_of(name).system, x)))
+        return determinant(unit(len(x)) - eps * slope(file_of(name).system, x))
     return function_value(parsed(name, text), x, eps)
 
 
@@ -120,9 +119,6 @@ def orbits(file, starts=4, steps=2):
 
 def slow_unless(names, fast):
     return [name if name in fast else pytest.param(name, marks=pytest.mark.slow) for name in names]
-
-
-# The answers themselves
 
 
 @pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if KNOWN[name]["dim"] <= 2]))
@@ -153,9 +149,6 @@ def test_the_answers_count_their_independent_integrals(name):
     assert rank + (MODIFIED in known["integrals"]) == known["independent_integrals"] <= known["dim"]
 
 
-# Blind
-
-
 @pytest.mark.parametrize("name", slow_unless([name for name in FURTHER if name not in BOUNDED], FAST))
 def test_the_analysis_gives_the_answer(name):
     found = analysed(name)
@@ -170,9 +163,6 @@ def test_the_analysis_of_degenerate_systems_gives_the_answer(name):
     growth = KNOWN[name]["growth"]
     assert found.conclusion.kind == ("linear" if affine else verdict_of(growth))
     assert found.skipped == []
-
-
-# What holds at one eps only
 
 
 SPECIAL = [(name, eps) for name, known in DEGENERATE.items() for eps in known["at_special_eps"]]
@@ -194,9 +184,6 @@ def test_special_eps(name, eps):
     assert defect in found.integrals.reason
     if special["defect"] == "no value":
         assert found.conclusion.kind == "singular"
-
-
-# Wrong answers are seen to be wrong
 
 
 @pytest.mark.parametrize("name", ["ishii", "zander_11m1_lines"])

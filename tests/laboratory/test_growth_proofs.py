@@ -4,9 +4,9 @@ import random
 from dataclasses import replace
 
 import pytest
+from degree_helpers import by_formulas
 from flint import fmpq, fmpz_mat, fmpz_poly
 
-from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import degrees, proofs
@@ -14,15 +14,9 @@ from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.proofs import exponent_matrix, linear_iterate, monomial_growth, spectral_radius
 from kahanmaps.laboratory.singular.singularities import Patterns
 from kahanmaps.maps.composed import composed_map
-from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 OPEN = Patterns((), None, False, "not looked at")
-
-
-def by_formulas(variables: str, image: str):
-    names = variables.split(",")
-    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image.split(";")])
 
 
 @pytest.mark.parametrize(

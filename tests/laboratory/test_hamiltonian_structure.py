@@ -1,28 +1,20 @@
 """Constant Hamiltonian structures: those of the catalogue, of random systems, and none where there is none."""
 
-from pathlib import Path
-
 import pytest
 from flint import fmpq, fmpq_mat
 from helpers import LORENZ, random_point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import kahanmaps
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
-from kahanmaps.documents.files import read_system
+from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.phase_functions import DeterminantDensity, ModifiedHamiltonian
-from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (
-    ConstantStructures,
-    constant_structures,
-)
+from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import ConstantStructures, constant_structures
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-
-CATALOG = Path(kahanmaps.__file__).parent / "documents" / "catalog"
 
 
 def checked(system: QuadraticSystem) -> ConstantStructures:
@@ -60,7 +52,7 @@ def conserved(found: ConstantStructures, seed: int = 1) -> bool:
 
 @pytest.mark.parametrize("name", ["henon_heiles", "planar_cubic_hamiltonian", "paper_m2"])
 def test_the_hamiltonian_systems_of_the_catalogue(name: str) -> None:
-    file = read_system(CATALOG / f"{name}.toml")
+    file = load(name)
     known = file.hamiltonian
     assert known is not None
     found = checked(file.system)
@@ -74,7 +66,7 @@ def test_the_hamiltonian_systems_of_the_catalogue(name: str) -> None:
 
 def test_degenerate_structures() -> None:
     for name in ("dressing_chain_3", "volterra_periodic_3"):
-        found = checked(read_system(CATALOG / f"{name}.toml").system)
+        found = checked(load(name).system)
         assert [str(casimir) for casimir in found.casimirs] == ["x1 + x2 + x3"]
         assert conserved(found)
     assert found.hamiltonian is not None
@@ -86,7 +78,7 @@ def test_degenerate_structures() -> None:
     ("system", "proved", "words"),
     [
         (LORENZ, True, "no affine integral"),
-        (read_system(CATALOG / "volterra_periodic_4.toml").system, True, "impossible for a skew"),
+        (load("volterra_periodic_4").system, True, "impossible for a skew"),
         # The dimension is odd, and of the two integrals every combination might span the kernel.
         (QuadraticSystem.from_text(["x", "y", "z", "s", "t"], ["x^2 + y", "y^2", "x*y", "0", "0"]), False, ""),
     ],

@@ -8,11 +8,7 @@ from search_helpers import system
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.preserve.hirota_kimura import (
-    hirota_kimura_basis,
-    orbit_profile,
-    relations_on_orbit,
-)
+from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis, orbit_profile, relations_on_orbit
 
 # Sets of more than 300 functions are measured by the tests of the catalogue.
 RELATIONS = [

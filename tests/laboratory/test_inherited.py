@@ -84,7 +84,7 @@ def test_what_a_theorem_gives_is_written_out_where_relations_show_nothing(eps):
 
 
 @pytest.mark.parametrize(("file", "products"), [(lotka_volterra(6, 3), 1)])
-def test_no_search_tells_of_fewer_integrals_than_theorems_give(file, products):
+def test_no_search_reports_fewer_integrals_than_theorems_give(file, products):
     """Relations of degree 1 show the affine integrals only; products of invariant hyperplanes are found beside them."""
     found = find_integrals(file, max_degree=1)
     assert found.codimension == found.by_theorems + products > found.profile.codimension

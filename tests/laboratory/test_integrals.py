@@ -53,7 +53,7 @@ def test_formulas_are_constant_along_exact_orbits(name):
         assert len(set().union(*values)) >= 3  # and not constants
 
 
-def test_the_exact_orbits_tell_a_wrong_formula():
+def test_exact_orbits_refute_a_wrong_formula():
     assert max(len(each) for each in values_on_orbits(load("euler_top"), "x1^2 + x2^2", EPS)) > 3
 
 

@@ -32,12 +32,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     Written,
     outcome_of,
 )
-from kahanmaps.laboratory.singular.singularities import (
-    Patterns,
-    _patterns,
-    patterns_of,
-    singularities,
-)
+from kahanmaps.laboratory.singular.singularities import Patterns, _patterns, patterns_of, singularities
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -184,7 +179,7 @@ def test_the_parts_of_a_report_do_not_contradict_each_other(given, kind, growth)
     assert found.degrees.patterns == patterns_of(found.singularities)
     lines = [line for _, section in found.sections for line in section]
     last = max(h.confined_at or 0 for run in found.singularities for h in run.hypersurfaces)
-    assert f"the last confinement comes after {last} steps" in [line.text for line in lines]
+    assert f"the longest confined pattern has {last} steps" in [line.text for line in lines]
     assert last < len(found.degrees.degrees) - 1
 
 
@@ -213,7 +208,7 @@ def beside(kind, growth, lengths=None, heights=(21, 5)):
     return doubt_of_heights(SimpleNamespace(heights=SimpleNamespace(kind=kind, orbits=orbits), degrees=degrees))
 
 
-def test_heights_and_degrees_that_do_not_go_together_are_told():
+def test_heights_and_degrees_that_disagree_are_reported():
     exponential, quadratic = Growth.EXPONENTIAL, Growth.QUADRATIC
     assert beside(exponential, Growth.LINEAR) == "the degrees grow linearly"
     assert beside(exponential, Growth.QUADRATIC) == "the degrees grow polynomially"

@@ -58,7 +58,7 @@ def test_integrals_of_the_map_tend_to_integrals_of_the_flow(name, leading, kept)
 
 
 @pytest.mark.parametrize("name", ["euler_top", "weierstrass"])
-def test_the_combination_has_the_series_that_is_told(name):
+def test_the_combination_has_the_reported_series(name):
     """combination - leading - eps^k second, by rational functions, is of a higher order in eps than k."""
     search = integrals_of(name)
     names = [*search.file.variables, "eps"]

@@ -71,7 +71,7 @@ def test_an_orbit_that_closes_has_each_of_its_points_once():
     assert len(modular(load("lorenz")).orbit(20)) == 20
 
 
-def test_a_map_without_values_is_told():
+def test_a_map_defined_nowhere_is_reported():
     singular = modular(system("x y", "x", "3*y"), eps=1)
     for look in (lambda: list(singular.pairs(1)), lambda: singular.orbit(3)):
         with pytest.raises(NoPoint, match="no value at random points"):

@@ -229,5 +229,5 @@ def test_what_cannot_be_scanned_is_refused(change, message, monkeypatch):
         (("y", "x^2 + (a - 1)*(a - 4)*y"), "a", (("-a + 5",),)),
     ],
 )
-def test_changes_of_parameters_are_told_where_they_permute_slow_members(rhs, names, symmetric):
+def test_symmetries_of_parameter_space_are_found_where_they_permute_special_members(rhs, names, symmetric):
     assert scan(planar(*rhs, *names), [*names], primes=(17, 19, 23), terms=4).symmetric == symmetric

@@ -55,7 +55,7 @@ def test_what_a_killed_process_did_not_do_is_done_here():
     assert found.skipped == []
 
 
-def test_a_step_that_gives_up_elsewhere_is_reported_and_a_bug_is_not_swallowed():
+def test_a_failed_step_of_the_second_process_is_reported_and_a_mistake_is_raised():
     def gives_up(*_, **__):
         raise InputError("too hard")
 

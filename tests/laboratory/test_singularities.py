@@ -13,10 +13,7 @@ from kahanmaps.algebra.work import Budget, counted
 from kahanmaps.documents.catalog import load
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.singular import outcomes
-from kahanmaps.laboratory.singular.jets import (
-    image_of,
-    images_of_curve,
-)
+from kahanmaps.laboratory.singular.jets import image_of, images_of_curve
 from kahanmaps.laboratory.singular.outcomes import BUDGET_SPENT, NOT_CONFINED, critical_points
 from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 from kahanmaps.maps.kahan import KahanMap

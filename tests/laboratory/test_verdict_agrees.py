@@ -19,6 +19,7 @@ SYSTEMS: list[tuple[str, dict[str, Any]]] = [
     ("riccati", {}),
     ("harmonic", {}),
     ("euler_top", {"symbols": ["a1"]}),
+    ("x' = 0; y' = 0", {}),
     ("x' = 0; y' = 0; z' = 0", {}),
 ]
 

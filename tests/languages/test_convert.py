@@ -159,7 +159,7 @@ def test_the_example_gives_eps_to_maps_that_have_one():
         ("_", "v", "v"),
     ],
 )
-def test_a_name_that_may_mean_something_else_is_replaced_and_told(name, expected, in_mathematica):
+def test_a_reserved_name_is_replaced_and_reported(name, expected, in_mathematica):
     file = km.SystemFile.from_system(km.QuadraticSystem.from_text([name], [f"3*{name}"]))
     for language in LANGUAGES[1:]:
         shown = in_mathematica if language == "mathematica" else expected

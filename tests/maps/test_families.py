@@ -65,7 +65,7 @@ def test_special_members_have_smaller_degrees():
 
 
 @pytest.mark.parametrize("kernel", ["numba", "numpy"])
-def test_an_iterate_that_exists_nowhere_is_told(kernel):
+def test_an_iterate_defined_nowhere_is_reported(kernel):
     if kernel == "numba":
         pytest.importorskip("numba")
     vanishing = 'variables = ["x"]\nparameters.a = 1\n[bilinear]\nequations = ["a*(X - x) = eps*a*x*X"]'

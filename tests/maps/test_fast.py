@@ -31,9 +31,6 @@ def last(orbit: FloatOrbit) -> np.ndarray:
     return x
 
 
-# From exact numbers to machine numbers.
-
-
 @given(a=st.integers(-(10**30), 10**30), b=st.integers(1, 10**30))
 def test_a_number_is_rounded_to_the_nearest_double(a, b):
     found = to_float(fmpq(a, b))
@@ -46,9 +43,6 @@ def exact(number: float) -> fmpq:
     return fmpq(*number.as_integer_ratio())
 
 
-# Orbits.
-
-
 def test_the_method_has_order_two():
     # The oscillator from (1, 0) after time 1, against (cos 1, -sin 1). The errors, above 1e-7, are far from rounding.
     errors = []
@@ -59,9 +53,6 @@ def test_the_method_has_order_two():
     slopes = [log2(a / b) for a, b in pairwise(errors)]
     assert len(slopes) >= 3
     assert max(abs(slope - 2) for slope in slopes) < 0.01  # the next term of the error is of order 4: h^2 <= 2^-8
-
-
-# On disk.
 
 
 START = ["1", "1/2", "1/3"]

@@ -57,9 +57,6 @@ def mapped(field, system, point, eps=3):
         assume(False)
 
 
-# The forms of the map.
-
-
 @given(x=st.tuples(rationals(), rationals(), rationals()), eps=steps)
 def test_the_euler_top_obeys_the_equations_of_hirota_and_kimura(x, eps):
     # x1~ - x1 = eps a1 (x2~ x3 + x2 x3~) and cyclic, here with a = (1, -2, 1)
@@ -92,9 +89,6 @@ def test_the_image_is_the_one_computed_in_fractions(pair, eps):
     assert (None if image is None else tuple(map(fraction, image))) == expected
 
 
-# The inverse.
-
-
 @over_all_fields
 @some
 @given(pair=systems_with_points(entries=integers))
@@ -107,18 +101,12 @@ def test_the_step_with_minus_eps_leads_back(field, pair):
     assert agree(field, back, x)
 
 
-# The Jacobi matrix.
-
-
 @given(pair=systems_with_points(), eps=steps)
 def test_the_jacobi_determinant_is_the_quotient_of_the_two_denominators(pair, eps):
     system, x = pair
     phi = KahanMap(system, eps)
     assume(phi.determinant(x) != 0)
     assert det(phi.jacobian(x)) * phi.determinant(x) == phi.inverse.determinant(phi.step(x))
-
-
-# Symmetries and what is kept.
 
 
 @given(
@@ -149,9 +137,6 @@ def test_affine_changes_of_variables_commute_with_the_map(pair, data, eps):
     assert KahanMap(changed, eps).step(change(x)) == change(y)
 
 
-# From Q to GF(p) and to balls.
-
-
 @pytest.mark.parametrize("prime", [23, 31, 2**61 - 1, SMALLEST_LARGE_PRIME])  # denominators are at most 20
 @some
 @given(pair=systems_with_points(), eps=steps)
@@ -178,9 +163,6 @@ def test_the_image_over_balls_encloses_the_exact_image(bits, pair, eps):
     assert all(encloses(ball, number) for ball, number in zip(balls, exact, strict=True))
 
 
-# Singular points.
-
-
 @over_exact_fields
 @some
 @given(pair=systems_with_points(entries=st.integers(-2, 2)))
@@ -189,9 +171,6 @@ def test_the_map_has_no_value_exactly_where_its_determinant_vanishes(field, pair
     system, x = pair
     phi = KahanMap(system, 1, field)
     assert (step_or_none(phi, x) is None) is (phi.determinant(x) == 0)
-
-
-# The door.
 
 
 @together("field, eps", product(FIELDS, [0, "0", "0.0", fmpq(0), Fraction(0), fmpz(0)]))

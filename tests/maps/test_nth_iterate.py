@@ -45,9 +45,6 @@ def reached(found, start, n):
         return None
 
 
-# Over prime fields.
-
-
 @pytest.mark.parametrize("prime", quick([3, 5, 7, 11, 101, 10007, 2**61 - 1, 2**89 - 1], [3, 11, 2**61 - 1]))
 @over_members
 def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
@@ -69,9 +66,6 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
                 assert image is None or prime < 5
 
 
-# Over Q.
-
-
 @over_members
 def test_over_q_it_is_the_point_of_the_orbit(name):
     normal_form, system = structure_and_system(name)
@@ -80,9 +74,6 @@ def test_over_q_it_is_the_point_of_the_orbit(name):
     found = NthIterate(normal_form, "1/10", QQ)
     for n in (0, 1, 7, 16, 17, 24, 25, 27):
         assert coordinates(found.value(start, n)) == points[n]
-
-
-# Singular orbits.
 
 
 def poles():
@@ -107,9 +98,6 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
         assert coordinates(found.value(start, n)) == points[n]
 
 
-# Balls.
-
-
 @over_members
 def test_balls_enclose_the_exact_iterate(name):
     normal_form, system = structure_and_system(name)
@@ -127,12 +115,6 @@ def test_balls_enclose_the_exact_iterate(name):
         assert all(ball.rad() < arb(2) ** -100 for ball in balls)
 
 
-# What is refused.
-
-
-# That the tests can fail.
-
-
 def test_a_wrong_doubling_is_noticed(monkeypatch):
     # Every iterate over Q is compared with the orbit modulo a random prime.
     normal_form, _ = structure_and_system("m = 2")
@@ -140,9 +122,6 @@ def test_a_wrong_doubling_is_noticed(monkeypatch):
     monkeypatch.setattr(tau, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
         NthIterate(normal_form, "1/10", QQ).value([1, 2, 3, "1/4"], 300)
-
-
-# A rational plane beside one over Q(i).
 
 
 @together("name", STARTS)

@@ -44,9 +44,6 @@ def ended(orbit: Orbit) -> OrbitEnd:
     return orbit.end
 
 
-# The points.
-
-
 @over_named_systems
 def test_each_point_is_the_image_of_the_one_before(system):
     phi = KahanMap(system, "1/10")
@@ -63,9 +60,6 @@ def test_backward_undoes_forward(pair):
     back = list(Orbit(phi, there[-1].x, 3, backward=True))
     assume(len(back) == 4)
     assert [point.x for point in back] == [point.x for point in reversed(there)]
-
-
-# A point of an orbit.
 
 
 def test_the_text_of_a_rational_point_is_in_lowest_terms_and_of_any_length():
@@ -88,8 +82,6 @@ def test_an_orbit_that_meets_the_singular_set_ends_there(start, last):
     assert points[-1] == (1,)
     assert len(points) == last + 1
 
-
-# Periodic.
 
 # q'' = -w^2 q + Q(q) with Q homogeneous of degree 2 and eps^2 w^2 = 1: there Phi^4 is the identity.
 FOUR_CYCLES = [
@@ -115,9 +107,6 @@ def test_over_a_prime_field_the_period_is_the_first_return(prime, start):
     assert ended(Orbit(phi, start, prime**2)).period == period
 
 
-# Budget.
-
-
 def test_an_orbit_ends_before_its_numbers_exceed_the_budget():
     orbit = henon_heiles(steps=50, max_digits=500)
     digits = [point.digits for point in orbit]
@@ -126,9 +115,6 @@ def test_an_orbit_ends_before_its_numbers_exceed_the_budget():
     assert max(digits) <= 500
     beyond = list(henon_heiles(steps=len(digits)))[-1]
     assert beyond.digits > 500
-
-
-# Interrupted.
 
 
 @over_all_fields
@@ -141,9 +127,6 @@ def test_an_interrupted_orbit_ends_after_the_point_in_hand(field):
             orbit.interrupt()
     assert delivered == [0, 1, 2]
     assert (orbit.end.status, orbit.end.steps, orbit.end.message) == ("interrupted", 2, "interrupted after step 2")
-
-
-# In normal form.
 
 
 def both(system, normal_form, eps, start, steps, field=QQ, **options):
@@ -196,9 +179,6 @@ def test_balls_with_a_structure_enclose_the_orbit_and_stay_narrow(name, backward
     assert min(ball.rel_accuracy_bits() for x in balls[1:] for ball in x) > bits / 2
     for point in Orbit(KahanMap(system, "1/10"), start, 30, backward=backward, max_digits=2000):
         assert all(encloses(ball, number) for ball, number in zip(balls[point.step], point.x, strict=True))
-
-
-# Iterates reached directly.
 
 
 @pytest.mark.parametrize("field", [QQ, GF(2**89 - 1)], ids=repr)

@@ -18,13 +18,7 @@ from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.division import PeriodicLevels
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic
-from kahanmaps.maps.normal_form.periods import (
-    PeriodKind,
-    period_of,
-    plane_period,
-    plane_period_over_rationals,
-    poles,
-)
+from kahanmaps.maps.normal_form.periods import PeriodKind, period_of, plane_period, plane_period_over_rationals, poles
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.normal_form.schoof import trace_modulo
 from kahanmaps.maps.orbits.iteration import Orbit
@@ -83,9 +77,6 @@ def assert_order_on_the_cubic(block, point, order, at_infinity):
             assert not cubic.is_zero(cubic.multiple(order // int(prime), T))
 
 
-# Large fields.
-
-
 @pytest.mark.parametrize("prime", [2**31 - 1, 2**40 - 87, 2**61 - 1, pytest.param(2**89 - 1, marks=pytest.mark.slow)])
 def test_in_a_large_prime_field_n_T_is_zero_and_no_smaller_multiple_is(prime):
     field, rng = Finite(prime), random.Random(3)
@@ -116,9 +107,6 @@ def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happe
     assert answers[True, False] == 0
 
 
-# The parts.
-
-
 @pytest.mark.parametrize(("prime", "degree"), [(1009, 1), (1000003, 1), (37, 2), (11, 3)])
 def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(prime, degree):
     field, rng = Finite(prime, degree), random.Random(prime)
@@ -133,9 +121,6 @@ def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(p
         curve.a2, curve.a4 = a2, a4
         assert curve.multiple(points, (x, (((x + a2) * x + a4) * x + a6).sqrt())) is None
         assert abs(points - field.q - 1) <= 2 * field.q**0.5
-
-
-# Members.
 
 
 @pytest.mark.parametrize(
@@ -161,9 +146,6 @@ def test_the_period_of_a_member_is_that_of_its_kahan_map_where_that_meets_no_pol
     assert period_of(normal_form, "1/10", [1, 2, 3, 4]).status == "aperiodic"
 
 
-# Over the rationals.
-
-
 # h, and a point (u, v) of one of the few levels that have a period over Q.
 PERIODIC_OVER_Q = [
     ((0, 2, -1, 2), ("-1/3", "-1/3"), 5),
@@ -174,7 +156,7 @@ PERIODIC_OVER_Q = [
 
 
 @pytest.mark.parametrize(("h", "start", "period"), PERIODIC_OVER_Q)
-def test_a_rational_orbit_of_period_5_or_6_comes_back(h, start, period):
+def test_a_rational_orbit_of_period_5_or_6_closes(h, start, period):
     block = PlanarBlock(*(fmpq(c) for c in h))
     u, v = (QQ.convert(value) for value in start)
     found = plane_period_over_rationals(block, (u, v, fmpq(1)))
@@ -202,9 +184,6 @@ def test_a_period_of_a_plane_over_q_is_what_walking_shows(name):
             assert (found.status, found.period, found.meets_pole) == ("periodic", step, met)
             return
     assert found.status in ("aperiodic", "undefined") or (met and found.meets_pole)
-
-
-# Levels with a period: division polynomials.
 
 
 RATIONAL = {5: fmpq(32, 27), 6: fmpq(28, 27), 9: fmpq(8, 9), 12: fmpq(80, 81)}

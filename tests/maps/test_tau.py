@@ -34,16 +34,10 @@ def stepped(block, count):
     return [reduced(triple) for triple in islice(block.triples(), count)]
 
 
-# The points.
-
-
 @over_starts
 def test_the_points_are_those_of_plain_gcds(cubic, start):
     block = integer_block(cubic, start)
     assert walked(block, 25) == by_gcds(block, 25)
-
-
-# The n-th point.
 
 
 @over_smooth
@@ -72,9 +66,6 @@ def test_a_pole_is_passed_over(steps):
         assert reduced(image(cubic, found[n])) == found[n + 1]
 
 
-# Budgets.
-
-
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize("n", [127, 180])
 def test_no_number_is_longer_than_the_result(name, n, monkeypatch):
@@ -90,9 +81,6 @@ def test_no_number_is_longer_than_the_result(name, n, monkeypatch):
     # A tenth, for bad primes and the three points around the base.
     assert max(lengths) < 1.1 * max(entry.bit_length() for entry in found)
     assert len(lengths) < 20 * n.bit_length()
-
-
-# That the tests can fail.
 
 
 @pytest.mark.parametrize("change", [1, -1])

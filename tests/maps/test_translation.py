@@ -57,9 +57,6 @@ over_finite = pytest.mark.parametrize(("field", "amount"), quick(FINITE, FINITE[
 NUMBERS = (0, 1, 2, 3, 7, 8, 11, 12, 15, 16, 17, 18, 19, 20, 23, 24, 25, 31, 32, 33, 47, 48, 49, 63)
 
 
-# The point that steps lead to.
-
-
 @over_finite
 def test_over_a_finite_field_it_is_the_point_that_steps_lead_to(field, amount):
     compared = 0
@@ -71,9 +68,6 @@ def test_over_a_finite_field_it_is_the_point_that_steps_lead_to(field, amount):
                 assert same_point(image, points[n])
                 compared += 1
     assert compared > amount
-
-
-# Poles and large n.
 
 
 def smooth(field, seed, amount):

@@ -153,7 +153,7 @@ def test_every_control_is_refuted_at_a_witness(name):
     assert report.verdict is PROVED
 
 
-def test_a_claim_that_no_control_refutes_is_told(monkeypatch):
+def test_a_claim_that_no_control_refutes_is_reported(monkeypatch):
     # The control "eps" without its effect: the claim that only it refutes is no check any more.
     monkeypatch.setitem(CONTROLS, "eps", replace(CONTROLS["eps"], function=lambda o: o.changed()))
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(6,), controls=True))

@@ -10,16 +10,7 @@ import pytest
 from helpers import together
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.figures import (
-    FORMATS,
-    drawing,
-    format_of,
-    label_of,
-    new_figure,
-    picture_bytes,
-    points,
-    svg_text,
-)
+from kahanmaps.plots.figures import FORMATS, drawing, format_of, label_of, new_figure, picture_bytes, points, svg_text
 from kahanmaps.plots.style import Style
 
 STYLE = Style(width=4)

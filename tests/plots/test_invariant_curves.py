@@ -160,7 +160,7 @@ def test_wrong_sizes_are_refused(starts, steps, message):
         find_invariant_curves(load("paper_m2"), starts, "1/20", steps)
 
 
-def test_a_system_without_normal_form_is_told_why():
+def test_a_system_without_normal_form_is_refused_with_the_reason():
     repeated = SystemFile.from_member(random_member_with_eigenvalues([1, 1], seed=7))
     for file, reason in (
         (load("euler_top"), "x' is not J grad H"),

@@ -74,7 +74,7 @@ def test_a_gap_too_small_for_machine_numbers_is_a_gap():
     assert 0 < found.gap < 1e-29
 
 
-def test_a_singular_point_is_told_and_only_what_is_there_is_compared():
+def test_a_singular_point_is_reported_and_only_existing_corners_are_compared():
     # x~ = x/(1 - 2 eps x) has a pole at x = 5 for eps = 1/10; from 5/3 it is met at the third step
     pair = plane_pair(["x^2", "0"], ["0", "y^2"])
     found = squares(pair, [5, 2], "1/10")

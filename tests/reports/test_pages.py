@@ -10,6 +10,7 @@ import pytest
 from fontTools.pens.boundsPen import BoundsPen
 from fontTools.ttLib import TTFont
 from page_helpers import Page, letters_of_formulas, letters_of_the_font, require_sound
+from search_helpers import analysis_of
 
 import kahanmaps as km
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
@@ -25,15 +26,15 @@ from kahanmaps.reports.report import formulas_of, report_html, write_report
 EVIL = "<script>alert(1)</script>"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def volterra():
-    return km.analyze(km.load("lotka_volterra"))
+    return analysis_of("lotka_volterra")
 
 
 @pytest.fixture(scope="module")
-def drawn(volterra):
+def drawn():
     """The page with its pictures."""
-    return report_html(volterra, command="kahanmaps report lotka_volterra")
+    return report_html(analysis_of("lotka_volterra"), command="kahanmaps report lotka_volterra")
 
 
 @pytest.fixture(scope="module")
@@ -186,7 +187,7 @@ def test_a_refuted_claim_stands_open_and_a_control_does_not():
     assert 'open="open"' not in html
 
 
-def test_a_claim_is_whole_on_a_page_and_what_is_too_long_is_told():
+def test_a_page_shows_whole_claims_and_the_length_of_what_is_cut():
     numbers = tuple(f"{k}{'7' * 300}" for k in range(1, 13))
     witness = Witness(numbers, numbers[0], numbers, numbers, "left", "right", vectors=dict.fromkeys("abcdef", numbers))
     also = tuple(Evidence("exact", f"a further reason, number {k}") for k in range(9))
@@ -201,7 +202,7 @@ def test_a_claim_is_whole_on_a_page_and_what_is_too_long_is_told():
     assert "(7000 characters)" in page.text
 
 
-def test_a_second_system_its_eps_and_an_orbit_cut_short_are_told():
+def test_a_page_names_the_second_system_its_eps_and_an_orbit_that_ended_early():
     top = km.load("euler_top")
     page = require_sound(report_html(km.check_commute(top, top, km.Settings(eps="1/10"), eps2="1/7"), pictures=False))
     assert "euler_top, euler_top, eps = 1/10 (time step 2 eps = 1/5), second map at eps2 = 1/7" in page.text

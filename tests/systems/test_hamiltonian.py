@@ -25,9 +25,6 @@ def cubics(names, degrees=(1, 2, 3)):
     return drawn.map(lambda c: ring(names).from_dict({m: a for m, a in zip(exponents, c, strict=True) if a != 0}))
 
 
-# The point about which a cubic is homogeneous.
-
-
 @given(cubics(FOUR, (3,)), st.lists(rationals(6), min_size=4, max_size=4))
 def test_a_homogeneous_cubic_is_found_about_the_point_it_was_moved_to(H, point):
     moved = CubicHamiltonian(H, standard_structure(4)).about([-c for c in point])
@@ -46,17 +43,11 @@ def test_the_centre_is_the_origin_where_it_can_be(H, centre):
     assert CubicHamiltonian(H, standard_structure(2)).centre == centre
 
 
-# The equations.
-
-
 @given(H=cubics(FOUR))
 def test_with_the_standard_structure_the_equations_are_the_canonical_ones(H):
     f = CubicHamiltonian(H, standard_structure(4)).system.rhs
     dq1, dq2, dp1, dp2 = gradient(H)
     assert f == (dp1, dp2, -dq1, -dq2)
-
-
-# What is refused.
 
 
 @pytest.mark.parametrize(

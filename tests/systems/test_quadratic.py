@@ -39,7 +39,7 @@ def test_the_coefficients_are_the_ones_read_off_by_hand():
 
 
 @given(system=systems())
-def test_a_system_comes_back_from_its_text(system):
+def test_a_printed_system_parses_back(system):
     texts = [line.split(" = ")[1] for line in str(system).splitlines()]
     assert QuadraticSystem.from_text(system.variables, texts) == system
 
