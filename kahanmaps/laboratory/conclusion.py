@@ -1,7 +1,7 @@
-"""The verdict on a map: what all that was found says of its integrability, and what this rests on.
+"""The verdict on a map: what the results say about its integrability, and on which evidence.
 
-Degrees, singularities, integrals and heights are found independently of each other, and each within limits of its own.
-What is proved stands. Where two measurements exclude each other, neither is a finding.
+Degrees, singularities, integrals and heights are computed independently of each other, each within limits of its own.
+Proved results stand. Where two measurements contradict each other, the verdict relies on neither.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class _Verdict(NamedTuple):
 
 
 class _Facts:
-    """What was result, and the phrases that several verdicts have in common."""
+    """The results, and phrases that several verdicts share."""
 
     def __init__(self, result: AnalysisResult) -> None:
         degrees = result.degrees
@@ -62,7 +62,7 @@ class _Facts:
         self.grown = degrees.known if degrees is not None else Certainty.MEASURED
         self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
-        # How many integrals there are; where that is a lower bound, the sentence says so.
+        # The number of integrals, or a lower bound.
         where = f" in dimension {result.dim}"
         number = counted(self.count, "independent integral") if self.count else "no integral"
         self.integrals = number + where if result.count_is_exact else f"at least {number}{where}"
@@ -74,26 +74,26 @@ class _Facts:
         period = result.integrals.profile.period if result.integrals is not None else None
         self.closes = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
         self.is_linear = result.file.is_quadratic and result.file.system.degree <= 1
-        self.liouville = ""  # by what the map is Liouville integrable, proved
+        self.liouville = ""  # why the map is Liouville integrable; only if proved
         if result.dim > 2 and not self.is_linear:
-            for one in reversed(result.poisson.tensors if result.poisson is not None else ()):
-                proved = (one.verdict, one.jacobi, one.involution)
-                if one.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in proved):
-                    self.liouville = f"with the Poisson tensor {one.name}"
+            for tensor in reversed(result.poisson.tensors if result.poisson is not None else ()):
+                proved = (tensor.verdict, tensor.jacobi, tensor.involution)
+                if tensor.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in proved):
+                    self.liouville = f"with the Poisson tensor {tensor.name}"
             if isinstance(result.normal_form, SystemNormalForm):
                 self.liouville = "as a member of the commuting family"
 
 
 def conclude(result: AnalysisResult) -> Conclusion:
-    """The verdict on what was found: the first of `_RULES` that says something."""
+    """The verdict on the results: that of the first rule in `_RULES` that applies."""
     facts = _Facts(result)
-    verdict = next(said for rule in _RULES if (said := rule(facts)))
+    verdict = next(verdict for rule in _RULES if (verdict := rule(facts)))
     sentence = verdict.sentence
     if result.eps is not None:
-        sentence += f" All this at eps = {result.eps} only: other eps may differ."
+        sentence += f" All this holds at eps = {result.eps}; other eps may differ."
     if result.symbols:
         parts = "integrals" if result.densities is None else "integrals and densities"
-        sentence += f" The {parts} are for every {', '.join(result.symbols)}, all else is for the given values."
+        sentence += f" The {parts} hold for every {', '.join(result.symbols)}, all else for the given values."
     if facts.liouville:
         sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
     sense, ground, growth = (
@@ -102,7 +102,7 @@ def conclude(result: AnalysisResult) -> Conclusion:
         facts.growth,
     )
     if verdict.kind == "not integrable":
-        growth = Growth.EXPONENTIAL  # also where that is estimated only
+        growth = Growth.EXPONENTIAL  # also where this is only estimated
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
 
@@ -128,14 +128,14 @@ def _linear(facts: _Facts) -> _Verdict | None:
 
 
 def _contradictory(facts: _Facts) -> _Verdict | None:
-    if not (said := contradictions(facts.result)):
+    if not (sentences := contradictions(facts.result)):
         return None
-    sentence = f"The findings do not agree: {'; '.join(said)}. {_capital(facts.integrals)}."
+    sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capital(facts.integrals)}."
     return _Verdict("undecided", sentence, ground=None)
 
 
 def _not_birational(facts: _Facts) -> _Verdict | None:
-    """What degrees and closed orbits mean is known of birational maps; a constant map needs no theorem."""
+    """Degrees and closed orbits have a meaning for birational maps only; a constant map needs no theorem."""
     if not facts.result.defect or facts.growth is Growth.ZERO:
         return None
     return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.phrase}.", ground=None)
@@ -159,7 +159,7 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
 
 
 def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
-    """Where a dynamical degree above 1 is proved."""
+    """Maps with a dynamical degree above 1, proved."""
     result = facts.result
     if facts.degrees is None or facts.degrees.enclosure is None:
         return None
@@ -173,7 +173,7 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
 
 
 def _on_curves(facts: _Facts) -> _Verdict | None:
-    """Where the orbits lie on curves, proved; or not, of maps whose growth is not known."""
+    """Maps whose orbits lie on curves: proved, or supported if the growth is not known."""
     result, proved = facts.result, 0
     if result.integrals is not None:  # independent ones
         proved = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
@@ -181,7 +181,7 @@ def _on_curves(facts: _Facts) -> _Verdict | None:
     if result.dim > 1 and proved >= result.dim - 1:
         sense = "superintegrable" if result.dim > 2 else "integrable"
         genus = result.pencil.genus if result.pencil is not None else None
-        if genus is None and result.dim == 2:  # the growth tells it where it was not computed
+        if genus is None and result.dim == 2:  # not computed, but determined by the growth
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
         sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
@@ -190,7 +190,7 @@ def _on_curves(facts: _Facts) -> _Verdict | None:
     if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
         return None
     curves = ", so that orbits lie on curves" if on_curves else ""
-    sentence = f"Integrable: {facts.integrals}{curves}; of the degrees: {facts.phrase}."
+    sentence = f"Integrable: {facts.integrals}{curves}; degrees: {facts.phrase}."
     return _Verdict("integrable", sentence, *_sense(facts.liouville))
 
 
@@ -214,7 +214,7 @@ def _undecided(facts: _Facts) -> _Verdict:
     return _Verdict("undecided", f"The growth is undecided: {facts.phrase}; {facts.integrals}.", ground=None)
 
 
-# The stronger ones first: what is proved before what is measured.
+# Stronger rules first: proved results before measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
     *(_nowhere_defined, _linear, _contradictory, _not_birational, _linearisable, _of_positive_entropy),
     *(_on_curves, _by_growth, _undecided),
@@ -228,7 +228,7 @@ def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tup
 
 
 def _confining(result: AnalysisResult) -> str:
-    """In which sense a map is not integrable: confinement is no proof of integrability."""
+    """The sense in which a map is not integrable: confinement does not prove integrability."""
     confined = {run.verdict for run in result.singularities} == {CONFINED}
     return "confining and not integrable" if confined else "not integrable"
 
@@ -238,33 +238,37 @@ def _capital(sentence: str) -> str:
 
 
 def orbits_lie_on_curves(result: AnalysisResult) -> bool:
-    """Whether dim - 1 independent integrals are proved or supported: then degrees grow quadratically at most.
+    """Whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically.
 
-    For the map acts on each of the curves, which have genus 0 or 1 where it has infinite order.
+    The reason: the map acts on each of the curves, and these have genus 0 or 1 where it has infinite order.
     """
     return result.integrals is not None and len(result.integrals.integrals) >= result.dim - 1 >= 1
 
 
 def contradictions(result: AnalysisResult) -> list[str]:
-    """What excludes each other among integrals, closed orbits and degrees: sentences, none where all agree."""
+    """Sentences on integrals, closed orbits and degrees that contradict each other; none if all agree."""
     growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
     period = result.integrals.profile.period if result.integrals is not None else None
-    said = []
+    sentences = []
     if growth is Growth.EXPONENTIAL and orbits_lie_on_curves(result):
-        said.append("the degrees seem to grow exponentially, which they cannot where integrals leave curves only")
+        sentences.append(
+            "the degrees seem to grow exponentially, which they cannot if integrals confine orbits to curves"
+        )
     elif growth is Growth.EXPONENTIAL and isinstance(result.normal_form, SystemNormalForm):
-        said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
+        sentences.append(
+            "the degrees seem to grow exponentially, which they cannot for a member of the commuting family"
+        )
     if result.degrees is not None and result.degrees.enclosure is not None and orbits_lie_on_curves(result):
-        said.append("positive algebraic entropy is proved, which excludes an integral")
+        sentences.append("positive algebraic entropy is proved, which excludes an integral")
     if result.pencil is not None and (impossible := result.pencil.against(growth)):
-        said.append(impossible)
+        sentences.append(impossible)
     if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL):
-        said.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
-    return said
+        sentences.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
+    return sentences
 
 
 def doubt_of_heights(result: AnalysisResult) -> str:
-    """Why the growth of heights is no finding beside that of the degrees; empty where the two go together."""
+    """The reason not to trust the growth of heights, given that of the degrees; empty if the two agree."""
     if result.heights is None or result.degrees is None:
         return ""
     kind, growth = result.heights.kind, result.degrees.growth

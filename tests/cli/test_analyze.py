@@ -100,7 +100,7 @@ def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, 
     outcome = kahanmaps("analyze weierstrass")
     _, lines, verdict = report(outcome.out)
     assert outcome.status == 130
-    assert "interrupted: the verdict rests on what was found so far" in outcome.err
+    assert "interrupted: the verdict rests on the results so far" in outcome.err
     assert list(dict.fromkeys(section for section, _, _ in lines)) == sections
     skipped = [text for section, _, text in lines if section == "not done"]
     assert skipped[-1] == "commuting systems: interrupted"

@@ -66,7 +66,7 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
     assert (special.conclusion.kind, special.integrals.profile.period) == ("linearisable", 4)
     assert special.conclusion.sentence == (
         "The map is periodic: Phi^4 is the identity (proved); 2 independent integrals in dimension 2. "
-        "All this at eps = 1 only: other eps may differ."
+        "All this holds at eps = 1; other eps may differ."
     )
     assert (generic.conclusion.kind, generic.conclusion.integrals) == ("integrable", 1)
     assert generic.conclusion.growth == "quadratic"
@@ -203,7 +203,7 @@ def test_where_an_iterate_is_constant():
     found = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
     assert found.conclusion.sentence == (
         "An iterate of the map is a constant map (measured): orbits end in one point. "
-        "All this at eps = 1/2 only: other eps may differ."
+        "All this holds at eps = 1/2; other eps may differ."
     )
     assert (found.conclusion.kind, found.conclusion.growth) == ("linearisable", "zero")
     linear = analyze(system("x", "x"), eps=-1)

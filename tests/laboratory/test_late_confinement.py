@@ -189,7 +189,7 @@ def test_what_excludes_each_other_is_undecided():
     both = replace(found, degrees=exponential)
     assert (both.conclusion.kind, contradictions(both)) == (
         "undecided",
-        ["the degrees seem to grow exponentially, which they cannot where integrals leave curves only"],
+        ["the degrees seem to grow exponentially, which they cannot if integrals confine orbits to curves"],
     )
     # An estimate gives way to what is proved.
     estimate = replace(found, degrees=replace(exponential, patterns=Patterns((30,), None, True)))
