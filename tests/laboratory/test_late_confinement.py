@@ -258,11 +258,11 @@ def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():
         ([("not contracted", None), ("undecided", None, 0)], Patterns((), None, False)),
         (
             [("undecided", 3, 2, 9, "no luck")],
-            Patterns((), None, None, "what becomes of x - 1 = 0 is undecided: no luck"),
+            Patterns((), None, None, "the pattern of x - 1 = 0 is undecided: no luck"),
         ),
         (
             [("not confined", None, 1, 90)],
-            Patterns((), None, None, "the pattern of x - 1 = 0 is still running after 90 steps (--steps)"),
+            Patterns((), None, None, "the pattern of x - 1 = 0 has not settled after 90 steps; raise --steps"),
         ),
     ],
 )

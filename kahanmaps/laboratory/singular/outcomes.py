@@ -168,7 +168,7 @@ class Hypersurface:
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
-    cannot be said: its pattern is still running. `orders` are those of this pattern. In a composition that is
+    cannot be said: its pattern has not settled. `orders` are those of this pattern. In a composition that is
     followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
     `generic` is its polynomial over Q[eps], empty where it is not known.
     """
