@@ -203,7 +203,7 @@ class Laboratory:
         try:
             pairs = [(map_, *pair) for map_ in self.maps for pair in map_.pairs(2)]
         except NoPoint:
-            return f"{at}the map has no value anywhere: {name} is identically 0"
+            return f"{at}the map is defined nowhere: {name} is identically 0"
         if not any(map_.determinant(x, image)[0] for map_, x, image in pairs):
             return f"{at}the map is not invertible: {above} is 0 at all {'points' if self.system is None else 'images'}"
         return ""

@@ -170,7 +170,7 @@ def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expe
     assert lines_of(found, "vector field")[-1].startswith(expected)
 
 
-NOWHERE = "at eps = 1 the map has no value anywhere: det(I - eps f'(x)) is identically 0"
+NOWHERE = "at eps = 1 the map is defined nowhere: det(I - eps f'(x)) is identically 0"
 SINGULAR = "at eps = 1 the map is not invertible: det(I + eps f'(x)) is 0 at all images"
 
 

@@ -29,7 +29,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
-    Written,
+    HypersurfaceForm,
     outcome_of,
 )
 from kahanmaps.laboratory.singular.singularities import Patterns, _patterns, patterns_of, singularities
@@ -230,7 +230,7 @@ def test_heights_and_degrees_that_disagree_are_reported():
 def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others():
     # x^2 = 2 z^2 has points in GF(p) for every other prime only.
     x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
-    form = Written(x**2 - 2 * z**2, False, None)
+    form = HypersurfaceForm(x**2 - 2 * z**2, False, None)
     for seed, units in enumerate((1e6, 1e6, 1e6, 1e6, 0)):
         limits = Range(4, 4, 4, Budget(units), 4)
         found = outcome_of(load("lorenz").map, fmpq(1, 7), form, "?", random.Random(seed), limits)

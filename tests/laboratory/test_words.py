@@ -75,7 +75,7 @@ def test_powers_have_every_kth_degree(name, k, square):
     found = degree_growth(word(name, power=k))
     assert (found.ended, found.derived.closed_form) == ("derived", f"{square * k * k}*n^2 + 1")
     assert found.patterns.word == Word((3,), k)
-    assert f"a step is {k} maps" in found.text
+    assert f"{k} maps make one iterate" in found.text
 
 
 def test_every_nth_coefficient_of_a_fraction():

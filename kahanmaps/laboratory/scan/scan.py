@@ -416,7 +416,7 @@ def _terms(
     room = usual if terms is None else _MOST_ROOM
     found = family.degrees(tried, eps, terms or _MOST_TERMS, room, rng).max(axis=0).tolist()
     if found[0] == NOWHERE:
-        raise InputError("the map has no value anywhere, whatever the parameters are")
+        raise InputError("the map is defined nowhere, whatever the parameters are")
     measured = sum(degree >= 0 for degree in found)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")

@@ -120,7 +120,7 @@ def sweep(
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
     generic = found.max(axis=0)
     if generic[0] < 0:
-        raise InputError("the map has no value anywhere, whatever the parameters are")
+        raise InputError("the map is defined nowhere, whatever the parameters are")
     special, accidents = np.flatnonzero((found != generic).any(axis=1)), 0
     for line in range(1, _LINES[1]):
         if not len(special):

@@ -229,29 +229,29 @@ def singularities(
             ) from None
         at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
         return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
-    below = map_form.denominator
+    denominator = map_form.denominator
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
-    run = SingularityRun(exact_eps, affine(below * (-1) ** (map_.dim * len(over.factors)), map_), map_form.degree)
-    is_undefined = bool(below.is_zero())  # det(I - eps f'(x)) = 0 for all x
+    run = SingularityRun(exact_eps, affine(denominator * (-1) ** (map_.dim * len(over.factors)), map_), map_form.degree)
+    is_undefined = bool(denominator.is_zero())  # det(I - eps f'(x)) = 0 for all x
     if is_undefined or not _is_dominant(map_, exact_eps):
         return replace(run, is_undefined=is_undefined, is_dominant=False)
     if map_form.degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
-    every, critical_degree = written(map_form)
+    forms, critical_degree = written(map_form)
     if critical_degree is None and len(over.factors) > 1:
         known = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
         if known is not None:
             return known
-    tracking = Tracking(*followed_forms(map_form, every)) if critical_degree else NONE_TRACKED
-    found: list[Hypersurface] = []
+    tracking = Tracking(*followed_forms(map_form, forms)) if critical_degree else NONE_TRACKED
+    hypersurfaces: list[Hypersurface] = []
     is_cut = False
-    for one in every:
+    for form in forms:
         if is_cut := limits.budget.is_spent:
             break
         try:
-            text = name_of(one.form, map_)
+            text = name_of(form.form, map_)
             progress(f"following {text[:40]}")
-            found.append(outcome_of(map_, exact_eps, one, text, rng, limits, tracking))
+            hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
             if isinstance(effort, Budget):  # a stage of something else, which ends, too
                 raise
@@ -259,16 +259,17 @@ def singularities(
             break
     if critical_degree is None and not is_cut:
         progress("following critical points")
-        too_large = "the hypersurfaces that this map contracts are too large to be written down"
-        found += unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
-    is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in found))
-    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(found), stopped=is_cut)
+        too_large = "the polynomials of the exceptional hypersurfaces are too large"
+        unnamed = unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
+        hypersurfaces += unnamed
+    is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_cut)
 
 
 def _map_by_map(
     map_: MapFamily, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
 ) -> SingularityRun | None:
-    """The same for a composition whose maps are followed one by one; None where one of them is too large."""
+    """The run for a composition whose maps are followed one by one; None where one of them is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
     found = followed_map_by_map(map_, run.eps, rng, limits, progress)
     return found and replace(run, word=found[0], hypersurfaces=tuple(found[1]), stopped=limits.budget.is_spent)
