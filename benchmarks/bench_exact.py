@@ -376,7 +376,7 @@ def contest(work: Work, steps: int, contestants: Sequence[tuple[str, Runner]]) -
     base_name, base = contestants[0]
     best, expected = base(work, steps)
     digits = max(len(entry.str()) for pair in expected for entry in pair)
-    what = f"m = {work.m}, N = {steps}, last iterate of up to {digits:,} digits above and below"
+    what = f"m = {work.m}, N = {steps}, last iterate of up to {digits:,} digits in numerator and denominator"
     times = {base_name: best}
     for name, run in contestants[1:]:
         try:
@@ -403,7 +403,8 @@ def over_fields(quick: bool = False) -> list[Row]:
         require_equal(chi, last, expected)
         split = min(split, normal_reduced(base, steps)[0])
         digits, others = (max(len(entry.str()) for pair in found for entry in pair) for found in (last, whole))
-        what = f"m = {base.m}, N = {steps}, chi = {chi}, last iterate of up to {digits:,} digits above and below"
+        what = f"m = {base.m}, N = {steps}, chi = {chi}, "
+        what += f"last iterate of up to {digits:,} digits in numerator and denominator"
         rows.append(
             row(
                 FIELDS,

@@ -163,83 +163,83 @@ def _most_memory(rows: list[Row]) -> float:
     return max(float(note.split()[0]) for note in here)
 
 
-# What is claimed, the figure, and whether it is at least or at most that.
+# Each claim: what is measured, how to read it from the rows, and the bound.
 CLAIMS: list[tuple[str, Callable[[list[Row]], float], str, float]] = [
     (
-        "every peer takes so many times as long as kahanmaps with reduced rationals in x (m = 3, N = 80)",
+        "smallest time of another program, relative to kahanmaps with reduced rationals in x (m = 3, N = 80)",
         _least_of_peers,
         "at least",
         20,
     ),
     (
-        "every system of the catalogue: FLINT's plain solve takes so many times as long as kahanmaps",
+        "smallest time of FLINT's plain solve relative to kahanmaps, over all systems of the catalogue",
         _least_of_catalogue,
         "at least",
         1,
     ),
     (
-        "the same, where bilinear forms hold along the orbit",
+        "the same over the systems with bilinear forms along the orbit",
         partial(_least_of_catalogue, relations=bench_catalogue.FORMS),
         "at least",
         5,
     ),
     (
-        "the same, where coordinates are forms in Somos sequences",
+        "the same over the systems whose coordinates are forms in Somos sequences",
         partial(_least_of_catalogue, relations=bench_catalogue.SOMOS),
         "at least",
         4,
     ),
     (
-        "every integrable system of the catalogue, to 400,000 bits: PARI by hand takes so many times as long",
+        "smallest time of PARI by hand relative to kahanmaps, over the integrable systems, to 400,000 bits",
         _least_of_longer,
         "at least",
         4,
     ),
     (
-        "members whose chi does not split take at most so many times as long as one whose chi does (m = 3, N = 80)",
+        "largest time of a member whose chi does not split relative to one whose chi splits (m = 3, N = 80)",
         _most_over_fields,
         "below",
         3,
     ),
     (
-        "exponent of N in the time of a whole orbit, normal coordinates alone",
+        "exponent of N in the time of a complete orbit, normal coordinates alone",
         lambda rows: _value(rows, "kahanmaps, normal form: normal coordinates", "m = 3, N = 80 to 320"),
         "below",
         3.7,
     ),
     (
-        "exponent of N in the time of a whole orbit, reduced rationals in x",
+        "exponent of N in the time of a complete orbit, reduced rationals in x",
         lambda rows: _value(rows, "kahanmaps, normal form: reduced", "m = 3, N = 80 to 320"),
         "below",
         3.7,
     ),
     (
-        "stepping takes so many times as long as the iterate n = 640 alone",
+        "time of stepping to n = 640 relative to computing this iterate alone",
         lambda rows: _value(rows, "kahanmaps: stepping", "m = 3, n = 640,"),
         "at least",
         50,
     ),
-    ("multiplications of the final size for the iterate n = 640 alone", _multiplications, "below", 10),
+    ("time of the iterate n = 640 alone, in multiplications of its size", _multiplications, "below", 10),
     (
-        "milliseconds for the iterate n = 10^18 over GF(2^61 - 1) (a claim on absolute time)",
+        "milliseconds for the iterate n = 10^18 over GF(2^61 - 1) (absolute time)",
         lambda rows: _value(rows, "kahanmaps: doublings", "m = 3, n = 10^18", "seconds") * 1e3,
         "below",
         0.3,
     ),
     (
-        "seconds of the process that has the iterate n = 2000 for its only task (another one)",
+        "seconds of a process that computes only the iterate n = 2000 (absolute time)",
         lambda rows: _value(rows, bench_iterate.ALONE, "m = 3, n = 2000,", "seconds"),
         "below",
         8,
     ),
     (
-        "seconds of the slowest process of `analyze` in dimension 6 (two processors, another one)",
+        "seconds of the slowest process of `analyze` in dimension 6 (absolute time, two processors)",
         partial(_slowest_process, dimension=6),
         "below",
         10,
     ),
     (
-        "seconds of the slowest process of `analyze` in dimension 3 (two processors, another one)",
+        "seconds of the slowest process of `analyze` in dimension 3 (absolute time, two processors)",
         partial(_slowest_process, dimension=3),
         "below",
         1,
@@ -267,88 +267,91 @@ def claims(rows: list[Row]) -> list[tuple[str, str, str, bool]]:
 HOW = """\
 # Benchmarks
 
-Written by `make bench`; `benchmarks/` has the scripts, `benchmarks/results.json` the figures with times.
+`make bench` writes this page. The scripts are in `benchmarks/`, and the results with times in
+`benchmarks/results.json`.
 
-Every contestant gets the same work on the same machine, one after the other on one core where nothing else is said,
-and exact results have to be equal before a time counts: a disagreement stops the run. Short runs are repeated, and the
-best processor time is taken. What is printed are ratios, since they survive a change of machine better than times do.
-PARI/GP takes its own time, without start-up and output; finding the normal form (a fraction of a second, once a system)
-is in no figure. Peers were given the best formulation that was found, and those that are slower but more natural as
-well.
+All programs get the same work on the same machine, one after the other, on one core unless stated otherwise. Exact
+results are compared, and a disagreement stops the run. Short runs are repeated, and the best processor time counts. The
+tables show ratios because they depend less on the machine than times do. PARI/GP reports its own time, without start-up
+and output. No result includes the search for the normal form (a fraction of a second, once per system). Each other
+program is used with the best formulation that we know, and also with slower ones that are more natural.
 
-The exact system is a member of the family with integer coefficients, hidden by a symplectic integer matrix;
-eps = 1/10.
+The exact system is a member of the commuting family with integer coefficients, in coordinates changed by a symplectic
+integer matrix; eps = 1/10.
 """
 
 GROUPS = {
     bench_exact.GROUP: (
         "Time relative to kahanmaps with reduced rationals in x: more is slower. All other libraries solve the\n"
-        "linear system of each step; rationals are reduced there as well, integers stand over one denominator in\n"
-        "lowest terms. What is less work than that has a line of its own: one common denominator from which the\n"
-        "last few bits are not removed, and normal coordinates without x. `fractions.Fraction` is too slow for\n"
-        "N = 80: it runs up to N = 40, and is compared there."
+        "linear system of each step. Their rationals are reduced as well, and their integers are over one\n"
+        "denominator in lowest terms. Variants of kahanmaps that do less work have lines of their own: one common\n"
+        "denominator from which a factor of a few bits is not removed, and normal coordinates without x.\n"
+        "`fractions.Fraction` is too slow for N = 80 and is compared for N = 40."
     ),
     bench_exact.FIELDS: (
-        "Time relative to the member of the same dimension whose chi splits, whose numbers are about as long. A plane\n"
-        "over Q[t]/g stands for deg g planes, but multiplications in it take more than deg g of integers."
+        "Time relative to the member of the same dimension whose chi splits and whose numbers are about as long.\n"
+        "A plane over Q[t]/g represents deg g planes, but a multiplication in it costs more than deg g\n"
+        "multiplications of integers."
     ),
     bench_exact.GROWTH: (
-        "The exponent e in time ~ N^e. The N-th iterate has about N^2 digits, so that the orbit as a whole has N^3."
+        "The exponent e in time ~ N^e. The N-th iterate has about N^2 digits, so the complete orbit has about\nN^3."
     ),
     bench_catalogue.GROUP: (
-        "Time relative to kahanmaps, which keeps integers over one common denominator, or fractions, and reduces the\n"
-        "coordinates of the last iterate: more is slower. The peers have the same map, eps = 3/11 and start. FLINT\n"
-        "has rationals throughout; PARI the quickest of three or four formulations by hand, which the line names:\n"
-        "matsolve or the formulas of an explicit map on rationals, otherwise integers over one denominator in lowest\n"
-        "terms.\n"
-        "Orbits go to 100,000 bits or 400 steps. Systems with numbers that stay short are left out: there calls of\n"
-        "Python are all that is measured."
+        "Time relative to kahanmaps, which uses integers over one common denominator, or fractions, and reduces\n"
+        "the coordinates of the last iterate: more is slower. The other programs have the same map, eps = 3/11\n"
+        "and initial point. FLINT uses rationals. PARI uses the fastest of three or four formulations written by\n"
+        "hand, named in the line: matsolve or the formulas of an explicit map on rationals, otherwise integers\n"
+        "over one denominator in lowest terms. Orbits end at 100,000 bits or 400 steps. Systems whose numbers\n"
+        "stay short are omitted, because their times would only measure calls of Python functions."
     ),
     bench_catalogue.LONG: (
-        "The same up to 400,000 bits or 2000 steps, for orbits with relations, and members of the family, these in "
-        "normal form: searches, which take a fixed time, count for less. PARI has the formulation that was the\n"
-        "quickest above."
+        "The same up to 400,000 bits or 2000 steps, for orbits with relations and for members of the family in\n"
+        "normal form. Searches, which take a fixed time, have less weight here. PARI uses the formulation that\n"
+        "was the fastest in the section before."
     ),
     bench_iterate.OVER_Q: (
-        "Time relative to kahanmaps' doublings: more is slower. `ellmul` does the heart of the task only: it\n"
-        "multiplies the point T by n on each elliptic curve, and does not come back to x."
+        "Time relative to the doublings of kahanmaps: more is slower. `ellmul` does only the main part of the\n"
+        "task: it multiplies the point T by n on each elliptic curve, and does not compute x from the result."
     ),
     bench_iterate.CATALOGUE: (
-        "Time relative to the point n alone: its coordinates are forms in two sequences, whose terms near n come from "
-        "those near n/2. That there is no pole on the way is seen by an orbit modulo a prime, which is in the time."
+        "Time relative to the point n alone: its coordinates are forms in two sequences, whose terms near n\n"
+        "follow from those near n/2. An orbit modulo a prime shows that it meets no indeterminacy point; the time\n"
+        "includes this."
     ),
     bench_iterate.MODULO: (
-        "As above. Here `ellmul`, compiled from C, is faster than kahanmaps, which is Python around single\n"
-        "operations of FLINT, some twelve for each binary digit of n."
+        "Time relative to the doublings of kahanmaps. `ellmul`, compiled from C, is faster here than kahanmaps,\n"
+        "which calls single operations of FLINT from Python, some twelve for each binary digit of n."
     ),
-    bench_iterate.BALLS: "No peer; the exact iterate n = 80 was found to be in the balls.",
+    bench_iterate.BALLS: "No other program. The balls were checked to contain the exact iterate n = 80.",
     FLOAT: (
-        "Speed relative to the first line of each block: **more is faster**. Integrators solve another problem,\n"
-        "the flow, and are what one would use instead."
+        "Speed relative to the first line of each block: **more is faster**. Integrators solve a different\n"
+        "problem, the flow; they are what one would use instead."
     ),
     bench_degrees.GROUP: (
-        "Time relative to kahanmaps, which walks two lines with different primes, compares them, and derives the\n"
-        "degrees from the singularity patterns: a constant cost, most of the time where iterates are few. The second\n"
-        "row is the lines alone, which is what the peers do, modulo 2^61 - 1. Polynomials with gcds are what\n"
-        "kahanmaps does itself up to dimension 5; in dimension 6 it takes power series."
+        "Time relative to kahanmaps, which computes the degrees on two lines with different primes, compares\n"
+        "them, and derives the degrees from the singularities. The last part has a constant cost, which dominates\n"
+        "if there are few iterates. The second row is the computation on lines alone, as in the other programs,\n"
+        "modulo 2^61 - 1. Up to dimension 5 kahanmaps uses polynomials with gcds, too; in dimension 6 it uses\n"
+        "power series."
     ),
     bench_analysis.PROCESSES: (
-        "No peer; `kahanmaps analyze NAME`, from the start of Python, on two processors. How fast these are,\n"
-        "which may change by the hour, a product of long numbers tells."
+        "No other program; `kahanmaps analyze NAME`, including the start of Python, on two processors. The speed\n"
+        "of the machine may change by the hour; the product of long numbers in the first line measures it."
     ),
     bench_memory.GROUP: (
-        "No peer; memory at its peak, relative to the first line of each block. Orbits and results are written as\n"
-        "they come. An orbit remembers terms of its sequences between n/2 and n; of the memory of a batch 128 MB are\n"
-        "SQLite's for pages of the database (a batch of a million tasks took 191 MB)."
+        "No other program; peak memory relative to the first line of each block. Orbits and results are written\n"
+        "as they are computed. An orbit keeps the terms of its sequences between n/2 and n. Up to 128 MB of the\n"
+        "memory of a batch are SQLite's cache of database pages (a batch of a million tasks took 191 MB)."
     ),
     bench_analysis.GROUP: (
-        "Time relative to what `analyze` does first to count integrals: how many polynomials of each degree vanish\n"
-        "along orbits modulo two primes. All of `analyze` includes degree 7, formulas, densities, proofs, degrees,\n"
-        "singularities and symmetries."
+        "Time relative to the first part of `analyze`, which counts integrals by the number of polynomials of\n"
+        "each degree that vanish along orbits modulo two primes. The complete `analyze` includes degree 7,\n"
+        "formulas, densities, proofs, degrees, singularities and symmetries."
     ),
     units.GROUP: (
-        "Searches are bounded by counted work, so that their answers do not depend on the machine nor on its load.\n"
-        "The ratio is units per microsecond of the processor; a unit is meant to be one, within a factor of three."
+        "Searches are bounded by counted work, so that their results depend neither on the machine nor on its\n"
+        "load. The ratio is units per microsecond of processor time; a unit should be one microsecond, within a\n"
+        "factor of three."
     ),
 }
 
@@ -359,7 +362,7 @@ def page(record: dict[str, Any]) -> str:
     lines = [HOW]
     held = claims(rows)
     if held:
-        lines += ["## What is claimed", "", "| | claimed | here |", "|---|---:|---:|"]
+        lines += ["## Claims", "", "| | claimed | measured |", "|---|---:|---:|"]
         lines += [f"| {text} | {bound} | {value}{'' if holds else ' (missed)'} |" for text, bound, value, holds in held]
         lines.append("")
     for group in dict.fromkeys(entry["group"] for entry in rows):

@@ -55,7 +55,7 @@ class Work:
 
 @lru_cache
 def work(m: int = 3) -> Work:
-    """The common work. For m = 3 every coordinate of the 80th iterate has 35,128 digits above and below."""
+    """The common work. For m = 3 numerators and denominators of the 80th iterate have 35,128 digits."""
     member = random_member_with_eigenvalues(EIGENVALUES[:m], seed=SEED)
     system = member.chosen.system
     normal_form = system_normal_form(system, member=member)

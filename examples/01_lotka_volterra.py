@@ -1,8 +1,8 @@
-"""Kahan's picture: the Lotka-Volterra system, by his method with a coarse step, and by Euler's with a fine one.
+"""Kahan's picture: the Lotka-Volterra system by Kahan's method with a large step and by Euler's with a small one.
 
-The orbits of Kahan's map that are drawn stay on rings; Euler's spiral outwards. The map preserves the measure
+The plotted orbits of Kahan's map stay on rings; those of Euler's method spiral outward. The map preserves the measure
 dx dy/(x y), which is proved, so no open set of orbits spirals into a point. Writes lotka_volterra.pdf if matplotlib is
-there.
+installed.
 """
 
 from importlib.util import find_spec

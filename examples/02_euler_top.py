@@ -1,7 +1,8 @@
-"""The discrete Euler top of Hirota and Kimura: an exact orbit, its integrals, and a wrong one.
+"""The discrete Euler top of Hirota and Kimura: an exact orbit, two integrals, and a function that is not an integral.
 
-Every iterate is a triple of rational numbers; both integrals keep their exact value. The integral of the
-differential equation, which is wrong for the map by a term in eps^2, is refuted with a witness.
+Every iterate is a triple of rational numbers, and both integrals keep their exact value. The map does not conserve the
+integral of the differential equation, which differs from one of the map by a term in eps^2: it is refuted with a
+witness.
 """
 
 import kahanmaps as km

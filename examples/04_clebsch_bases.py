@@ -1,9 +1,9 @@
 """The discrete Clebsch system: the Hirota-Kimura bases that Petrera, Pfadler and Suris found by experiment.
 
-Which combinations of p_i^2, m_i^2, m_i p_i and 1 vanish along an orbit of the map? Their coefficients may change from
-orbit to orbit, and then they are integrals. The dimensions are measured modulo primes. The smallest basis says that
-c_1 p_1^2 + c_2 p_2^2 + c_3 p_3^2 = 1 on each orbit; so the c_i are integrals. They turn out to be functions of a
-single one, which is claimed, and proved.
+Which linear combinations of p_i^2, m_i^2, m_i p_i and 1 vanish along an orbit of the map? Coefficients that differ
+between orbits are integrals. The dimensions are measured modulo primes. By the smallest basis,
+c_1 p_1^2 + c_2 p_2^2 + c_3 p_3^2 = 1 on each orbit, so the c_i are integrals. They are functions of a single integral,
+which is proved in the form of two claims.
 """
 
 from flint import fmpq_mat

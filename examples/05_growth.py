@@ -1,7 +1,7 @@
-"""How numbers grow: an integrable map against one that is not.
+"""How the numbers of exact orbits grow: an integrable map compared with one that is not integrable.
 
 The digits of an orbit of an integrable map grow like the square of the step; those of the Lotka-Volterra map double
-with every step, until the digit budget ends the orbit with a status instead of an exception.
+with every step, until the limit on digits ends the orbit with a status instead of an exception.
 """
 
 import kahanmaps as km

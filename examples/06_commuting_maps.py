@@ -1,7 +1,7 @@
-"""The theorem of Petrera and Suris for m = 3, and its control.
+"""The theorem of Petrera and Suris for m = 3, with a control.
 
-A member of the family is drawn, its four associated systems are listed, their Kahan maps are composed in both
-orders at a rational point, and the pairwise commutativity is proved. The maps of H_0 and H_1 do not commute.
+The script constructs a random member of the family, lists its four associated systems, composes two of their Kahan
+maps in both orders at a rational point, and proves that they commute pairwise. The maps of H_0 and H_1 do not commute.
 """
 
 import kahanmaps as km

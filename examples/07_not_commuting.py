@@ -1,8 +1,8 @@
-"""Two systems that commute, and whose Kahan maps do not: why associated systems are something special.
+"""Two systems whose flows commute, but whose Kahan maps do not: commuting Kahan maps are special to associated systems.
 
 H_0 and H_1 with grad H_1 = A grad H_0 are in involution, so the flows of J grad H_0 and J grad H_1 commute. Their Kahan
-maps do not: the corners of the square x -> Phi_0 -> Phi_1 miss each other, by a gap that shrinks with a power of eps.
-For two associated systems the square closes exactly, at every eps.
+maps do not: Phi_0(Phi_1(x)) and Phi_1(Phi_0(x)) differ by a gap that shrinks like a power of eps. For two associated
+systems both points are equal, at every eps.
 """
 
 from itertools import pairwise
@@ -21,7 +21,7 @@ print("{H_0, H_1} =", bracket)
 
 
 def gap(f, g, eps):
-    """The largest difference of the two corners, an exact number."""
+    """The largest difference between a coordinate of the two points, an exact number."""
     phi_f, phi_g = km.KahanMap(f, eps), km.KahanMap(g, eps)
     x = phi_f.point(["1/20", "-1/30", 0, "1/10"])
     one, other = phi_f.step(phi_g.step(x)), phi_g.step(phi_f.step(x))

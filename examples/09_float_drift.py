@@ -1,8 +1,9 @@
-"""What floating point makes of exactly conserved integrals: a drift study.
+"""Drift of exactly conserved integrals in floating-point arithmetic.
 
-First the Euler top by three methods with the same time step: Kahan's map conserves its integrals up to rounding,
+First the Euler top by three methods with the same time step: Kahan's map conserves its integrals up to rounding errors,
 Runge-Kutta and the implicit midpoint rule do not. Then a member of the commuting family, whose orbits pass close to
-poles of the map, where digits are lost; in normal form fewer are. Writes drift.pdf if matplotlib is there.
+indeterminacy points of the map, where digits are lost; the normal form loses fewer. Writes drift.pdf if matplotlib is
+installed.
 """
 
 from importlib.util import find_spec
@@ -17,7 +18,7 @@ EPS, STEPS = "1/20", 20_000
 
 
 def errors_of(survey, function):
-    """The typical error of a function, by method: the median of the largest errors in some 200 stretches."""
+    """The typical error of a function, by method: the median of the maxima over some 200 bins of steps."""
     return {c.method: float(np.median(c.errors)) for c in survey.curves if c.function == function}
 
 

@@ -1,7 +1,7 @@
 """A batch on a cluster: the theorem for random members, and the growth of three maps, on workers of a dask scheduler.
 
-The scheduler and two workers are started here, on this machine; in earnest they are on many, and only the address
-changes. The same batch on one machine gives the same records, whatever came first. Needs `pip install
+This script starts the scheduler and two workers on one machine. On a real cluster only the address of the scheduler
+changes. The same batch without a cluster gives the same results, in whatever order they arrive. Needs `pip install
 'kahanmaps[cluster]'`.
 """
 
@@ -28,7 +28,7 @@ options = { max_degree = 300 }
 
 
 def start(module, *options):
-    # Whoever reaches a port of dask can run code there: these are reached from this machine only.
+    # Anyone who can reach a port of dask can run code there, so these accept local connections only.
     here = ["--host", "127.0.0.1", "--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
     command = [sys.executable, "-m", f"distributed.cli.{module}", *here, *options]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -37,7 +37,7 @@ def start(module, *options):
 
 
 def results(records):
-    """The results by the key of their task, in which the order of arrival does not show."""
+    """The results by the key of their task, independent of the order in which they arrive."""
     return {record.key: record.verdict or record.result["growth"] for record in records}
 
 

@@ -1,36 +1,41 @@
 #!/usr/bin/env bash
-# The main job in one minute: a member of the family, an orbit, integrals, commutativity and its control, an analysis.
+# A tour of one minute: a member of the commuting family, an orbit, integrals, commutativity with a control, an analysis.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p .demo
 
-exec 3>&1  # the commands are shown whole, whatever their output is piped into
+exec 3>&1  # command lines are printed here, outside the pipes that shorten the output
 
 run() {
     printf '\n$ kahanmaps %s\n' "$*" >&3
     kahanmaps "$@"
 }
 
-echo "== a member of the family, dimension 6, eigenvalues 1, -2, 3 hidden by a random symplectic matrix"
-run family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o .demo/pair.toml
-run family associated .demo/pair.toml --write-to .demo | cut -c 1-110
+# Cut lines of more than $1 characters at a word boundary, and mark the cut by an ellipsis.
+shorten() {
+    awk -v width="$1" 'length($0) > width { $0 = substr($0, 1, width - 3); sub(/[ \t][^ \t]*$/, ""); $0 = $0 " ..." } { print }'
+}
 
-echo; echo "== an exact orbit of its Kahan map; the last column is conserved"
+echo "== a member of the commuting family: dimension 6, eigenvalues 1, -2, 3, coordinates changed by a random symplectic matrix"
+run family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o .demo/pair.toml
+run family associated .demo/pair.toml --write-to .demo | shorten 110
+
+echo; echo "== an exact orbit of its Kahan map: two of the six coordinates, and a conserved function in the last column"
 run orbit .demo/pair.toml --start 1/2,-1/3,0,1,2/5,-1 --eps 1/10 --steps 2 --integral known --format csv | cut -d , -f 1-3,8 | grep -v '^#'
 
-echo; echo "== its integrals, for every eps"
-run check-integrals .demo/pair.toml | cut -c 1-160
+echo; echo "== its integrals, proved for every eps"
+run check-integrals .demo/pair.toml | shorten 160
 
 echo; echo "== the maps of two associated systems commute"
-run check-commute .demo/pair-ppp.toml .demo/pair-ppm.toml | cut -c 1-160
+run check-commute .demo/pair-ppp.toml .demo/pair-ppm.toml | shorten 160
 
-echo; echo "== all associated maps, pairwise; the control, H_0 with H_1, has to be refuted"
-run check-commute .demo/pair.toml | grep -v '^	' | cut -c 1-160
+echo; echo "== all pairs of associated maps commute; the maps of H_0 and H_1 are a control that must be refuted"
+run check-commute .demo/pair.toml | grep -v '^	' | shorten 160
 
 echo; echo "== Section 6 of the paper, statement by statement"
-run verify .demo/pair.toml --section 6 -q | grep -v '^	' | grep -v '^note' | cut -c 1-160
+run verify .demo/pair.toml --section 6 -q | grep -v '^	' | grep -v '^note' | shorten 160
 
-echo; echo "== many members at once: a batch, resumed by the same command, and its summary"
+echo; echo "== a batch of many members (the same command would resume it) and its summary"
 cat > .demo/first.toml <<'END'
 [experiments.commute]
 task = "check-commute"
@@ -46,7 +51,7 @@ END
 run batch run .demo/first.toml --db .demo/first.db -q
 run batch summary --db .demo/first.db -e heights --by m,growth --value constant --stable
 
-echo; echo "== a system of another kind: what does the map of the Euler top preserve, and is it integrable?"
-run analyze euler_top | cut -c 1-160
+echo; echo "== a system outside the family: what does the map of the Euler top preserve, and is it integrable?"
+run analyze euler_top | shorten 160
 
-echo; echo "The files are in .demo; start your own with: .venv/bin/kahanmaps --help"
+echo; echo "The files are in .demo. To start your own work: .venv/bin/kahanmaps --help"

@@ -15,10 +15,10 @@ from fontTools.subset import Options, Subsetter, load_font, save_font
 FONT = Path(__file__).parents[2] / "kahanmaps" / "reports" / "fonts" / "kahanmaps-math.woff"
 PRIMES = {0x2032, 0x2033, 0x2034}
 CHARACTERS = (
-    "20-7E A0 B1 B7 D7 F7 391-3A9 3B1-3C9 3D1 3D5 3F1 3F5 2026 2032-2034 2061-2064 "  # text, Greek, primes
-    "210E 211A 211D 2124 1D434-1D467 1D6E2-1D71B "  # h, Q, R, Z; italic letters
-    "2190-2192 2194 21A6 2202 2208 2209 220F 2211-2213 2218 221A 221E 2227 2228 222B 223C 2248 2260 2261 2264 2265 "
-    "2282 22C5 22EF"  # relations and operators
+    "20-7E A0 AF B1 B7 D7 F7 2C6 391-3A9 3B1-3C9 3D1 3D5 3F1 3F5 2026 2032-2034 2061-2064 "  # text, Greek, primes
+    "2102 210E 2113 211A 211D 2124 1D434-1D467 1D49C 1D51E 1D51F 1D6E2-1D71B "  # C, h, l, Q, R, Z, italics, script
+    "2190-2192 2194 21A6 2202 2207 2208 2209 220F 2211-2213 2217 2218 221A 221E 2223 2224 2227-2229 222B 2236 223C "
+    "2245 2248 2260 2261 2264 2265 2282 2295 2297 22C5 22EF 230A 230B 27E8 27E9 2A01"  # relations, operators, brackets
 )
 
 

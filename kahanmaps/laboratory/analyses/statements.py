@@ -62,10 +62,10 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
 def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
     """Formulas, measurements and relations along orbits, and the curves of a planar integral."""
     if (search := result.integrals) is not None:
-        texts = [(integral, integral.short_text) for integral in search.integrals]
-        texts += [(integral, integral.text) for integral in search.in_iterates]
-        for integral, text in texts:
-            yield Statement(integral.verdict, f"{integral.name} = {text}  [{integral.origin}]")
+        for integral in search.integrals:
+            yield Statement(integral.verdict, f"{integral.name} = {integral.short_text}  [{integral.origin}]")
+        for iterated in search.in_iterates:
+            yield Statement(iterated.verdict, f"{iterated.name} = {iterated.text}  [{iterated.origin}]")
         for timed in search.time_dependent:
             text = f"{timed.name} = {timed.text} at the n-th point, an integral that depends on n"
             yield Statement(timed.integral.verdict, text)
