@@ -3,7 +3,7 @@
     python benchmarks/bench_degrees.py [--quick]
 
 The peers walk two lines modulo 2^61 - 1 at eps = 1/10 and remove common factors by gcds; kahanmaps walks two, each
-modulo a prime of its own, compares them, and explains their degrees by the singularities.
+modulo a prime of its own, compares them, and derives their degrees from the singularity patterns.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ EPS = "1/10"
 WORKS = [("planar_cubic_hamiltonian", 40), ("euler_top", 12), ("clebsch_first_flow", 8), ("lorenz", 7)]
 WORKS += [("planar_cubic_hamiltonian", 80), ("euler_top", 28), ("clebsch_first_flow", 14), ("lorenz", 8)]
 QUICK = [("planar_cubic_hamiltonian", 12), ("euler_top", 5)]
-OURS = "kahanmaps, two lines compared and explained"
+OURS = "kahanmaps, two lines compared, degrees derived"
 ALONE = "kahanmaps, the lines alone, singularities known before"
 POLYNOMIALS = "python-flint: minors of polynomial matrices, gcds, two lines"
 PARI = "PARI/GP: matsolve over GF(p)(t), two lines"

@@ -107,14 +107,14 @@ def parts_of(name: str) -> Iterator[Row]:
     before: dict[str, Any] = {"pending": None, "time": time.process_time(), "units": 0}
     found: list[tuple[str, float, int]] = []
 
-    def reached(analysis: Analysis) -> None:
+    def on_result(analysis: Analysis) -> None:
         now = time.process_time()
         if before["pending"] is not None:
             (part,) = set(before["pending"]) - set(analysis.pending)
             found.append((part, now - before["time"], analysis.units - before["units"]))
         before.update(pending=list(analysis.pending), time=now, units=analysis.units)
 
-    dim = analyze(load(name), reached=reached).dim
+    dim = analyze(load(name), on_result=on_result).dim
     for part, seconds, units in found:
         if seconds >= LEAST:
             yield counted_row(part, PARTS.format(dim), name, seconds, units)

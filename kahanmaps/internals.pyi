@@ -105,12 +105,12 @@ from .hard_stop import time_limit as time_limit
 from .invariants.growth import Growth as Growth
 from .laboratory.analysis import Analysis as Analysis
 from .laboratory.analysis import analyze as analyze
+from .laboratory.analysis_result import Statement as Statement
 from .laboratory.cycles import Census as Census
 from .laboratory.cycles import cycle_census as cycle_census
 from .laboratory.cycles import default_eps as default_eps
 from .laboratory.defaults import ITERATE_DEGREE as ITERATE_DEGREE
 from .laboratory.defaults import budget_for as budget_for
-from .laboratory.findings import Statement as Statement
 from .laboratory.growth.degrees import DegreeGrowth as DegreeGrowth
 from .laboratory.growth.degrees import degree_growth as degree_growth
 from .laboratory.growth.height_survey import DEFAULT_STARTS as DEFAULT_STARTS

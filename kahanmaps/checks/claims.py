@@ -19,15 +19,15 @@ from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, WithoutTru
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
     """How certain a claim is. Its truth value is `holds`; `bool` of a certainty is an error.
 
-    Checks give one of the first four. EXPLAINED is what follows exactly from the patterns of singularities, which are
-    measured; NOTE stands where certainty is not the question.
+    Checks give one of the first four. DERIVED is what follows exactly from the measured singularity
+    patterns; NOTE stands where certainty is not the question.
     """
 
     PROVED = "proved"
     REFUTED = "refuted"
     SUPPORTED = "supported"  # at random points, with a bound for the probability of an error
     UNDECIDED = "undecided"
-    EXPLAINED = "explained"
+    DERIVED = "derived"  # from the measured singularity patterns
     MEASURED = "measured"  # modulo primes, or on orbits
     ESTIMATED = "estimated"
     NOTE = "note"

@@ -1,7 +1,7 @@
-"""How the results of the laboratory look: the lines of their command for `print`, the same as a table in a notebook.
+"""The display of results of the laboratory: the lines that commands and `print` show, and a table in notebooks.
 
-What a result says is written once, as lines of cells (`lines_of`). `print` puts tabs between cells; a notebook makes a
-table of them, bounded in size, with formulas set and verdicts marked. Nothing is computed anew.
+`lines_of` gives the lines of a result, as cells. `print` separates cells by tabs; a notebook shows them as a table of
+bounded size, with typeset formulas and marked verdicts. Nothing is computed again.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ _ROWS = 60  # of a table in a notebook
 _TEXT = 300
 _LENGTHS_SHOWN = 12
 WORDS = (
-    "proved: an identity of rational functions, or a theorem; supported: true at random points; explained: follows "
-    "from singularities that were measured; measured: modulo primes or along orbits, which is evidence"
+    "proved: an identity of rational functions, or a theorem; supported: true at random points; derived: follows "
+    "exactly from the measured singularity patterns; measured: modulo primes or along orbits, which is evidence"
 )
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A cell that a notebook shows in another way than as its text: `html` makes it."""
+class HtmlCell:
+    """A cell that a notebook shows as `html()` instead of its text."""
 
     text: str
     html: Callable[[], str]
@@ -57,48 +57,48 @@ class Shown:
         return self.text
 
 
-Line = Sequence[object]  # cells: `Shown`, or what str() makes a text of
+Line = Sequence[object]  # cells: `HtmlCell`, or anything with a text by str()
 
 
-def _formula(text: str, function: fmpq_mpoly | RationalFunction, name: str = "") -> Shown:
-    return Shown(text, lambda: formula(function, name, CHARACTERS))
+def _formula(text: str, function: fmpq_mpoly | RationalFunction, name: str = "") -> HtmlCell:
+    return HtmlCell(text, lambda: formula(function, name, CHARACTERS))
 
 
-def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> Shown:
+def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> HtmlCell:
     return _formula(format_polynomial(polynomial), polynomial, name)
 
 
 def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
-    """For which eps a result is, with the time step: a phrase, empty for a map that does not depend on eps."""
+    """The eps of a result, with the time step, as a phrase; empty for a map that does not depend on eps."""
     return markup.eps_phrase(eps_record(eps, *maps))
 
 
 @singledispatch
-def lines_of(found: object) -> Iterator[Line]:
-    """What a result says, line by line: the lines of its command below the heading."""
-    raise TypeError(f"no lines are known of a {type(found).__name__}")
+def lines_of(result: object) -> Iterator[Line]:
+    """The lines of a result, as its command prints them below the heading."""
+    raise TypeError(f"no display is registered for {type(result).__name__}")
 
 
-def result_text(found: object) -> str:
-    """The lines of a result, cells between tabs."""
-    return "\n".join("\t".join(map(str, line)) for line in lines_of(found))
+def result_text(result: object) -> str:
+    """The lines of a result, with cells separated by tabs."""
+    return "\n".join("\t".join(map(str, line)) for line in lines_of(result))
 
 
-def result_html(found: Any, map_: MapFamily | None = None) -> str:
-    """The lines of a result as a table; `map_` tells what eps is, where it is not Kahan's."""
+def result_html(result: Any, map_: MapFamily | None = None) -> str:
+    """The lines of a result as a table; give `map_` where the result does not know its map."""
 
     def shown(cell: object) -> str:
-        if isinstance(cell, Shown):
+        if isinstance(cell, HtmlCell):
             return cell.html()
         text = str(cell).strip().removeprefix("# ")
         return markup.verdict(text) if text in markup.WORDS else _text(text)
 
-    rows = [[shown(cell) for cell in line] for line in islice(lines_of(found), _ROWS + 1)]
-    more = "\n<p>… and more: print shows all</p>" if len(rows) > _ROWS else ""
-    title, beside = _TITLES[type(found)](found)
+    rows = [[shown(cell) for cell in line] for line in islice(lines_of(result), _ROWS + 1)]
+    more = "\n<p>… print shows all lines</p>" if len(rows) > _ROWS else ""
+    title, subtitle = _TITLES[type(result)](result)
     if map_ is not None:
-        beside = eps_sentence(found.eps, map_)
-    return markup.titled(title, (markup.table((), rows[:_ROWS]) if rows else "<p>none</p>") + more, beside)
+        subtitle = eps_sentence(result.eps, map_)
+    return markup.titled(title, (markup.table((), rows[:_ROWS]) if rows else "<p>none</p>") + more, subtitle)
 
 
 def _text(text: str, width: int = _TEXT) -> str:
@@ -109,7 +109,7 @@ def _text(text: str, width: int = _TEXT) -> str:
 
 
 def analysis_title(found: Analysis) -> str:
-    """The system, its dimension and parameters, and for which eps the report is."""
+    """The title of a report: the system, its dimension and parameters, and eps."""
     step = eps_told(found.eps, found.file.map)
     values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
     formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
@@ -117,7 +117,7 @@ def analysis_title(found: Analysis) -> str:
 
 
 def analysis_head(found: Analysis) -> str:
-    """What stands above the sections: the title, the equations, what the words mean."""
+    """The head of the report: the title, the equations, and the meaning of the words."""
     return f"analyze: {analysis_title(found)}\n{found.file.map}\n{WORDS}"
 
 
@@ -125,8 +125,8 @@ def analysis_head(found: Analysis) -> str:
 def analysis_text(found: Analysis) -> str:
     """The whole report."""
     lines = [analysis_head(found)]
-    for name, told in found.sections:
-        lines += ["", name, *(f"{line.status}\t{line.text}" for line in told)]
+    for title, statements in found.sections:
+        lines += ["", title, *(f"{line.status}\t{line.text}" for line in statements)]
     return "\n".join([*lines, "", "verdict", f"{found.conclusion.kind}\t{found.conclusion.sentence}", found.work])
 
 
@@ -151,19 +151,19 @@ def analysis_html(found: Analysis) -> str:
 
 @lines_of.register
 def _integrals(found: IntegralSearch) -> Iterator[Line]:
-    """Every formula with its verdict and what that rests on, then why there are no more."""
+    """Every formula with its verdict and evidence, then the reason why there are no more."""
     return _formulas([(one.name, one, "") for one in found.integrals], (found.note, found.reason))
 
 
 @lines_of.register
 def _densities(found: DensitySearch) -> Iterator[Line]:
-    """The formula with its verdict and what that rests on, then what more there is, or why there is none."""
+    """The formula with its verdict and evidence, then further densities, or the reason why there is none."""
     return _formulas([("phi", one, "") for one in found.shown], (found.further, found.note, found.reason))
 
 
 @lines_of.register
 def _tensors(found: PoissonSearch) -> Iterator[Line]:
-    """Every tensor with its verdict and what is known of it, then why there are no more."""
+    """Every tensor with its verdict and properties, then the reason why there are no more."""
     named = [(one.name, one, f"{one.statement}; ") for one in found.tensors]
     return _formulas(named, (found.note, found.reason))
 
@@ -176,9 +176,9 @@ def _formulas(named: Sequence[tuple[str, Any, str]], notes: Sequence[str]) -> It
     yield from (("note", text) for text in notes if text)
 
 
-def _brackets(one: Any) -> Shown:
+def _brackets(one: Any) -> HtmlCell:
     brackets = islice(one.tensor.brackets.items(), _ROWS)
-    return Shown(
+    return HtmlCell(
         one.text, lambda: "<br/>".join(formula(entry, f"{{{a},{b}}}", CHARACTERS) for (a, b), entry in brackets)
     )
 
@@ -214,13 +214,13 @@ def _structures(found: ConstantStructures) -> Iterator[Line]:
 
 @lines_of.register
 def _growth(found: DegreeGrowth | Scan) -> Iterator[Line]:
-    """The lines that it has itself."""
+    """The lines of its `text`."""
     return (line.split("\t") for line in found.text.split("\n"))
 
 
 @lines_of.register
 def _heights(found: HeightSurvey) -> Iterator[Line]:
-    """A line for each orbit, and what they say together."""
+    """A line for each orbit, and the conclusion from all of them."""
     for orbit in found.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
         yield "orbit", *([f"eps {orbit.eps}"] if found.has_eps else []), f"start {point}", orbit.growth.text
@@ -253,13 +253,13 @@ def _census(census: Census) -> Iterator[Line]:
 
 @lines_of.register
 def _singularities(run: SingularityRun) -> Iterator[Line]:
-    """The denominator, and each hypersurface with its outcome."""
+    """The denominator, and each exceptional hypersurface with its outcome."""
     yield (f"# map of degree {run.map_degree}, {run.text}",)
     if run.word is not None:
         yield (f"# {run.word.text}",)
     yield "denominator", run.denominator
     for found in run.hypersurfaces:
-        kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
+        kind = f"degree {found.degree}" + (", factor of the denominator" if found.is_pole else "")
         kind += " in all" if found.polynomial == "?" else ""
         kind += "" if found.stage is None else f", of map {found.stage + 1}"
         outcome = found.status + (f": {found.note}" if found.note else "")
@@ -272,7 +272,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
         if found.steps:
             ranks = " ".join(str(step.rank) for step in found.steps)
             poles = " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
-            yield f"  ranks {ranks}", f"poles {poles}"
+            yield f"  ranks {ranks}", f"pole orders {poles}"
 
 
 # -- symmetries
@@ -280,7 +280,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
 
 @lines_of.register
 def _symmetries(found: Symmetries) -> Iterator[Line]:
-    """One-parameter groups, a scaling, the finite group by its generators, and what was searched."""
+    """One-parameter groups, a scaling, the finite group by its generators, and the completed searches."""
     for x in found.infinitesimal:
         kind = "linear" if x.is_linear else "affine"
         yield "one-parameter group", f"{kind}, the flow of ({', '.join(x.rhs)})"
@@ -288,27 +288,27 @@ def _symmetries(found: Symmetries) -> Iterator[Line]:
         rhs = ", ".join(found.scaling.rhs)
         yield "scaling", f"the flow of ({rhs}) by t takes the map at eps to that at e^-t eps"
     if found.order is not None:
-        yield "group", found.group_text or "the identity alone"
+        yield "group", found.group_text or "only the identity"
     elements = [("generator", t) for t in found.generators]
-    elements += [("besides", t) for t in found.others if found.group_of != MATRICES]
+    elements += [("further", t) for t in found.others if found.group_of != MATRICES]
     for name, t in elements:
-        yield name, f"{t.kind} {t.text}", *["obvious"] * t.obvious
+        yield name, f"{t.kind} {t.text}", *["trivial"] * t.is_trivial
     yield from (("searched", sentence) for sentence in found.searched)
-    yield (f"# {'complete: every search came to its end' if found.complete else f'undecided: {found.undecided[0]}'}",)
+    yield (f"# {'complete: every search was completed' if found.complete else f'undecided: {found.undecided[0]}'}",)
 
 
 @lines_of.register
 def _commuting(found: CommutingSystems) -> Iterator[Line]:
-    """The g that commute other than 0, f and -f, each with g as options of any other command."""
+    """The g that commute, except 0, f and -f, each written as options of a command."""
     if found.dimension is not None:
         yield "bracket", f"the g with [f, g] = 0 have dimension {found.dimension}"
     if found.every_g_commutes:
         yield "proved", "f = 0 and its map is x -> x: every g commutes"
-    told: list[QuadraticSystem] = []
+    listed: list[QuadraticSystem] = []
     for g in found.nontrivial:
-        if g.system.scaled(-1) not in told:
-            told.append(g.system)
-            yield g.finding.verdict, "g and -g", _pasted(g, found.root)
+        if g.system.scaled(-1) not in listed:
+            listed.append(g.system)
+            yield g.finding.verdict, "g and -g", _as_options(g, found.root)
             yield "", g.finding.evidence.summary
     for family in found.families:
         letters = [f"t{k + 1}" for k in range(len(family.directions))]
@@ -316,7 +316,7 @@ def _commuting(found: CommutingSystems) -> Iterator[Line]:
         total = " + ".join(f"{t}*g{k + 1}" for k, t in enumerate(letters))
         yield family.finding.verdict, "family", f"g = {base}{total} for all {', '.join(letters)}"
         named = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
-        yield from (("", name, _pasted(g, found.root)) for name, g in named)
+        yield from (("", name, _as_options(g, found.root)) for name, g in named)
         yield "", family.finding.evidence.summary
     if found.irrational:
         yield "note", f"more solutions, not rational: {'; '.join(found.irrational)}"
@@ -327,15 +327,15 @@ def _commuting(found: CommutingSystems) -> Iterator[Line]:
     if found.every_g_commutes:
         yield ("# complete: every g commutes",)
     elif found.complete:
-        listed = bool(told or found.families or found.irrational)
-        but = "these, 0, f and -f" if listed else "0, f and -f"
-        yield (f"# complete: among the {found.kind_text} only {but} commute with f",)
+        has_others = bool(listed or found.families or found.irrational)
+        which = "these, 0, f and -f" if has_others else "0, f and -f"
+        yield (f"# complete: among the {found.kind_text} only {which} commute with f",)
     else:
         yield (f"# undecided: there may be more; {found.undecided[0]}",)
 
 
-def _pasted(g: CommutingField, root: str) -> Shown:
-    """The system as options of any other command, and B below it where g = B f; in a notebook its equations."""
+def _as_options(g: CommutingField, root: str) -> HtmlCell:
+    """The system as options of a command, and B below it where g = B f; in a notebook its equations."""
     texts = [f"--rhs='{text}'" for text in g.rhs]
     text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
     if root:
@@ -343,19 +343,19 @@ def _pasted(g: CommutingField, root: str) -> Shown:
     if g.B is not None:
         rows = [", ".join(map(str, row)) for row in g.B.tolist()]
         text += f"\n\tB = [{', '.join(f'[{row}]' for row in rows)}]"
-    return Shown(text, lambda: equations_html(g.system, CHARACTERS // 4))
+    return HtmlCell(text, lambda: equations_html(g.system, CHARACTERS // 4))
 
 
 # -- titles
 
 
-def _about(what: str, found: Any, *beside: str) -> tuple[str, str]:
-    """A title with the name of the system, and what stands beside it, for which eps last."""
-    words = (*beside, eps_sentence(found.eps, found.file.map))
+def _about(what: str, found: Any, *subtitle: str) -> tuple[str, str]:
+    """A title with the name of the system, and a subtitle that ends with eps."""
+    words = (*subtitle, eps_sentence(found.eps, found.file.map))
     return f"{what} of {markup.shortened(found.file.name)}", "; ".join(filter(None, words))
 
 
-# What has a title here is shown by its lines: the title, and what stands beside it.
+# Titles and subtitles of the results that are displayed by their lines.
 _TITLES: dict[type, Callable[[Any], tuple[str, str]]] = {
     IntegralSearch: lambda found: _about("integrals", found, f"{found.formula_count} found; {found.count_text}"),
     DensitySearch: lambda found: _about("densities", found, "dx/phi is invariant"),

@@ -19,7 +19,7 @@ WORDS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
     "supported": ("≈", "#0e8fa8"),
-    "explained": ("≋", "#0e8fa8"),
+    "derived": ("≋", "#0e8fa8"),
     "measured": ("~", "#3f7ae0"),
     "estimated": ("?", "#b8860b"),
     "refuted": ("✗", "#e0353f"),

@@ -74,7 +74,7 @@ def scan_parameters(
         "confirmed": sum(one.is_confirmed for one in found.components),
         "integrable": [one.text for kind, some in kinds if kind != "exponential" for one in some if one.is_confirmed],
         "generic": list(found.generic),
-        "left": max(found.left, default=0),
+        "unassigned": max(found.unassigned, default=0),
     }, found
 
 

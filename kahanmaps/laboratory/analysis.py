@@ -1,8 +1,9 @@
-"""Everything about one map as one report: what is preserved, how it grows, what it belongs to, and a verdict.
+"""The analysis of one map: what it preserves, how fast its iterates grow in complexity, and a verdict.
 
-The analysis is given the map only; what a file claims of its system is not read. Every statement carries
-how it is known: proved or supported (formulas, as identities in x and eps), or measured (modulo primes, or on orbits).
-The number of integrals and the growth are two separate findings: a map may have many integrals and grow exponentially.
+The analysis uses the map only, and ignores what a file claims about its system. Every statement carries how it is
+known: proved or supported (formulas, as identities in x and eps), derived (from the measured singularity patterns), or
+measured (modulo primes, or along orbits). The number of integrals and the growth are determined independently of each
+other: a map may have many integrals and grow exponentially.
 """
 
 from __future__ import annotations
@@ -23,74 +24,74 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import KahanmapsError
-from kahanmaps.laboratory.analyses.part import Part, Run
+from kahanmaps.laboratory.analyses.step import AnalysisContext, AnalysisStep
 from kahanmaps.laboratory.analyses.table import ANALYSES, TITLES
+from kahanmaps.laboratory.analysis_result import AnalysisResult, Statement
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
-from kahanmaps.laboratory.findings import Findings, Statement
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import end_with_parent, processors
 
-# Units of work at effort 1 by dimension, for the parts that read integrals, and once more for the others.
-# Most maps take a small part of them.
+# Units of work at effort 1 by dimension: as many for the independent steps, and as many for the others.
+# Most maps use a small part of them.
 _UNITS = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
-_MOST_UNITS = 150e6
+_MAX_UNITS = 150e6
 
 
 @dataclass
-class Analysis(Findings, PrintableResult):
-    """What `analyze` found, and statements about it."""
+class Analysis(AnalysisResult, PrintableResult):
+    """The result of `analyze`, with the statements about it."""
 
-    parts: tuple[Part, ...] = ANALYSES
+    analyses: tuple[AnalysisStep, ...] = ANALYSES
     interrupted: bool = False
 
     def __getstate__(self) -> dict[str, Any]:
-        """For `pickle`, which has no names for the functions of the table: there the class says which parts."""
+        """The state for `pickle`, which cannot store the functions of the table; the default of the class is used."""
         return {name: value for name, value in vars(self).items() if value is not ANALYSES}
 
     @property
     def work(self) -> str:
-        """How much was to be done and was: effort 1, 12.3 million units."""
+        """The effort and the work done: effort 1, 12.3 million units."""
         return f"effort {self.effort}, {self.units / 1e6:.1f} million units"
 
     def interrupt(self, reason: str = "interrupted") -> None:
-        """Leave out the parts that are pending, for this reason: Ctrl-C, or that the time of a `time_limit` is over."""
-        self.skipped += [f"{part}: {reason}" for part in self.pending]
+        """Skip the steps that are pending, after Ctrl-C or at the end of a `time_limit`; `reason` is reported."""
+        self.skipped += [f"{name}: {reason}" for name in self.pending]
         self.pending.clear()
         self.interrupted = True
 
     @property
     def conclusion(self) -> Conclusion:
-        """The verdict; integrability and the number of integrals are told apart."""
+        """The verdict on integrability, the number of integrals and the growth."""
         return conclude(self)
 
     @property
     def sections(self) -> list[tuple[str, list[Statement]]]:
-        """The report: titles and their statements, those that have some."""
+        """The sections of the report that have statements: titles and statements."""
         return self._sections(self._titled)
 
     @property
     def final_sections(self) -> list[tuple[str, list[Statement]]]:
-        """The first of them, up to the one that is not complete yet."""
-        waiting = (k for k, part in enumerate(self._titled) if {part.name, *part.reads}.intersection(self.pending))
+        """The sections before the first one that a pending step may still change."""
+        waiting = (k for k, step in enumerate(self._titled) if {step.name, *step.requires}.intersection(self.pending))
         return self._sections(self._titled[: next(waiting, None)])
 
     @property
-    def _titled(self) -> list[Part]:
-        """The parts with statements, in the order of the report."""
-        titled = [part for part in self.parts if part.statements is not None]
-        return sorted(titled, key=lambda part: TITLES.index(part.title) if part.title in TITLES else len(TITLES))
+    def _titled(self) -> list[AnalysisStep]:
+        """The steps with statements, in the order of the report."""
+        titled = [step for step in self.analyses if step.statements is not None]
+        return sorted(titled, key=lambda step: TITLES.index(step.title) if step.title in TITLES else len(TITLES))
 
-    def _sections(self, parts: Sequence[Part]) -> list[tuple[str, list[Statement]]]:
-        told = [(part.title, list(part.statements(self))) for part in parts if part.statements is not None]
+    def _sections(self, steps: Sequence[AnalysisStep]) -> list[tuple[str, list[Statement]]]:
+        sections = [(step.title, list(step.statements(self))) for step in steps if step.statements is not None]
         skipped = [] if self.pending else [Statement(Certainty.NOTE, text) for text in self.skipped]
-        return [(title, lines) for title, lines in (*told, ("not done", skipped)) if lines]
+        return [(title, lines) for title, lines in (*sections, ("not done", skipped)) if lines]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each statement, for `pandas.DataFrame(found.rows())` and the like."""
-        told = ((name, line) for name, lines in self.sections for line in lines)
-        return [{"section": name, "status": line.status, "text": line.text} for name, line in told]
+        """A row for each statement, for `pandas.DataFrame(analysis.rows())` and the like."""
+        statements = ((title, line) for title, lines in self.sections for line in lines)
+        return [{"section": title, "status": line.status, "text": line.text} for title, line in statements]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: the verdict, the statements, and all results."""
@@ -120,7 +121,7 @@ class Analysis(Findings, PrintableResult):
                 for line in lines
             ],
             "divergence": format_polynomial(self.file.system.divergence) if self.file.is_quadratic else None,
-            **{key: value for part in self.parts for key, value in part.to_json(self).items()},
+            **{key: value for step in self.analyses for key, value in step.to_json(self).items()},
             "skipped": self.skipped,
             "document": dict(self.file.document),
         }
@@ -135,114 +136,118 @@ def analyze(
     effort: int = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
-    reached: Callable[[Analysis], None] = lambda _: None,
-    parts: Sequence[Part] = ANALYSES,
+    on_result: Callable[[Analysis], None] = lambda _: None,
+    analyses: Sequence[AnalysisStep] = ANALYSES,
     processes: int = 1,
 ) -> Analysis:
-    """What a map preserves and how it grows, within a budget of counted work.
+    """Determine what a map preserves and how fast its iterates grow in complexity, within a budget of counted work.
 
     Args:
-        system: the map, of a differential equation its Kahan map; its claims and facts are not looked at. With an
-            algebraic parameter what is not done over a number field is named in `skipped`.
+        system: the map; a differential equation stands for its Kahan map. Claims and facts of a file are ignored. With
+            an algebraic parameter, steps that do not apply over a number field are named in `skipped`.
         symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
-        eps: an exact number, to analyse the map at that eps only; None for every eps.
+        eps: an exact number, to analyse the map at that eps only; None for every eps. eps is half the time step.
         time_step: 2 eps, in its place.
-        effort: 1, or more: each more doubles the work that searches may take, each less halves it.
-        seed: of everything random.
-        progress: is told what is being done.
-        reached: gets what is known, at the beginning and after each part.
-        parts: the analyses to do, in this order; the verdict rests on these.
-        processes: 1, or more: then a forked copy of this process does those that need no integrals, where there is a
-            second processor (on Linux only; what runs in other threads should bear a fork). The answers are the same.
+        effort: an integer; each increase by 1 doubles the work that searches may take.
+        seed: the random seed.
+        progress: called with a message whenever the analysis turns to something else.
+        on_result: called with the results so far, at the beginning and after each step.
+        analyses: the steps to run, in this order; the verdict rests on their results only.
+        processes: 1, or more: then a forked copy of this process runs the independent steps, where there is a second
+            processor (on Linux only; other threads must tolerate a fork). The results are the same.
 
     Returns:
-        An `Analysis`, the same on any machine at any load. Parts that could not be done are named in `skipped`.
-        Ctrl-C and a `time_limit` end it with an exception; what `reached` got last is then all that was completed.
+        An `Analysis`, the same on any machine at any load. Steps that were not completed are named in `skipped`.
+        Ctrl-C and a `time_limit` end it with an exception; the last argument of `on_result` then has all that was
+        completed.
 
     Raises:
         InputError: for eps = 0, unknown symbols, and an effort that is no integer from -20 to 40.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = analyze(load("nahm_tetrahedral"))
-    >>> found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth
+    >>> analysis = analyze(load("nahm_tetrahedral"))
+    >>> analysis.conclusion.kind, analysis.conclusion.integrals, analysis.conclusion.growth
     ('integrable', 1, 'quadratic')
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
-    laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses what is wrong before any work
-    units = units_at(effort, _UNITS.get(file.dim, _MOST_UNITS))
-    found = Analysis(file, laboratory.eps, effort, seed, laboratory.free_symbols, parts=tuple(parts))
-    found.defect = laboratory.defect if file.is_quadratic else ""
-    run = Run(found, laboratory, symbols, progress)
-    todo = sorted(filter(run.applies, parts), key=lambda part: run.dim > part.slow_above)
-    found.pending = [part.name for part in todo]
-    reached(found)
+    laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses wrong arguments before any work
+    units = units_at(effort, _UNITS.get(file.dim, _MAX_UNITS))
+    analysis = Analysis(file, laboratory.eps, effort, seed, laboratory.free_symbols, analyses=tuple(analyses))
+    analysis.defect = laboratory.defect if file.is_quadratic else ""
+    context = AnalysisContext(analysis, laboratory, symbols, progress)
+    steps = sorted(filter(context.applies, analyses), key=lambda step: context.dim > step.slow_above)
+    analysis.pending = [step.name for step in steps]
+    on_result(analysis)
     can_fork = processes > 1 and processors() > 1 and sys.platform == "linux"
-    apart = [part for part in todo if part.is_apart and can_fork]
+    forked = [step for step in steps if step.is_independent and can_fork]
     skipped: dict[str, str] = {}
-    # Parts that may be done apart have a budget of their own, so that it is the same with one process and with two.
+    # Independent steps have a budget of their own, so that it is the same with one process and with two.
     accounts = {
-        is_apart: _Account(run, [part for part in todo if part.is_apart is is_apart], units)
-        for is_apart in (False, True)
+        is_independent: _Account(context, [step for step in steps if step.is_independent is is_independent], units)
+        for is_independent in (False, True)
     }
-    with _second_process(run, apart, accounts[True]) as outcomes:
-        here, there = [part for part in todo if part not in apart], list(apart)
+    with _second_process(context, forked, accounts[True]) as outcomes:
+        here, there = [step for step in steps if step not in forked], list(forked)
         while here or there:
-            has_come = bool(there) and (not here or outcomes.poll())
-            part, outcome = (there if has_come else here).pop(0), None
-            progress(part.name)
-            if has_come:
-                with suppress(EOFError, OSError):  # the process was killed, or met an error, which it meets here again
+            has_arrived = bool(there) and (not here or outcomes.poll())
+            step, outcome = (there if has_arrived else here).pop(0), None
+            progress(step.name)
+            if has_arrived:
+                # The process was killed, or met an error, which this process meets again.
+                with suppress(EOFError, OSError):
                     outcome = outcomes.recv()
-            account = accounts[part.is_apart]
-            result, reason, spent = outcome or account.outcome(part)
-            account.book(part, spent)  # what the other process spent as well: this one may have to go on in its place
-            found.units += spent
+            account = accounts[step.is_independent]
+            result, reason, spent = outcome or account.run(step)
+            account.book(step, spent)  # also the work of the other process, as this one may have to take over from it
+            analysis.units += spent
             if reason:
-                skipped[part.name] = f"{part.name}: {reason}"
-                found.skipped = [skipped[one.name] for one in todo if one.name in skipped]
+                skipped[step.name] = f"{step.name}: {reason}"
+                analysis.skipped = [skipped[step.name] for step in steps if step.name in skipped]
             else:
-                found[part.result] = result
-            found.pending.remove(part.name)
-            reached(found)
-    if others := ", ".join(part.name for part in parts if not run.applies(part)):
-        if run.root is not None:
-            found.skipped.append(f"over the number field {run.root.number_field}: {others}, integrals in iterates")
+                analysis[step.key] = result
+            analysis.pending.remove(step.name)
+            on_result(analysis)
+    if others := ", ".join(step.name for step in analyses if not context.applies(step)):
+        if context.root is not None:
+            analysis.skipped.append(
+                f"over the number field {context.root.number_field}: {others}, integrals in iterates"
+            )
         else:
-            found.skipped.append(f"{others}: for fields only")
-    return found
+            analysis.skipped.append(f"{others}: for vector fields only")
+    return analysis
 
 
 class _Account:
-    """The units that parts share, one after the other: what one leaves goes to those after it."""
+    """The units of work that several steps share, one after the other: what one leaves goes to those after it."""
 
-    def __init__(self, run: Run, parts: Sequence[Part], units: float) -> None:
-        self.run, self.waiting, self.units = run, list(parts), units
+    def __init__(self, context: AnalysisContext, steps: Sequence[AnalysisStep], units: float) -> None:
+        self.context, self.waiting, self.units = context, list(steps), units
 
-    def outcome(self, part: Part) -> tuple[Any, str, int]:
-        """What a part found; or None, and why it was not done; and the units that it took."""
+    def run(self, step: AnalysisStep) -> tuple[Any, str, int]:
+        """The result of a step, or None and the reason why there is none; and the units that it took."""
         if self.units <= 0:
             return None, SPENT, 0
-        budget = Budget(self.units * self.run.weight(part) / sum(map(self.run.weight, self.waiting)))
+        budget = Budget(self.units * self.context.weight(step) / sum(map(self.context.weight, self.waiting)))
         try:
-            result, reason = part.look(self.run, **self.run.given(part, budget)), ""
+            result, reason = self.context.run(step, budget), ""
         except KahanmapsError as error:
             result, reason = None, str(error)
         return result, reason, budget.spent
 
-    def book(self, part: Part, spent: int) -> None:
-        """The part is done, and this is what it took."""
-        self.waiting.remove(part)
+    def book(self, step: AnalysisStep, spent: int) -> None:
+        """Remove a step that has run, and subtract the units that it took."""
+        self.waiting.remove(step)
         self.units -= spent
 
 
 @contextmanager
-def _second_process(run: Run, parts: Sequence[Part], account: _Account) -> Iterator[Connection]:
-    """A copy of this process that does the parts, if there are any, and sends their outcomes; it ends with the block.
+def _second_process(context: AnalysisContext, steps: Sequence[AnalysisStep], account: _Account) -> Iterator[Connection]:
+    """Run steps in a forked process, if there are any, and yield the connection for their outcomes.
 
-    As a copy it has the map and all functions without being told; what it finds comes back as pickles.
+    The fork inherits the map and all functions; results come back as pickles. The process ends with the block.
     """
     parent, (receiver, sender) = os.getpid(), Pipe(duplex=False)
-    if not parts:
+    if not steps:
         yield receiver
         return
 
@@ -250,17 +255,17 @@ def _second_process(run: Run, parts: Sequence[Part], account: _Account) -> Itera
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the first process
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         end_with_parent(parent)
-        run.progress = lambda _: None
+        context.progress = lambda _: None
         with suppress(Exception):
-            for part in parts:
-                result, reason, spent = account.outcome(part)
-                account.book(part, spent)
+            for step in steps:
+                result, reason, spent = account.run(step)
+                account.book(step, spent)
                 if not reason:
-                    run.found[part.result] = result
+                    context.result[step.key] = result
                 sender.send((result, reason, spent))
 
     process = get_context("fork").Process(target=work, daemon=True)
-    with suppress(OSError):  # no memory for one more process, or too many: then all is done here
+    with suppress(OSError):  # too little memory, or too many processes: then the first process does all
         process.start()
     try:
         sender.close()  # so that the end of the process is the end of the pipe

@@ -1,7 +1,7 @@
-"""The verdict on a map: what all that was found says of its integrability, and what this rests on.
+"""The verdict on a map: what the results say about its integrability, and on which evidence.
 
-Degrees, singularities, integrals and heights are found independently of each other, and each within limits of its own.
-What is proved stands. Where two measurements exclude each other, neither is a finding.
+Degrees, singularities, integrals and heights are computed independently of each other, each within limits of its own.
+Proved results stand. Where two measurements contradict each other, the verdict relies on neither.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from kahanmaps.checks.claims import Certainty
 from kahanmaps.errors import counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.findings import Findings
+from kahanmaps.laboratory.analysis_result import AnalysisResult
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.preserve.poisson.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.outcomes import CONFINED
@@ -30,10 +30,11 @@ class Conclusion:
     defined) or "undecided".
 
     `sense` says more exactly what is meant: "superintegrable" (one integral less than the dimension, proved),
-    "Liouville integrable" (proved), "integrable in the sense of complexity", "not integrable", "confining and not
-    integrable", else the kind. `ground` is what the verdict rests on: "proved", "explained" (by the patterns of
-    singularities), "measured" or "estimated"; empty where there is no verdict. `integrals` is the number of independent
-    integrals known or shown by orbits, `growth` the kind of degree growth.
+    "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable",
+    "confining and not integrable", else the kind. `ground` is how the verdict is known: "proved", "derived" (from the
+    measured singularity patterns), "measured" or "estimated"; empty where there is no verdict.
+    `integrals` is the number of independent integrals that are known or shown by orbits, `growth` the kind of growth of
+    the degrees.
     """
 
     kind: str
@@ -52,47 +53,47 @@ class _Verdict(NamedTuple):
 
 
 class _Facts:
-    """What was found, and the phrases that several verdicts have in common."""
+    """The results, and phrases that several verdicts share."""
 
-    def __init__(self, found: Findings) -> None:
-        degrees = found.degrees
-        self.found, self.degrees, self.count = found, degrees, found.integral_count
+    def __init__(self, result: AnalysisResult) -> None:
+        degrees = result.degrees
+        self.result, self.degrees, self.count = result, degrees, result.integral_count
         self.growth = degrees.growth if degrees is not None else Growth.UNKNOWN
         self.grown = degrees.known if degrees is not None else Certainty.MEASURED
         self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
         self.basis = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
-        # How many integrals there are; where that is a lower bound, the sentence says so.
-        where = f" in dimension {found.dim}"
+        # The number of integrals, or a lower bound.
+        where = f" in dimension {result.dim}"
         number = counted(self.count, "independent integral") if self.count else "no integral"
-        self.integrals = number + where if found.count_is_exact else f"at least {number}{where}"
-        if not found.integrals_were_counted:
+        self.integrals = number + where if result.count_is_exact else f"at least {number}{where}"
+        if not result.integrals_were_counted:
             self.integrals = "the integrals were not counted"
-        elif not self.count and found.integrals is not None and not found.count_is_exact:
-            degree = found.integrals.profile.degree
+        elif not self.count and result.integrals is not None and not result.count_is_exact:
+            degree = result.integrals.profile.degree
             self.integrals = f"no integral{where} up to degree {degree} (relations along orbits)"
-        period = found.integrals.profile.period if found.integrals is not None else None
+        period = result.integrals.profile.period if result.integrals is not None else None
         self.closes = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
-        self.is_linear = found.file.is_quadratic and found.file.system.degree <= 1
-        self.liouville = ""  # by what the map is Liouville integrable, proved
-        if found.dim > 2 and not self.is_linear:
-            for one in reversed(found.poisson.tensors if found.poisson is not None else ()):
-                proved = (one.verdict, one.jacobi, one.involution)
-                if one.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in proved):
-                    self.liouville = f"with the Poisson tensor {one.name}"
-            if isinstance(found.normal_form, SystemNormalForm):
+        self.is_linear = result.file.is_quadratic and result.file.system.degree <= 1
+        self.liouville = ""  # why the map is Liouville integrable; only if proved
+        if result.dim > 2 and not self.is_linear:
+            for tensor in reversed(result.poisson.tensors if result.poisson is not None else ()):
+                proved = (tensor.verdict, tensor.jacobi, tensor.involution)
+                if tensor.is_liouville_integrable and all(verdict is Certainty.PROVED for verdict in proved):
+                    self.liouville = f"with the Poisson tensor {tensor.name}"
+            if isinstance(result.normal_form, SystemNormalForm):
                 self.liouville = "as a member of the commuting family"
 
 
-def conclude(found: Findings) -> Conclusion:
-    """The verdict on what was found: the first of `_RULES` that says something."""
-    facts = _Facts(found)
-    verdict = next(said for rule in _RULES if (said := rule(facts)))
+def conclude(result: AnalysisResult) -> Conclusion:
+    """The verdict on the results: that of the first rule in `_RULES` that applies."""
+    facts = _Facts(result)
+    verdict = next(verdict for rule in _RULES if (verdict := rule(facts)))
     sentence = verdict.sentence
-    if found.eps is not None:
-        sentence += f" All this at eps = {found.eps} only: other eps may differ."
-    if found.symbols:
-        parts = "integrals" if found.densities is None else "integrals and densities"
-        sentence += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
+    if result.eps is not None:
+        sentence += f" All this holds at eps = {result.eps}; other eps may differ."
+    if result.symbols:
+        parts = "integrals" if result.densities is None else "integrals and densities"
+        sentence += f" The {parts} hold for every {', '.join(result.symbols)}, all else for the given values."
     if facts.liouville:
         sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
     sense, ground, growth = (
@@ -101,7 +102,7 @@ def conclude(found: Findings) -> Conclusion:
         facts.growth,
     )
     if verdict.kind == "not integrable":
-        growth = Growth.EXPONENTIAL  # also where that is estimated only
+        growth = Growth.EXPONENTIAL  # also where this is only estimated
     return Conclusion(verdict.kind, facts.count, str(growth), sentence, sense, ground)
 
 
@@ -115,7 +116,7 @@ def _nowhere_defined(facts: _Facts) -> _Verdict | None:
 def _linear(facts: _Facts) -> _Verdict | None:
     if not facts.is_linear:
         return None
-    eps, B = facts.found.eps, facts.found.file.system.B
+    eps, B = facts.result.eps, facts.result.file.system.B
     if eps is not None and (QQ.identity(B.nrows()) - B * eps).det() == 0:
         return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Certainty.PROVED)
     proof = None if facts.degrees is None else facts.degrees.proof
@@ -127,17 +128,17 @@ def _linear(facts: _Facts) -> _Verdict | None:
 
 
 def _contradictory(facts: _Facts) -> _Verdict | None:
-    if not (said := contradictions(facts.found)):
+    if not (sentences := contradictions(facts.result)):
         return None
-    sentence = f"The findings do not agree: {'; '.join(said)}. {_capital(facts.integrals)}."
+    sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capital(facts.integrals)}."
     return _Verdict("undecided", sentence, ground=None)
 
 
 def _not_birational(facts: _Facts) -> _Verdict | None:
-    """What degrees and closed orbits mean is known of birational maps; a constant map needs no theorem."""
-    if not facts.found.defect or facts.growth is Growth.ZERO:
+    """Degrees and closed orbits have a meaning for birational maps only; a constant map needs no theorem."""
+    if not facts.result.defect or facts.growth is Growth.ZERO:
         return None
-    return _Verdict("undecided", f"{_capital(facts.found.defect)}; {facts.phrase}.", ground=None)
+    return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.phrase}.", ground=None)
 
 
 def _linearisable(facts: _Facts) -> _Verdict | None:
@@ -153,57 +154,58 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
     if facts.growth is not Growth.BOUNDED:
         return None
     bounded = f"The degrees of the iterates are bounded{facts.basis}"
-    sentence = f"{bounded}: the map is linearisable in the sense of complexity; {facts.integrals}."
+    sentence = f"{bounded}: the map is linearisable in the sense of bounded degrees; {facts.integrals}."
     return _Verdict("linearisable", sentence, ground=facts.grown)
 
 
 def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
-    """Where a dynamical degree above 1 is proved."""
-    found = facts.found
+    """Maps with a dynamical degree above 1, proved."""
+    result = facts.result
     if facts.degrees is None or facts.degrees.enclosure is None:
         return None
     bound = f"the dynamical degree is at least {facts.degrees.enclosure.lower}"
-    where = "" if found.eps is not None or not found.file.map.has_eps else ", for all but finitely many eps"
+    where = "" if result.eps is not None or not result.file.map.has_eps else ", for all but finitely many eps"
     sentence = (
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
         f"function is an integral; {facts.phrase}{facts.basis}."
     )
-    return _Verdict("not integrable", sentence, _confining(found), Certainty.PROVED)
+    return _Verdict("not integrable", sentence, _confining(result), Certainty.PROVED)
 
 
 def _on_curves(facts: _Facts) -> _Verdict | None:
-    """Where the orbits lie on curves, proved; or not, of maps whose growth is not known."""
-    found, proved = facts.found, 0
-    if found.integrals is not None:  # independent ones
-        proved = sum(verdict is Certainty.PROVED for _, verdict in found.integrals.formulas)
-        proved = max(proved, 0 if found.integrals.symbols else found.integrals.by_theorems)
-    if found.dim > 1 and proved >= found.dim - 1:
-        sense = "superintegrable" if found.dim > 2 else "integrable"
-        genus = found.pencil.genus if found.pencil is not None else None
-        if genus is None and found.dim == 2:  # the growth tells it where it was not computed
+    """Maps whose orbits lie on curves: proved, or supported if the growth is not known."""
+    result, proved = facts.result, 0
+    if result.integrals is not None:  # independent ones
+        proved = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
+        proved = max(proved, 0 if result.integrals.symbols else result.integrals.by_theorems)
+    if result.dim > 1 and proved >= result.dim - 1:
+        sense = "superintegrable" if result.dim > 2 else "integrable"
+        genus = result.pencil.genus if result.pencil is not None else None
+        if genus is None and result.dim == 2:  # not computed, but determined by the growth
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
         sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
         return _Verdict("integrable", sentence, sense, Certainty.PROVED)
-    on_curves = orbits_lie_on_curves(found)
+    on_curves = orbits_lie_on_curves(result)
     if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
         return None
     curves = ", so that orbits lie on curves" if on_curves else ""
-    sentence = f"Integrable: {facts.integrals}{curves}; of the degrees: {facts.phrase}."
+    sentence = f"Integrable: {facts.integrals}{curves}; degrees: {facts.phrase}."
     return _Verdict("integrable", sentence, *_sense(facts.liouville))
 
 
 def _by_growth(facts: _Facts) -> _Verdict | None:
-    """Exponential and polynomial growth, measured or explained."""
+    """Exponential and polynomial growth, measured or derived."""
     count, integrals = facts.count, facts.integrals
     exact = facts.growth is Growth.EXPONENTIAL  # else the phrase says that it is estimated
     if exact or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
-        sentence = f"Not integrable in the sense of complexity: {facts.phrase}{facts.basis if exact else ''}{although}."
+        growth = f"{facts.phrase}{facts.basis if exact else ''}"
+        sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{although}."
         ground = facts.grown if exact else Certainty.ESTIMATED
-        return _Verdict("not integrable", sentence, _confining(facts.found), ground)
+        return _Verdict("not integrable", sentence, _confining(facts.result), ground)
     if facts.growth in _POLYNOMIAL:
-        sentence = f"Integrable in the sense of complexity: {facts.phrase}{facts.basis}; {integrals}."
+        sentence = f"Integrable in the sense of zero algebraic entropy: {facts.phrase}{facts.basis}; {integrals}."
         return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.grown))
     return None
 
@@ -212,7 +214,7 @@ def _undecided(facts: _Facts) -> _Verdict:
     return _Verdict("undecided", f"The growth is undecided: {facts.phrase}; {facts.integrals}.", ground=None)
 
 
-# The stronger ones first: what is proved before what is measured.
+# Stronger rules first: proved results before measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
     *(_nowhere_defined, _linear, _contradictory, _not_birational, _linearisable, _of_positive_entropy),
     *(_on_curves, _by_growth, _undecided),
@@ -222,12 +224,12 @@ _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
 def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tuple[str, Certainty | None]:
     if liouville:
         return "Liouville integrable", Certainty.PROVED
-    return "integrable in the sense of complexity", ground
+    return "integrable in the sense of zero algebraic entropy", ground
 
 
-def _confining(found: Findings) -> str:
-    """In which sense a map is not integrable: confinement is no proof of integrability."""
-    confined = {run.verdict for run in found.singularities} == {CONFINED}
+def _confining(result: AnalysisResult) -> str:
+    """The sense in which a map is not integrable: confinement does not prove integrability."""
+    confined = {run.verdict for run in result.singularities} == {CONFINED}
     return "confining and not integrable" if confined else "not integrable"
 
 
@@ -235,37 +237,41 @@ def _capital(sentence: str) -> str:
     return sentence[0].upper() + sentence[1:]
 
 
-def orbits_lie_on_curves(found: Findings) -> bool:
-    """Whether dim - 1 independent integrals are proved or supported: then degrees grow quadratically at most.
+def orbits_lie_on_curves(result: AnalysisResult) -> bool:
+    """Whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically.
 
-    For the map acts on each of the curves, which have genus 0 or 1 where it has infinite order.
+    The reason: the map acts on each of the curves, and these have genus 0 or 1 where it has infinite order.
     """
-    return found.integrals is not None and len(found.integrals.integrals) >= found.dim - 1 >= 1
+    return result.integrals is not None and len(result.integrals.integrals) >= result.dim - 1 >= 1
 
 
-def contradictions(found: Findings) -> list[str]:
-    """What excludes each other among integrals, closed orbits and degrees: sentences, none where all agree."""
-    growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-    period = found.integrals.profile.period if found.integrals is not None else None
-    said = []
-    if growth is Growth.EXPONENTIAL and orbits_lie_on_curves(found):
-        said.append("the degrees seem to grow exponentially, which they cannot where integrals leave curves only")
-    elif growth is Growth.EXPONENTIAL and isinstance(found.normal_form, SystemNormalForm):
-        said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
-    if found.degrees is not None and found.degrees.enclosure is not None and orbits_lie_on_curves(found):
-        said.append("positive algebraic entropy is proved, which excludes an integral")
-    if found.pencil is not None and (impossible := found.pencil.contradiction(growth)):
-        said.append(impossible)
+def contradictions(result: AnalysisResult) -> list[str]:
+    """Sentences on integrals, closed orbits and degrees that contradict each other; none if all agree."""
+    growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
+    period = result.integrals.profile.period if result.integrals is not None else None
+    sentences = []
+    if growth is Growth.EXPONENTIAL and orbits_lie_on_curves(result):
+        sentences.append(
+            "the degrees seem to grow exponentially, which they cannot if integrals confine orbits to curves"
+        )
+    elif growth is Growth.EXPONENTIAL and isinstance(result.normal_form, SystemNormalForm):
+        sentences.append(
+            "the degrees seem to grow exponentially, which they cannot for a member of the commuting family"
+        )
+    if result.degrees is not None and result.degrees.enclosure is not None and orbits_lie_on_curves(result):
+        sentences.append("positive algebraic entropy is proved, which excludes an integral")
+    if result.pencil is not None and (impossible := result.pencil.contradiction(growth)):
+        sentences.append(impossible)
     if period is not None and growth in (Growth.EXPONENTIAL, *_POLYNOMIAL):
-        said.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
-    return said
+        sentences.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
+    return sentences
 
 
-def doubt_of_heights(found: Findings) -> str:
-    """Why the growth of heights is no finding beside that of the degrees; empty where the two go together."""
-    if found.heights is None or found.degrees is None:
+def doubt_of_heights(result: AnalysisResult) -> str:
+    """The reason not to trust the growth of heights, given that of the degrees; empty if the two agree."""
+    if result.heights is None or result.degrees is None:
         return ""
-    kind, growth = found.heights.kind, found.degrees.growth
+    kind, growth = result.heights.kind, result.degrees.growth
     bounded = growth in (Growth.ZERO, Growth.BOUNDED)
     if bounded and kind in (Growth.QUADRATIC, Growth.EXPONENTIAL):
         reason = "the degrees are bounded"
@@ -275,9 +281,9 @@ def doubt_of_heights(found: Findings) -> str:
         reason = "the degrees grow exponentially"
     else:
         reason = ""
-    steps = max(len(orbit.growth.heights) for orbit in found.heights.orbits) - 1
-    last = max(found.degrees.patterns.lengths, default=0) if found.degrees.patterns is not None else 0
+    steps = max(len(orbit.growth.heights) for orbit in result.heights.orbits) - 1
+    last = max(result.degrees.patterns.lengths, default=0) if result.degrees.patterns is not None else 0
     if kind is not Growth.UNDECIDED and last > steps // 2:
-        late = f"the singularities show something new up to step {last} and the orbits have {counted(steps, 'step')}"
+        late = f"orbits of {counted(steps, 'step')} are too short, singularity patterns settle only at step {last}"
         return f"{reason}: {late}" if reason else late
     return reason

@@ -38,13 +38,13 @@ DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3",
 
 @dataclass(frozen=True)
 class Census(PrintableResult):
-    """What becomes of the points of P^n over GF(p) under a map at one eps (half the time step); exact counts.
+    """The orbits of the points of P^n over GF(p) under a map at one eps (half the time step); exact counts.
 
-    `lengths` is the number of cycles by length if all points were looked at (`complete`), else the number of sampled
-    points that came back, by the step at which they did. A point is `indeterminate` where the map is not defined,
+    `lengths` is the number of cycles by length if all points were followed (`complete`), else the number of sampled
+    points that are periodic, by their period. A point is `indeterminate` where the map is not defined,
     `pre_indeterminate` if its orbit gets to such a point, `preperiodic` if its orbit gets to a cycle without being on
     it, and `open` if none of this was seen in `steps` steps (samples only). Where a time limit `stopped` the work
-    before the images of all points were known, no point counts as looked at.
+    before the images of all points were known, `looked_at` is 0.
     """
 
     prime: int
@@ -149,8 +149,10 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
             point = following[point]
             length += 1
         lengths[length] += length > 0
-    lost, ended = (int((points[:count] == count).sum()) for points in (image, last))
-    kinds = dict[str, Any](indeterminate=lost, pre_indeterminate=ended - lost, preperiodic=count - ended - len(cyclic))
+    indeterminate, ended = (int((points[:count] == count).sum()) for points in (image, last))
+    kinds = dict[str, Any](
+        indeterminate=indeterminate, pre_indeterminate=ended - indeterminate, preperiodic=count - ended - len(cyclic)
+    )
     return replace(census, complete=True, looked_at=count, lengths=dict(sorted((+lengths).items())), **kinds)
 
 
@@ -161,23 +163,23 @@ def _of_samples(
 
     drawn = np.random.default_rng(seed).integers(0, census.prime, (census.dim + 1, 2 * samples + 20))
     start = points = space.normalized(drawn[:, drawn.any(axis=0)][:, :samples])
-    looked_at, lengths, lost, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
+    looked_at, lengths, ended, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
     try:
         while done < steps and start.shape[1]:
             progress(f"p = {census.prime}: step {done} of at most {steps}")
             portions = range(0, points.shape[1], space.portion)
             points = np.hstack([space.images(points[:, low : low + space.portion]) for low in portions])
-            is_lost, is_back = ~points.any(axis=0), (points == start).all(axis=0)
-            lost[done > 0] += int(is_lost.sum())
+            is_indeterminate, is_periodic = ~points.any(axis=0), (points == start).all(axis=0)
+            ended[done > 0] += int(is_indeterminate.sum())
             done += 1
-            if is_back.any():
-                lengths[done] = int(is_back.sum())
-            goes_on = ~(is_lost | is_back)
+            if is_periodic.any():
+                lengths[done] = int(is_periodic.sum())
+            goes_on = ~(is_indeterminate | is_periodic)
             points, start = points[:, goes_on], start[:, goes_on]
     except TimeLimit:
         stopped = True
     census = replace(census, stopped=stopped, looked_at=looked_at, steps=done, lengths=lengths)
-    return replace(census, indeterminate=lost[0], pre_indeterminate=lost[1], open=start.shape[1])
+    return replace(census, indeterminate=ended[0], pre_indeterminate=ended[1], open=start.shape[1])
 
 
 class _ProjectiveMap:

@@ -1,9 +1,9 @@
-"""The maps modulo primes on which one map is examined, and the way from what is found on them to formulas.
+"""The maps modulo primes on which one map is examined, and the reconstruction of formulas from their results.
 
 Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is known modulo a prime where g splits from its values at all
 roots of g there, by interpolation; the c_j are functions over Q, and are found as those are.
 
-Formulas are put to the proof as identities in x, eps and the symbols, stated without quotients, for I = P/Q that
+Formulas are certified as identities in x, eps and the symbols, stated without quotients, for I = P/Q that
 P(x~) Q(x) = P(x) Q(x~): that is the smaller form to expand. In coordinates in which the planes of a normal form
 separate, identities that are too long to expand are short.
 """
@@ -193,23 +193,24 @@ class Laboratory:
 
     @property
     def defect(self) -> str:
-        """Why the maps at the given eps are no birational maps, measured at random points; empty where they are."""
+        """Why the map at the given eps is not birational, measured at random points; empty if it is."""
         if self.flow or (self.eps is None and self.system is not None):
             return ""  # det(I - eps f'(x)) is 1 at eps = 0
         at = "" if self.eps is None else f"at eps = {self.eps} "
-        name, above = self.map.denominator_name, "det dPhi(x)"
+        name, numerator = self.map.denominator_name, "det dPhi(x)"
         if self.system is not None:
-            name, above = "det(I - eps f'(x))", "det(I + eps f'(x))"
+            name, numerator = "det(I - eps f'(x))", "det(I + eps f'(x))"
         try:
             pairs = [(map_, *pair) for map_ in self.maps for pair in map_.pairs(2)]
         except NoPoint:
-            return f"{at}the map has no value anywhere: {name} is identically 0"
+            return f"{at}the map is defined nowhere: {name} is identically 0"
         if not any(map_.determinant(x, image)[0] for map_, x, image in pairs):
-            return f"{at}the map is not invertible: {above} is 0 at all {'points' if self.system is None else 'images'}"
+            where = "points" if self.system is None else "images"
+            return f"{at}the map is not invertible: {numerator} is 0 at all {where}"
         return ""
 
     def cofactors(self) -> list[Cofactor]:
-        """The cofactors that polynomials are tried with."""
+        """The cofactors that the search for Darboux polynomials tries."""
         if self.flow:
             return []
         if self.system is None:
@@ -219,9 +220,9 @@ class Laboratory:
     def affine_cofactors(self) -> list[Cofactor]:
         """Those of affine Darboux functions of the system, which is there."""
         assert self.system is not None
-        context, whole, n = self.system.rhs[0].context(), ring(self.map.names), self.system.dim
+        context, full_ring, n = self.system.rhs[0].context(), ring(self.map.names), self.system.dim
         return [
-            Cofactor(format_polynomial(one.function), 1, one.function.compose(*whole.gens()[:n], ctx=whole))
+            Cofactor(format_polynomial(one.function), 1, one.function.compose(*full_ring.gens()[:n], ctx=full_ring))
             for one in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
             # l is to divide l' with the symbols free, not only at the values that the file gives them, or at that one
             if darboux_cofactor(self.system, one.function.compose(*context.gens()[:n], ctx=context)) is not None
@@ -253,14 +254,14 @@ class Laboratory:
             evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIMED
             return (Certainty.PROVED if kept else Certainty.REFUTED), evidence
         map_ = self.map if self.root is None else self.file.map
-        told: dict[str, Any] = {"eps": self.eps, "seed": self.seed, "is_density": is_density}
+        options: dict[str, Any] = {"eps": self.eps, "seed": self.seed, "is_density": is_density}
         separated = self._separated
         terms = len(function.numerator) + len(function.denominator)
         expands = separated is None and terms < self._too_long.get(is_density, math.inf)
-        verdict, evidence = verdict_on(map_, function, **told, factor=factor, expands=expands)
+        verdict, evidence = verdict_on(map_, function, **options, factor=factor, expands=expands)
         if verdict is Certainty.SUPPORTED and separated is not None:
             given = separated.function(function), None if factor is None else separated.function(factor)
-            there, proof = verdict_on(separated.system, given[0], **told, factor=given[1])
+            there, proof = verdict_on(separated.system, given[0], **options, factor=given[1])
             if there is not Certainty.SUPPORTED:
                 return there, replace(proof, summary=f"{proof.summary}, in coordinates in which the planes separate")
         elif verdict is Certainty.SUPPORTED and expands:
@@ -485,8 +486,8 @@ def verdict_on(
     Args:
         given: the map, some of its parameters symbols; a system stands for its Kahan map.
         function: I or phi, an exact function of (variables, symbols, eps); an algebraic number is one of the symbols.
-        eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
-        seed: of the random points.
+        eps: half the time step (exact), or None for every eps.
+        seed: the random seed.
         is_density: whether the function is a phi.
         factor: c, a function of the same names, for I(x~) = c I(x) or c phi; None for 1.
         expands: whether to try a proof where random points support it.

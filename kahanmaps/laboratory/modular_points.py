@@ -26,11 +26,11 @@ Point = tuple[int, ...]
 Values = Sequence[Any]  # as nmod, whose products take half the time of those of Python's integers; or as integers
 Exponent = tuple[int, ...]
 _TRIES = 60
-_NO_VALUE = "the map has no value at random points modulo a prime"
+_NO_VALUE = "the map is not defined at random points modulo a prime"
 
 
 class NoPoint(KahanmapsError):
-    """The map has no value at any of many random points modulo a prime."""
+    """The map is not defined at any of many random points modulo a prime."""
 
 
 class ModularMap:
@@ -63,7 +63,7 @@ class ModularMap:
         return tuple(self.rng.randrange(self.prime) for _ in range(self.dim))
 
     def step(self, x: Point) -> Point | None:
-        """The image of a point, None where the map has no value."""
+        """The image of a point, None where the map is not defined."""
         # Values of polynomials count themselves.
         count(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMap) else 10)
         try:

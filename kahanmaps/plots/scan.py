@@ -12,7 +12,7 @@ import numpy as np
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
-from kahanmaps.laboratory.scan.conditions import beside
+from kahanmaps.laboratory.scan.conditions import points_outside
 from kahanmaps.laboratory.scan.result import Component, Scan, growth_on
 from kahanmaps.plots.curves.level_sets import level_curves
 from kahanmaps.plots.figures import (
@@ -47,7 +47,7 @@ def plot_scan(
     """Curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
 
     `window` is (low, high) of each parameter; by default it holds most of the points with rational parameters. With
-    `modulo`, one of the primes modulo which all members were tried, the slow ones among these, those on no component
+    `modulo`, one of the primes modulo which all members were tried, the special ones among these, those on no component
     as well. Raises InputError for a scan over another number of parameters, and another prime.
 
     >>> from kahanmaps.documents.catalog import load
@@ -68,21 +68,21 @@ def plot_scan(
         if modulo not in known:
             tried = ", ".join(map(str, known)) or "none were tried"
             raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
-        # The slow members, each with the growth of a component that it is on and has the degrees of.
+        # The special members, each with the growth of a component that it is on and has the degrees of.
         rest = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
-        slow = []
+        special = []
         for kind, some in kinds.items():
             dots, texts = list[tuple[int, ...]](), list[tuple[str, Sequence[tuple[float, ...]]]]()
             for one in some:
                 before = rest.get(one.degrees, [])
-                rest[one.degrees] = beside(before, [one], modulo) if before else []
+                rest[one.degrees] = points_outside(before, [one], modulo) if before else []
                 on = sorted(set(before) - set(rest[one.degrees]))
                 dots += on
                 texts += [(one.text, [on[len(on) // 2]])] if on and kind != _MANY else []
-            slow.append(_Kind(kind, dots, [], texts))
+            special.append(_Kind(kind, dots, [], texts))
         if left := [point for points in rest.values() for point in points]:
-            slow.append(_Kind("on no component", left, [], []))
-        return _draw(found, style, slow, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
+            special.append(_Kind("on no component", left, [], []))
+        return _draw(found, style, special, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
     points = {kind: [_place(one) for one in some if one.is_rational_point] for kind, some in kinds.items()}
     if window is None:
         every = [place for some in points.values() for place in some]

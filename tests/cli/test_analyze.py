@@ -14,7 +14,7 @@ from kahanmaps.laboratory.analyses import table
 from kahanmaps.laboratory.laboratory import Laboratory
 
 TOP = "analyze euler_top"
-STATUSES = {"proved", "supported", "explained", "measured", "undecided", "note"}
+STATUSES = {"proved", "supported", "derived", "measured", "undecided", "note"}
 
 
 def report(out):
@@ -41,7 +41,7 @@ def test_the_report_as_text(kahanmaps):
         "I1 = (2*x1^2 + x2^2)/(2*x1^2*eps^2 + 1)  [relations of degree 2 along orbits]",
     ) in (lines)
     assert ("integrals", "measured", "along orbits x1^2 + c1*x3^2 + c2 = 0") in lines
-    assert ("growth", "explained", "d_n = 2*n^2 + 1") in lines
+    assert ("growth", "derived", "d_n = 2*n^2 + 1") in lines
     assert ", ".join(dict.fromkeys(section for section, _, _ in lines)) == (
         "vector field, integrals, measure, the flow, Poisson tensors, growth, singularities, symmetry, structure, "
         "commuting systems"
@@ -49,7 +49,7 @@ def test_the_report_as_text(kahanmaps):
     assert verdict == (
         "integrable",
         "Superintegrable (proved): 2 independent integrals in dimension 3, so that orbits lie on curves; quadratic "
-        "growth, dynamical degree 1 (explained). It is Liouville integrable, with the Poisson tensor P1 (proved).",
+        "growth, dynamical degree 1 (derived). It is Liouville integrable, with the Poisson tensor P1 (proved).",
     )
 
 
@@ -100,7 +100,7 @@ def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, 
     outcome = kahanmaps("analyze weierstrass")
     _, lines, verdict = report(outcome.out)
     assert outcome.status == 130
-    assert "interrupted: the verdict rests on what was found so far" in outcome.err
+    assert "interrupted: the verdict rests on the results so far" in outcome.err
     assert list(dict.fromkeys(section for section, _, _ in lines)) == sections
     skipped = [text for section, _, text in lines if section == "not done"]
     assert skipped[-1] == "commuting systems: interrupted"

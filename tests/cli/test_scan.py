@@ -28,23 +28,23 @@ def test_blocks_say_degrees_growth_and_where(plane):
     assert plane.status == 0
     assert plane.out.splitlines() == [
         "# scan: inline over g, every eps (the time step is 2 eps)",
-        "in general\t2, 4, 8, 16",
+        "generic\t2, 4, 8, 16",
         "degrees\t1, 1, 1, 1\tbounded growth, dynamical degree 1, measured",
         "at g =\t-2",
-        "degrees\t2, 2, 2, 2\tbounded growth, dynamical degree 1, explained",
+        "degrees\t2, 2, 2, 2\tbounded growth, dynamical degree 1, derived",
         "at g =\t-1",
-        "degrees\t2, 4, 6, 8\tlinear growth, dynamical degree 1, explained",
+        "degrees\t2, 4, 6, 8\tlinear growth, dynamical degree 1, derived",
         "at g =\t0",
-        "degrees\t2, 4, 7, 12\tquadratic growth, dynamical degree 1, explained",
+        "degrees\t2, 4, 7, 12\tquadratic growth, dynamical degree 1, derived",
         "at g =\t2",
-        "degrees\t2, 4, 8, 13\tquadratic growth, dynamical degree 1, explained",
+        "degrees\t2, 4, 8, 13\tquadratic growth, dynamical degree 1, derived",
         "at g =\t1",
         "growth\tthat of one member; singularities were followed for 40 steps",
-        "tried\tall members with parameters modulo 31, 37, 41; found are single points, where one of the first 4 "
+        "searched\tall members with parameters modulo 31, 37, 41; found are single points, where one of the first 4 "
         "degrees is smaller, over Q with numerators and denominators up to 23; points over number fields of degree d "
         "up to 6, with coefficients up to H where 2^12 (2 H + 1)^(d + 1) is below the product of the primes modulo "
         "which they have residues",
-        "left\tnone: every slow member that was seen is on a component",
+        "unassigned\tnone: every special member that was seen is on a component",
     ]
 
 
@@ -100,8 +100,8 @@ def test_ctrl_c_ends_it_with_what_was_seen(kahanmaps, monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.scan.scan.sweep", interrupted)
     outcome = kahanmaps(f"scan {QUICK}")
     assert outcome.status == 130
-    assert outcome.out.splitlines()[1:3] == ["slow\t2, 3\t1 members modulo 11", "slow\t2, 3\t1 members modulo 13"]
-    assert re.match("open\t.* members modulo 17", outcome.out.splitlines()[-1])
+    assert outcome.out.splitlines()[1:3] == ["special\t2, 3\t1 members modulo 11", "special\t2, 3\t1 members modulo 13"]
+    assert re.match("not done\t.* members modulo 17", outcome.out.splitlines()[-1])
     assert outcome.err.startswith("stopped early: interrupted before members modulo 17")
 
 

@@ -148,10 +148,10 @@ def measured(file):
 )
 def test_the_singularities_give_the_formula_for_the_degrees(n, k):
     growth = degree_growth(load(f"lv({n},{k})").map)
-    assert growth.explained is not None
+    assert growth.derived is not None
     assert list(growth.degrees) == [degree(n, k, m) for m in range(len(growth.degrees))]
-    # The formula satisfies the recurrence that is explained, and agrees at the start.
-    coefficients = [int(c) for c in growth.explained.characteristic.coeffs()]
+    # The formula satisfies the recurrence that is derived, and agrees at the start.
+    coefficients = [int(c) for c in growth.derived.characteristic.coeffs()]
     for m in range(3, 30):
         assert sum(c * degree(n, k, m + i) for i, c in enumerate(coefficients)) == 0
 

@@ -60,8 +60,8 @@ def test_the_whole_report_is_kept_if_asked_for():
 
 
 GROWING = of_rhs("x")  # det(I - eps f') = 1 - eps vanishes identically at eps = 1
-QUADRATIC = {"growth": "quadratic", "dynamical_degree": "1", "power": 2, "status": "explained"}
-EXPONENTIAL = {"growth": "exponential", "dynamical_degree": "2", "power": 0, "status": "explained"}
+QUADRATIC = {"growth": "quadratic", "dynamical_degree": "1", "power": 2, "status": "derived"}
+EXPONENTIAL = {"growth": "exponential", "dynamical_degree": "2", "power": 0, "status": "derived"}
 BOUNDED = {"growth": "bounded", "dynamical_degree": "1", "power": 0, "status": "recurrence"}
 INTEGRABLE = {
     "status": "complete",
@@ -101,7 +101,7 @@ COUNTED = {"status": "complete", "reason": ""}
             RIVALS,
             {"over": "a", "terms": 2, "primes": "11,13,17"},
             {"status": "complete", "growth": "linear", "integrable": ["-1"], "components": 1, "confirmed": 1,
-             "left": 0, "generic": [2, 4]},
+             "unassigned": 0, "generic": [2, 4]},
         ),
     ],
 )  # fmt: skip

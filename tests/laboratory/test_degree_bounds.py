@@ -35,7 +35,7 @@ for i, row in enumerate([[2, 1, 1, 1], [-1, 0, -1, -1], [-1, -1, 0, -1], [-1, -1
 
 
 @pytest.mark.parametrize("name", quick(POSITIVE, ["hietarinta_viallet"]))
-def test_the_bounds_enclose_the_dynamical_degree_that_is_explained(name):
+def test_the_bounds_enclose_the_dynamical_degree_that_is_derived(name):
     found = degree_growth(load(name).map)
     exact = float(found.dynamical_degree.digits)
     assert 0.9 * exact < float(found.enclosure.lower) < exact <= float(found.enclosure.upper) < 3

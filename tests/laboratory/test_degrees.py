@@ -123,7 +123,7 @@ def test_the_budget_and_the_degree_are_limits():
     assert found.to_json() == degree_growth(henon_heiles, effort=Budget(100_000)).to_json()
     known = degree_growth(load("lotka_volterra").system).patterns
     found = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
-    assert (found.ended, found.enclosure) == ("explained", None)
+    assert (found.ended, found.enclosure) == ("derived", None)
     assert found.notes == ("the budget was spent before bounds of the dynamical degree were proved (--effort)",)
     found = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
     assert (found.ended, found.growth) == ("budget", Growth.BOUNDED)

@@ -180,7 +180,7 @@ def test_special_eps(name, eps):
         assert found.conclusion.integrals == file.system.dim
         return
     assert found.integrals.integrals == found.densities.densities == ()
-    defect = {"no value": "has no value anywhere", "not invertible": "is not invertible"}[special["defect"]]
+    defect = {"no value": "is defined nowhere", "not invertible": "is not invertible"}[special["defect"]]
     assert defect in found.integrals.reason
     if special["defect"] == "no value":
         assert found.conclusion.kind == "singular"

@@ -29,7 +29,7 @@ from kahanmaps.laboratory.singular.outcomes import (
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
-    Written,
+    HypersurfaceForm,
     outcome_of,
 )
 from kahanmaps.laboratory.singular.singularities import Patterns, _patterns, patterns_of, singularities
@@ -89,14 +89,14 @@ def test_three_lines_of_late_confinement_have_no_dynamical_degree_2(exponents, f
     assert found.dynamical_degree is None or found.dynamical_degree.text != "2"
 
 
-def test_seven_degrees_are_explained_by_a_pattern_that_is_longer():
+def test_seven_degrees_are_derived_by_a_pattern_that_is_longer():
     """So few terms are all 2^n; the pattern that lowers those after them is seen by the singularities."""
     system = three_lines(1, 2, 6)
     found = degree_growth(system, max_terms=7)
     assert found.degrees == tuple(2**n for n in range(8))
-    assert [found.explained.predict(n) for n in range(1, 12)] == polynomial_degrees(system, 11, 5)
-    assert (found.basis, found.unconfirmed) == ("explained: no other confinement within 1000 steps", "")
-    # Without what the singularities explain there is an estimate only.
+    assert [found.derived.predict(n) for n in range(1, 12)] == polynomial_degrees(system, 11, 5)
+    assert (found.basis, found.unconfirmed) == ("derived: no other confinement within 1000 steps", "")
+    # Without what follows from the singularities there is an estimate only.
     length = max(found.patterns.lengths)
     measured = replace(found, patterns=replace(found.patterns, series=()))
     assert (measured.recurrence, measured.dynamical_degree, measured.growth) == (
@@ -106,18 +106,18 @@ def test_seven_degrees_are_explained_by_a_pattern_that_is_longer():
     )  # proved by its bounds
     assert measured.growth_text == (
         "exponential growth (proved), by a factor of about 2 (estimated: the last quotients are 2 to 2; "
-        f"after a pattern of {length} steps {length + 2} "
-        "iterates are needed (--effort, --max-degree))"
+        f"a singularity pattern of {length} steps calls for {length + 2} "
+        "iterates; raise --effort or --max-degree)"
     )
     assert measured.to_json()["unconfirmed"] == measured.unconfirmed != ""
 
 
-def test_degrees_that_the_singularities_do_not_explain_are_no_result():
+def test_degrees_that_contradict_the_singularities_are_no_result():
     found = degree_growth(load("euler_top").system)
     other = replace(found, degrees=(*found.degrees[:8], found.degrees[8] + 1, *found.degrees[9:]))
     assert (found.disagreement, other.disagreement) == (None, 8)
-    assert (other.explained, other.recurrence, other.growth) == (None, None, Growth.UNKNOWN)
-    assert "do not explain the degree of iterate 8" in other.unconfirmed
+    assert (other.derived, other.recurrence, other.growth) == (None, None, Growth.UNKNOWN)
+    assert "the measured degree of iterate 8 contradicts" in other.unconfirmed
 
 
 # The patterns themselves
@@ -135,9 +135,9 @@ def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
 
 def test_two_eps_that_differ_leave_the_patterns_open():
     runs = [singularities(planar("1", "x*y"), eps, steps=80) for eps in ("1/7", "2/7")]
-    assert patterns_of(runs).running == "the singularities at two values of eps differ (--eps)"
+    assert patterns_of(runs).running == "the singularities at the two values of eps differ; choose one with --eps"
     assert patterns_of(runs[:1]).running == ""
-    assert "was spent" in patterns_of([replace(runs[0], stopped=True)]).running
+    assert "work limit" in patterns_of([replace(runs[0], stopped=True)]).running
     assert "not dominant" in patterns_of([replace(runs[0], is_dominant=False)]).running
 
 
@@ -154,7 +154,7 @@ def test_a_recurrence_needs_terms_beyond_all_patterns():
         assert (found.recurrence, found.growth) == (None, Growth.UNKNOWN)
         assert found.growth_text.startswith("13 terms fit linear growth, an estimate only: ")
     # 13 terms, no hypersurface that could lower a degree, and yet the degrees are not 2^n
-    assert "degrees drop where" in growth_with(Patterns((), 100, False), *linear).unconfirmed
+    assert "degrees drop although" in growth_with(Patterns((), 100, False), *linear).unconfirmed
     assert growth_with(Patterns((), 100, False), *(2**n for n in range(8))).dynamical_degree.text == "2"
 
 
@@ -179,7 +179,7 @@ def test_the_parts_of_a_report_do_not_contradict_each_other(given, kind, growth)
     assert found.degrees.patterns == patterns_of(found.singularities)
     lines = [line for _, section in found.sections for line in section]
     last = max(h.confined_at or 0 for run in found.singularities for h in run.hypersurfaces)
-    assert f"the last confinement comes after {last} steps" in [line.text for line in lines]
+    assert f"the longest confined pattern has {last} steps" in [line.text for line in lines]
     assert last < len(found.degrees.degrees) - 1
 
 
@@ -189,7 +189,7 @@ def test_what_excludes_each_other_is_undecided():
     both = replace(found, degrees=exponential)
     assert (both.conclusion.kind, contradictions(both)) == (
         "undecided",
-        ["the degrees seem to grow exponentially, which they cannot where integrals leave curves only"],
+        ["the degrees seem to grow exponentially, which they cannot if integrals confine orbits to curves"],
     )
     # An estimate gives way to what is proved.
     estimate = replace(found, degrees=replace(exponential, patterns=Patterns((30,), None, True)))
@@ -216,7 +216,7 @@ def test_heights_and_degrees_that_disagree_are_reported():
     assert beside(quadratic, Growth.BOUNDED) == beside(quadratic, Growth.ZERO) == "the degrees are bounded"
     assert beside(exponential, Growth.UNKNOWN) == beside(Growth.UNDECIDED, Growth.EXPONENTIAL) == ""
     # Half of the longest orbit has to reach beyond the last pattern; 21 heights are those of 20 steps.
-    late = "the singularities show something new up to step 11 and the orbits have 20 steps"
+    late = "orbits of 20 steps are too short, singularity patterns settle only at step 11"
     assert beside(quadratic, quadratic, (4, 10)) == ""
     assert beside(quadratic, quadratic, (4, 11)) == late
     assert beside(quadratic, Growth.BOUNDED, (4, 11)) == f"the degrees are bounded: {late}"
@@ -230,7 +230,7 @@ def test_heights_and_degrees_that_disagree_are_reported():
 def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others():
     # x^2 = 2 z^2 has points in GF(p) for every other prime only.
     x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
-    form = Written(x**2 - 2 * z**2, False, None)
+    form = HypersurfaceForm(x**2 - 2 * z**2, False, None)
     for seed, units in enumerate((1e6, 1e6, 1e6, 1e6, 0)):
         limits = Range(4, 4, 4, Budget(units), 4)
         found = outcome_of(load("lorenz").map, fmpq(1, 7), form, "?", random.Random(seed), limits)
@@ -258,11 +258,11 @@ def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():
         ([("not contracted", None), ("undecided", None, 0)], Patterns((), None, False)),
         (
             [("undecided", 3, 2, 9, "no luck")],
-            Patterns((), None, None, "what becomes of x - 1 = 0 is undecided: no luck"),
+            Patterns((), None, None, "the pattern of x - 1 = 0 is undecided: no luck"),
         ),
         (
             [("not confined", None, 1, 90)],
-            Patterns((), None, None, "the pattern of x - 1 = 0 is still running after 90 steps (--steps)"),
+            Patterns((), None, None, "the pattern of x - 1 = 0 has not settled after 90 steps; raise --steps"),
         ),
     ],
 )

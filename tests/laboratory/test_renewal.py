@@ -25,7 +25,7 @@ def settled(*rows, returns=None):
 
 
 @cache
-def explained(name):
+def derived(name):
     map_ = load(name).map
     return patterns(map_, None)
 
@@ -54,21 +54,21 @@ OF_ONE_FORM = {
 
 
 @pytest.mark.parametrize("name", quick(WRITTEN, DAILY))
-def test_the_degrees_of_the_catalogue_are_explained(name):
+def test_the_degrees_of_the_catalogue_are_derived(name):
     found = degree_growth(load(name).map, max_degree=500)
     if found.degrees[1] > 1 and found.proof is None:
-        assert found.explained is not None
+        assert found.derived is not None
         assert tuple(coefficients(found.patterns.fraction, len(found.degrees))) == found.degrees
-        assert found.explained.characteristic == (found.fitted or found.explained).characteristic
+        assert found.derived.characteristic == (found.fitted or found.derived).characteristic
 
 
 @pytest.mark.parametrize("name", quick(list(OF_ONE_FORM), ["kirchhoff_case", "three_wave"]))
-def test_hypersurfaces_of_one_form_are_told_apart_and_explain_degrees(name):
+def test_hypersurfaces_of_one_form_are_told_apart_and_derive_degrees(name):
     found = patterns(load(name).map, fmpq(2, 7))
     sizes = [h.degree for h in found.contracted]
     assert sorted(sizes) == OF_ONE_FORM[name]
     measured = degree_growth(load(name).map, max_terms=6, patterns=found)
-    assert measured.explained is not None
+    assert measured.derived is not None
     # Each degree counts: with another one in its place the degrees of the map are other ones.
     every = [h.orders for h in found.contracted]
     for k in range(len(sizes)):
@@ -101,12 +101,12 @@ def test_the_degrees_of_the_family_are_those_of_m_planes(m, name):
         planar.append(2 * planar[n] - planar[n - 1] + (1 if n % 2 else 2))
     law = [m * D - (m - 1) * (n % 2 == 0) for n, D in enumerate(planar)]
     assert law == [m * (3 * n * n + 5) // 4 if n % 2 else 3 * m * n * n // 4 + 1 for n in range(41)]
-    assert coefficients(explained(name).fraction, 41) == law
+    assert coefficients(derived(name).fraction, 41) == law
 
 
-def test_orders_that_are_wrong_explain_nothing():
+def test_orders_that_are_wrong_derive_nothing():
     """Each number in the orders of a map counts: changed, the degrees are not those measured."""
-    found = explained("euler_top")
+    found = derived("euler_top")
     sizes = [h.degree for h in found.contracted]
     every = [h.orders for h in found.contracted]
     true = degree_growth(load("euler_top").map, max_terms=8).degrees
@@ -159,7 +159,7 @@ def explicit(*image):
     return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image])
 
 
-def test_unknown_orders_that_are_needed_explain_nothing():
+def test_unknown_orders_that_are_needed_derive_nothing():
     costly, attracted = settled((1, 0, 0)), settled((0, 1, 2))
     assert needed([costly, attracted]) == [0, 1]
     assert needed([costly, replace(attracted, beyond=(1,))]) is None
@@ -170,7 +170,7 @@ def test_unknown_orders_that_are_needed_explain_nothing():
     chain = [returning, settled((0, 0, 0, 1)), settled((1, 0, 0, 0))]
     assert needed(chain) == [0, 1, 2]
     assert needed([*chain[:2], replace(chain[2], beyond=(0,))]) is None
-    with pytest.raises(ValueError, match="orders that are not known"):
+    with pytest.raises(ValueError, match="expected known multiplicities"):
         degree_series([2], [(1, costly), (1, replace(attracted, beyond=(0,)))])
     # What is not needed does not count.
     assert degree_series([2], [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))]) == degree_series(

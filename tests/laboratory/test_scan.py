@@ -60,7 +60,7 @@ def test_the_classification_of_three_lines_is_found(three_lines):
 
 def test_everything_is_confirmed_and_nothing_is_left(three_lines):
     assert all(one.is_confirmed and one.tried == 3 for one in three_lines.components)
-    assert not any(three_lines.left)
+    assert not any(three_lines.unassigned)
     # all permutations of the exponents (g1 : g2 : 1), which exchanges and one cycle generate
     assert three_lines.symmetric == (("g2", "g1"), ("g1/g2", "1/g2"))
     assert three_lines.height == 31
@@ -94,7 +94,7 @@ inverse = ["y - (c - 1)*x^2 - (a*b + 1)*x^3", "x"]
         "a*b + 1 = 0": (2, 4),
         "a*b + 1 = 0, c - 1 = 0": (1, 1),
     }
-    assert not any(found.left)
+    assert not any(found.unassigned)
 
 
 def test_the_conditions_of_lotka_volterra_in_space_are_found():
@@ -105,7 +105,7 @@ def test_the_conditions_of_lotka_volterra_in_space_are_found():
     for one in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
         assert conditions[one].growth.growth is Growth.QUADRATIC
         assert conditions[one].dimension == 1
-    assert not any(found.left)
+    assert not any(found.unassigned)
 
 
 def planar(first, second, *names):
@@ -126,7 +126,7 @@ def test_what_splits_over_a_number_field_is_found_as_one(second, names, text, di
     found = scan(planar("y", second, *names), [*names], terms=4)
     one = next(one for one in found.components if one.text == text)
     assert (one.dimension, one.is_confirmed, one.growth.growth) == (dimension, True, Growth.QUADRATIC)
-    assert not any(found.left)
+    assert not any(found.unassigned)
 
 
 REPAIRED = """variables = ["x", "y"]
@@ -163,7 +163,7 @@ def test_four_parameters_give_what_has_codimension_2_as_well():
 def test_the_budget_may_be_spent_before_anything_is_known():
     found = scan(load("henon_heiles"), ["c"], effort=Budget(1))
     assert (found.ended, found.components, found.height) == ("budget", (), 0)
-    assert "open\tthe budget was spent (--effort) before members modulo 10" in found.text
+    assert "not done\tthe budget was spent (--effort) before members modulo 10" in found.text
 
     def over():
         raise TimeOver

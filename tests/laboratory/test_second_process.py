@@ -11,7 +11,7 @@ import pytest
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis
-from kahanmaps.laboratory.analyses.part import Of, Part
+from kahanmaps.laboratory.analyses.step import AnalysisStep, MapKinds
 from kahanmaps.laboratory.analysis import analyze
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="a second process is for Linux")
@@ -27,15 +27,21 @@ def where(*_, **__):
     return os.getpid()
 
 
-def apart(name, look=where, *, is_apart=True):
-    return Part(name, look, of=Of.EVERY, is_apart=is_apart, json=lambda found: {name: found[name]})
+def step(name, run=where, *, is_independent=True):
+    return AnalysisStep(
+        name, run, applies_to=MapKinds.ALL, is_independent=is_independent, json=lambda result: {name: result[name]}
+    )
 
 
-def test_parts_that_are_apart_are_done_elsewhere_in_their_order_and_the_others_here():
-    parts = [apart("first"), apart("second", lambda run, **_: run.found["first"]), apart("third", is_apart=False)]
-    found = analyze(load("harmonic"), parts=parts, processes=2)
+def test_independent_steps_run_elsewhere_in_their_order_and_the_others_here():
+    steps = [
+        step("first"),
+        step("second", lambda context, **_: context.result["first"]),
+        step("third", is_independent=False),
+    ]
+    found = analyze(load("harmonic"), analyses=steps, processes=2)
     assert found["first"] == found["second"] != found["third"] == HERE
-    assert analyze(load("harmonic"), parts=parts)["first"] == HERE  # with one process
+    assert analyze(load("harmonic"), analyses=steps)["first"] == HERE  # with one process
 
 
 def test_what_a_killed_process_did_not_do_is_done_here():
@@ -44,7 +50,7 @@ def test_what_a_killed_process_did_not_do_is_done_here():
             os.kill(os.getpid(), signal.SIGKILL)
         return os.getpid()
 
-    found = analyze(load("harmonic"), parts=[apart("first"), apart("second", killed), apart("third")], processes=2)
+    found = analyze(load("harmonic"), analyses=[step("first"), step("second", killed), step("third")], processes=2)
     assert found["first"] != found["second"] == found["third"] == HERE
     assert found.skipped == []
 
@@ -53,25 +59,28 @@ def test_a_failed_step_of_the_second_process_is_reported_and_a_mistake_is_raised
     def gives_up(*_, **__):
         raise InputError("too hard")
 
-    parts = [apart("first", gives_up), apart("second"), apart("third", gives_up, is_apart=False)]
-    assert analyze(load("harmonic"), parts=parts, processes=2).skipped == ["first: too hard", "third: too hard"]
+    steps = [step("first", gives_up), step("second"), step("third", gives_up, is_independent=False)]
+    assert analyze(load("harmonic"), analyses=steps, processes=2).skipped == ["first: too hard", "third: too hard"]
     with pytest.raises(ZeroDivisionError):
-        analyze(load("harmonic"), parts=[apart("first", lambda *_, **__: 1 // 0)], processes=2)
+        analyze(load("harmonic"), analyses=[step("first", lambda *_, **__: 1 // 0)], processes=2)
 
 
 ENDED = """
 import os, signal, sys, time
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import analysis
-from kahanmaps.laboratory.analyses.part import Of, Part
+from kahanmaps.laboratory.analyses.step import AnalysisStep, MapKinds
 
 def sleeping(*_, **__):
     print(os.getpid(), flush=True)
     time.sleep(60)
 
 analysis.processors = lambda: 2
-parts = [Part("far", sleeping, of=Of.EVERY, is_apart=True), Part("near", sleeping, of=Of.EVERY)]
-analysis.analyze(load("harmonic"), parts=parts, processes=2)
+steps = [
+    AnalysisStep("far", sleeping, applies_to=MapKinds.ALL, is_independent=True),
+    AnalysisStep("near", sleeping, applies_to=MapKinds.ALL),
+]
+analysis.analyze(load("harmonic"), analyses=steps, processes=2)
 """
 
 

@@ -87,7 +87,7 @@ def test_a_translation_is_found_where_it_is_needed():
     """x' = x^2 + x is even about -1/2: x -> -x - 1 takes the map to its inverse."""
     f = load("riccati", {}).system
     (_, t) = linear_symmetries(f).signed
-    assert (t.text, t.reversing, t.obvious) == ("(x) -> (-x - 1)", True, False)
+    assert (t.text, t.reversing, t.is_trivial) == ("(x) -> (-x - 1)", True, False)
     assert holds_for_the_map(f, t.S, t.r, lambda eps: -eps)
     found = linear_symmetries(system("x y", "x^2 + x", "y^2 - 3*y"))
     assert [t.text for t in found.reversing] == ["(x, y) -> (-x - 1, -y + 3)"]

@@ -1,4 +1,4 @@
-"""Compositions that are too long to be multiplied out are followed map by map, and their degrees explained."""
+"""Compositions that are too long to be multiplied out are followed map by map, and their degrees are derived."""
 
 import random
 
@@ -26,8 +26,8 @@ def word(*letters, power=1):
     return parse_system(f"[composition]\nof = [{', '.join(entries * power)}]").map
 
 
-def explained(map_, terms, eps=None):
-    """The word of a composition, and its degrees as its maps explain them, followed one by one."""
+def derived(map_, terms, eps=None):
+    """The word of a composition, and its degrees as its maps give them, followed one by one."""
     limits = Range(12, 60, 40, Budget(), 40)
     found, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
     pairs = [(h.degree, h.orders) for h in hypersurfaces]
@@ -46,9 +46,9 @@ def explained(map_, terms, eps=None):
         (["y;(y+1/3)/(x+2/5)"], 5, 5, Word((2,), 5)),
     ],
 )
-def test_words_explain_the_measured_degrees(letters, power, terms, expected):
+def test_words_give_the_measured_degrees(letters, power, terms, expected):
     map_ = word(*letters, power=power)
-    found, degrees = explained(map_, terms)
+    found, degrees = derived(map_, terms)
     assert found == expected
     measured = degree_growth(
         map_, "3/11" if map_.has_eps else None, max_terms=terms, patterns=Patterns((), None, False)
@@ -56,7 +56,7 @@ def test_words_explain_the_measured_degrees(letters, power, terms, expected):
     assert tuple(degrees) == measured.degrees
 
 
-def test_a_hypersurface_of_another_map_explains_other_degrees():
+def test_a_hypersurface_of_another_map_gives_other_degrees():
     """Negative control: with the maps in the other order the same hypersurfaces stand for another composition."""
     map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
     limits = Range(12, 60, 40, Budget(), 40)
@@ -73,9 +73,9 @@ def test_a_hypersurface_of_another_map_explains_other_degrees():
 @pytest.mark.parametrize(("name", "k", "square"), [("mcmillan", 7, 2), ("euler_top", 2, 2)])
 def test_powers_have_every_kth_degree(name, k, square):
     found = degree_growth(word(name, power=k))
-    assert (found.ended, found.explained.closed_form) == ("explained", f"{square * k * k}*n^2 + 1")
+    assert (found.ended, found.derived.closed_form) == ("derived", f"{square * k * k}*n^2 + 1")
     assert found.patterns.word == Word((3,), k)
-    assert f"a step is {k} maps" in found.text
+    assert f"{k} maps make one iterate" in found.text
 
 
 def test_every_nth_coefficient_of_a_fraction():

@@ -26,7 +26,7 @@ from kahanmaps_cli.signals import INTERRUPTED
 @click.option("--markdown", is_flag=True, help="Print the report in Markdown.")
 @opt.output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Analyze the map of SYSTEM: report what it preserves, how it grows, and a verdict on integrability.
+    """Analyze the map of SYSTEM: what it preserves, how fast its iterates grow in complexity, and a verdict.
 
     \b
       kahanmaps analyze euler_top --symbolic a1,a2,a3
@@ -36,81 +36,84 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)" --json
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
-    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md). The report
-    contains fixed points with eigenvalues; an affinely equivalent system of the catalogue; integrals and densities with
-    proofs; the integrals of the flow that the map keeps, deforms or loses; genus and base points of the curves of a
-    planar integral; Hirota-Kimura relations; degrees of the iterates and their recurrence; heights; symmetries and
-    reversing symmetries; commuting systems; singularity confinement; and membership in the commuting family. Claims in
-    the file are not used. Without --eps the results hold for every eps.
+    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).
+    The report has fixed points with their eigenvalues; a catalogue system that is affinely equivalent; integrals and
+    densities in closed form with their proofs; which integrals of the flow the map keeps, deforms or loses; genus and
+    base points of the curves of a planar integral; Hirota-Kimura relations; degrees of the iterates with their
+    recurrence; heights; symmetries and reversing symmetries; commuting systems; singularity confinement; and whether
+    the system belongs to the commuting family, in these or other affine coordinates. Claims in the file are ignored.
+    Without --eps all results hold for every eps.
 
-    Formulas are proved or supported as identities in x and eps. Results measured modulo primes and along orbits are
-    evidence. The number of integrals and the growth are separate findings.
+    proved, supported: formulas, as identities in x and eps. derived: from the measured singularity patterns. measured:
+    modulo primes and along orbits, which is evidence. The number of integrals and the growth are independent results.
 
-    Exit status: 0 there is a verdict, 2 usage error, 3 undecided.
+    Exit status: 0 the verdict is decided, 2 usage error, 3 undecided.
     """
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
-    asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
+    arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
     file = opt.load_system(system, {**options, "quiet": quiet})
     report = _Report(as_json or markdown)
     with SearchProgress({**options, "quiet": quiet}) as search:
         report.progress = search
         try:
-            lib.analyze(file, **asked, progress=search, reached=report)
+            lib.analyze(file, **arguments, progress=search, on_result=report)
         except KeyboardInterrupt:
-            if report.found is None:
+            if report.result is None:
                 raise
-            report.found.interrupt("stopped (--seconds)" if search.is_over else "interrupted")
-    found = report.found
-    assert found is not None
+            report.result.interrupt("stopped (--seconds)" if search.is_over else "interrupted")
+    result = report.result
+    assert result is not None
     if as_json:
-        print_json(found.to_json())
+        print_json(result.to_json())
     elif markdown:
-        lines = [f"# {lib.markdown(lib.analysis_title(found))}", "", "```"]
-        lines += [*str(found.file.map).split("\n"), "```", "", f"**{lib.markdown(found.conclusion.sentence)}**", ""]
-        for name, told in found.sections:
-            lines += [f"## {name}", ""]
-            lines += [f"* *{one.status}*: {(lib.code if '=' in one.text else lib.markdown)(one.text)}" for one in told]
+        lines = [f"# {lib.markdown(lib.analysis_title(result))}", "", "```"]
+        lines += [*str(result.file.map).split("\n"), "```", "", f"**{lib.markdown(result.conclusion.sentence)}**", ""]
+        for title, statements in result.sections:
+            lines += [f"## {title}", ""]
+            for statement in statements:
+                text = (lib.code if "=" in statement.text else lib.markdown)(statement.text)
+                lines.append(f"* *{statement.status}*: {text}")
             lines.append("")
-        print_raw("\n".join([*lines, found.work]))
+        print_raw("\n".join([*lines, result.work]))
     else:
-        report.print_new(found.sections)
-        final = found.conclusion
+        report.print_new(result.sections)
+        final = result.conclusion
         print_stdout("\nverdict", style="bold")
         print_stdout(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
-        print_stdout(found.work)
+        print_stdout(result.work)
     if search.is_over:
         return 3
-    if found.interrupted:
-        print_stderr("interrupted: the verdict rests on what was found so far")
+    if result.interrupted:
+        print_stderr("interrupted: the verdict rests on the results so far")
         return INTERRUPTED
-    return 3 if found.conclusion.kind == "undecided" else 0
+    return 3 if result.conclusion.kind == "undecided" else 0
 
 
 class _Report:
-    """The report as text, each section as soon as it is final; `is_silent` keeps it back for another form."""
+    """Prints the report, each section as soon as it is final; `is_silent` is for another output format."""
 
     def __init__(self, is_silent: bool) -> None:
-        self.found: lib.Analysis | None = None
+        self.result: lib.Analysis | None = None
         self.progress: SearchProgress | None = None
-        self._is_silent, self._told = is_silent, 0
+        self._is_silent, self._printed = is_silent, 0
 
-    def __call__(self, found: lib.Analysis) -> None:
-        begins, self.found = self.found is None, found
+    def __call__(self, result: lib.Analysis) -> None:
+        is_first, self.result = self.result is None, result
         if self._is_silent:
             return
-        if begins:
-            print_stdout(lib.analysis_head(found))
-        self.print_new(found.final_sections)
+        if is_first:
+            print_stdout(lib.analysis_head(result))
+        self.print_new(result.final_sections)
 
     def print_new(self, sections: Sequence[tuple[str, Sequence[lib.Statement]]]) -> None:
         """Print the sections that have not been printed yet."""
-        if self.progress is not None and len(sections) > self._told:
+        if self.progress is not None and len(sections) > self._printed:
             self.progress.clear()
-        for name, lines in sections[self._told :]:
+        for name, lines in sections[self._printed :]:
             print_stdout(f"\n{name}", style="bold")
             for line in lines:
                 print_stdout(f"{line.status}\t{formula(line.text)}")
-        self._told = max(self._told, len(sections))
+        self._printed = max(self._printed, len(sections))
         sys.stdout.flush()

@@ -16,15 +16,19 @@ from kahanmaps_cli.screen.value_rows import Cell, table
 
 @click.command("cycles")
 @opt.system_options
-@click.option("--prime", "primes", type=int, multiple=True, metavar="P", help="Prime P. Repeatable.")
+@click.option(
+    "--prime", "primes", type=int, multiple=True, metavar="P", help="The field is GF(P), P an odd prime; repeatable."
+)
 @opt.several_eps_options
 @click.option("--samples", type=int, metavar="N", help="Follow N random points instead of all points.")
-@click.option("--steps", type=int, metavar="N", help="With --samples: follow them for at most N steps (default 10000).")
+@click.option(
+    "--steps", type=int, metavar="N", help="With --samples: follow each point for at most N steps (default 10000)."
+)
 @opt.seconds_option
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Count the cycles of the map of SYSTEM on projective space over a finite field by their lengths.
+    """Count the cycles of the map of SYSTEM on projective space over a finite field, by length.
 
     \b
       kahanmaps cycles weierstrass --prime 101
@@ -34,21 +38,22 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps cycles henon_heiles -p c=-2..0 --prime 11
       kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
 
-    All points of P^n over GF(P) are used, or random ones where there are more than two million (from dimension 7 on,
-    half as many with each dimension). Without --eps two values are used for each prime, since one may be special.
+    All points of P^n over GF(P) are followed, or random points where there are more than two million (above dimension 6
+    the limit halves with each dimension). Without --eps two values are tried for each prime, as one may be special.
 
-    A point is indeterminate if the map is undefined there, after common factors of its forms are divided out (up to
-    dimension 6); pre-indeterminate if its orbit reaches such a point; and preperiodic if its orbit reaches a cycle. The
-    counts are exact and are not compared with any law: integrable maps too may have cycles longer than
-    P + 1 + 2 sqrt P, on levels with several components or levels that the map permutes.
+    A point is indeterminate if the map is not defined there; common factors of the forms of the map are divided out
+    first (up to dimension 6). A point is pre-indeterminate if its orbit reaches an indeterminate point, and preperiodic
+    if its orbit reaches a cycle without the point being on it. The counts are exact, and are compared with no bound:
+    integrable maps, too, may have cycles longer than P + 1 + 2 sqrt P, on level sets with several components or on
+    level sets that the map exchanges.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
-    record) for each combination of values. Values at which the map is undefined are listed at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
+    combination of values; with --json, a record on each line. Values for which there is no map are listed at the end.
 
     Exit status: 0 done, 2 usage error, 3 stopped by --seconds.
     """
     if options["steps"] is not None and options["samples"] is None:
-        raise click.UsageError("--steps N is for --samples N")
+        raise click.UsageError("--steps N needs --samples N")
     if not options["primes"]:
         raise click.UsageError("missing --prime P, e.g. --prime 101")
 

@@ -17,7 +17,7 @@ from kahanmaps_cli.screen.value_rows import Cell, table
 _SHOWN = 8  # degrees in a line of a table
 
 
-# Of the picture as well.
+# Shared with the command that draws the degrees.
 degree_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.eps_options,
     opt.effort_options,
@@ -30,7 +30,7 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
         metavar="D",
         default=lib.ITERATE_DEGREE,
         show_default=True,
-        help="Compute no larger degree.",
+        help="Measure no larger degree.",
     ),
     opt.seed_option,
 )
@@ -40,11 +40,11 @@ degree_options: Callable[[opt.F], opt.F] = opt.stack(
 @opt.system_options
 @degree_options
 @click.option(
-    "--steps", type=int, metavar="N", help="Number of steps to trace singularities (default: as in singularities)."
+    "--steps", type=int, metavar="N", help="Follow singularities for N steps (default: as the command singularities)."
 )
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
-    """Compute the degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
+    """Measure the degrees of the iterates of the map of SYSTEM: their recurrence and the dynamical degree.
 
     \b
       kahanmaps degrees euler_top
@@ -53,71 +53,72 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps degrees --rhs "x' = x*(1-y); y' = y*(x-1)"
       kahanmaps degrees henon_heiles -p c=-2..0:1/2 --terms 6
 
-    The degree of Phi^n as a map of projective space is measured on two random lines modulo random primes of 61 bits.
-    Without --eps, eps is a random residue. Measured degrees are evidence, not proof.
+    The degree of Phi^n as a map of projective space is measured on two random lines, each modulo a random prime of 61
+    bits. Without --eps, eps is generic: a random residue for each line. This is evidence, and no proof.
 
-    The hypersurfaces that the map contracts are followed, and explain the degrees for all times: generating function,
-    recurrence, dynamical degree; of long compositions, map by map. A line for each of them says when it comes
-    back, and what it costs. Where they explain nothing, a recurrence is accepted that holds for at least 2 terms more
-    than determine it, with terms enough beyond the last confinement, and else there is an estimate only. "no
-    confinement" is said with the number of steps that were tried.
+    The images of the exceptional hypersurfaces, those that the map contracts, are followed. From their singularity
+    patterns the degrees of all iterates are derived: generating function, recurrence and dynamical degree. (Long
+    compositions are followed map by map.) One line for each exceptional hypersurface says at which steps it lowers the
+    degree, in which exceptional hypersurfaces its images lie, and whether it is confined. Where no law can be derived,
+    a recurrence is accepted if it holds for at least 2 terms more than determine it, with enough terms beyond the last
+    confinement; otherwise there is only an estimate. "no confinement" comes with the number of steps tried.
 
-    In the plane a dynamical degree above 1 is proved by exact bounds. The growth of monomial maps is proved by powers
-    of the exponent matrix, and that of maps with an iterate of degree 1 by composing formulas.
+    In the plane a dynamical degree above 1 is proved, and its bounds are exact. The growth of monomial maps is proved
+    by powers of the exponent matrix, and that of maps with an iterate of degree 1 by composing formulas.
 
-    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line (with --json a
-    record) for each combination of values. Values at which the map is undefined are listed at the end.
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
+    combination of values; with --json, a record on each line. Values for which there is no map are listed at the end.
 
-    Exit status: 0 a recurrence was found, all requested terms were computed, or the iterates are constant or undefined
-    from some step on; 2 usage error; 3 undecided, or stopped early.
+    Exit status: 0 a recurrence was found, or all requested terms were measured, or the iterates become undefined or
+    constant; 2 usage error; 3 undecided, or stopped early.
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
-        found = measured(file, eps, options, search)
-        more = ", ..." if len(found.degrees) > _SHOWN else ""
-        line = f"{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}"
+        growth = measure(file, eps, options, search)
+        more = ", ..." if len(growth.degrees) > _SHOWN else ""
+        line = f"{', '.join(map(str, growth.degrees[:_SHOWN]))}{more}\t{growth.kind_text}"
         undecided = ""
-        if not is_done(found, options["terms"]):
-            undecided = f"undecided: {found.unconfirmed}" if found.unconfirmed else f"stopped early: {found.message}"
-        return Cell(line, lambda: _record(file, options, found, search), lambda: _print(file, found), undecided)
+        if not is_done(growth, options["terms"]):
+            undecided = f"undecided: {growth.unconfirmed}" if growth.unconfirmed else f"stopped early: {growth.message}"
+        return Cell(line, lambda: _record(file, options, growth, search), lambda: _print(file, growth), undecided)
 
     return table(system, options, cell)
 
 
-def measured(
+def measure(
     file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]
 ) -> lib.DegreeGrowth:
-    """The degrees that the options ask for."""
-    asked = opt.given(options, "effort", "max_degree", "seed", max_terms="terms")
-    return lib.degree_growth(file.map, eps, **asked, steps=options.get("steps"), progress=progress)
+    """Measure the degrees that the options request."""
+    arguments = opt.given(options, "effort", "max_degree", "seed", max_terms="terms")
+    return lib.degree_growth(file.map, eps, **arguments, steps=options.get("steps"), progress=progress)
 
 
-def is_done(found: lib.DegreeGrowth, terms: int | None) -> bool:
-    """Whether nothing was left open that was asked for: `terms` degrees, or (None) a recurrence."""
-    if found.ended in ("terms", "constant", "singular"):
+def is_done(growth: lib.DegreeGrowth, terms: int | None) -> bool:
+    """Whether the request is fulfilled: `terms` degrees, or a recurrence if `terms` is None."""
+    if growth.ended in ("terms", "constant", "singular"):
         return True
-    return terms is None and (found.proof is not None or found.recurrence is not None)
+    return terms is None and (growth.proof is not None or growth.recurrence is not None)
 
 
-def _print(file: lib.SystemFile, found: lib.DegreeGrowth) -> None:
-    eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 61 bits"
+def _print(file: lib.SystemFile, growth: lib.DegreeGrowth) -> None:
+    eps, lines = growth.eps, f"{len(growth.primes)} random lines modulo primes of 61 bits"
     at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_told(eps, file.map)
-    how = f"{lines}: measured, not proved" if found.primes else "powers of the exponent matrix: exact"
+    how = f"{lines}: measured, not proved" if growth.primes else "powers of the exponent matrix: exact"
     print_stdout(f"# {file.name}{at}, {how}")
-    print_stdout(found.text)
+    print_stdout(growth.text)
 
 
 def _record(
-    file: lib.SystemFile, options: dict[str, Any], found: lib.DegreeGrowth, search: SearchProgress
+    file: lib.SystemFile, options: dict[str, Any], growth: lib.DegreeGrowth, search: SearchProgress
 ) -> dict[str, Any]:
-    time_step = lib.eps_record(found.eps, file.map)["time_step"]
+    time_step = lib.eps_record(growth.eps, file.map)["time_step"]
     return record_of(
         "degrees",
         file,
-        "modulo the primes of the lines" if found.primes else "exact",
+        "modulo the primes of the lines" if growth.primes else "exact",
         time_step="generic" if time_step == "every" else time_step,
         **search.work,
         **opt.given(options, "max_degree", terms_asked="terms"),
-        **found.to_json(),
+        **growth.to_json(),
     )

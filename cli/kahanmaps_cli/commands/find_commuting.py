@@ -17,15 +17,15 @@ from kahanmaps_cli.screen.progress import SearchProgress
 @click.option(
     "--shape",
     type=click.Choice(["linear", "quadratic"]),
-    help="Form of g: linear (g = B f with a constant matrix B) or quadratic (any g of degree at most 2; default in "
-    "dimension 1 to 3).",
+    help="linear: g = B f with a constant matrix B; quadratic: any g of degree at most 2 (the default in dimension 1 "
+    "to 3, where it takes a second).",
 )
 @opt.seed_option
-@opt.error_bits_option("Bound the error probability of supported solutions by 2^-BITS.")
+@opt.error_bits_option("A statement reported as supported is false with probability below 2^-BITS.")
 @opt.effort_options
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Find all g over Q whose Kahan maps commute with that of SYSTEM, x' = f(x), at the same eps, for every eps.
+    """Find all rational g whose Kahan map commutes with that of SYSTEM, x' = f(x), at the same eps, for every eps.
 
     \b
       kahanmaps find-commuting paper_m3
@@ -34,18 +34,19 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps find-commuting pair.toml --json | jq '.solutions[].B'
       kahanmaps find-commuting "x' = a*x^2; y' = y^2" -p 'a=root of t^2 - 2'
 
-    First the g with [f, g] = 0 by linear algebra; then equations from the next powers of eps, solved over Q; then every
-    solution is proved, or supported at random points. No solution is discarded at any stage, so the list is complete
-    unless it says otherwise. A system over a number field is treated as a system over Q; "g = B f" is then the default
-    in every dimension. 0, f and -f always commute and are omitted; --json has them, marked by "trivial".
+    Linear algebra gives all g with [f, g] = 0; the next powers of eps give further equations, which are solved over Q;
+    then every solution is proved, or supported at random points. No solution is discarded at any stage, so the list is
+    complete unless the output says otherwise. A system over a number field is treated as the corresponding larger
+    system over Q, and "g = B f" is then the default in every dimension. 0, f and -f always commute and are left out;
+    --json has them, marked in "trivial".
 
-    Exit status: 0 the list is complete, 2 usage error, 3 something remained open.
+    Exit status: 0 the list is complete, 2 usage error, 3 undecided: there may be more.
     """
     file = opt.load_system(system, {**options, "quiet": quiet})
     seed, error_bits = options["seed"], options["error_bits"]
     settings = lib.Settings(seed=seed, error_bits=error_bits)
     with SearchProgress({**options, "quiet": quiet}) as search:
-        found = lib.find_commuting(
+        commuting = lib.find_commuting(
             file.system if file.map.root is None else file.map,
             options["shape"],
             seed=seed,
@@ -53,5 +54,5 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             effort=options["effort"],
             progress=search,
         )
-    heading = f"# find-commuting: {file.name}, {found.kind_text}, every eps (the time step is 2 eps)"
-    return print_list("find-commuting", heading, found, search, settings.context([file], **search.work), as_json)
+    heading = f"# find-commuting: {file.name}, {commuting.kind_text}, every eps (the time step is 2 eps)"
+    return print_list("find-commuting", heading, commuting, search, settings.context([file], **search.work), as_json)

@@ -25,19 +25,21 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps find-symmetry --vars x,y --rhs 'x*(1 - y)' --rhs 'y*(x - 1)'
       kahanmaps find-symmetry lorenz --json | jq .group
 
-    Kahan's method is equivariant under affine changes of variables: T(x) = S x + r is a symmetry for every eps if and
+    Kahan's method is equivariant under affine changes of variables: for every eps, T(x) = S x + r is a symmetry if and
     only if f(T(x)) = S f(x), and a reversing symmetry if and only if f(T(x)) = -S f(x). Hence every symmetry reported
     is proved.
 
-    The search covers one-parameter groups and a scaling; signed permutations of the variables, or of scaled variables,
-    with a translation (dimension at most 12); and in dimension at most 3 all rational matrices, unless they form
-    one-parameter groups. -I reverses every homogeneous quadratic system, which is reported as trivial. A finite group
-    is given by generators; --json lists its elements.
+    The search covers one-parameter groups and a scaling; signed permutations of the variables or of scaled variables,
+    with a translation (dimension at most 12); and in dimension at most 3 all rational matrices, unless there are
+    one-parameter groups of linear maps. -I reverses every homogeneous quadratic system; it is reported as trivial. A
+    finite group is given by generators; --json lists its elements.
 
-    Exit status: 0 the search is complete, 2 usage error, 3 it was too large or the budget was spent.
+    Exit status: 0 all searches completed, 2 usage error, 3 a search was too large or the budget was spent.
     """
     file = load_system(system, {**options, "quiet": quiet})
     with SearchProgress({**options, "quiet": quiet}) as search:
-        found = lib.linear_symmetries(file.system, effort=options["effort"], progress=search)
-    heading = f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved"
-    return print_list("find-symmetry", heading, found, search, lib.Settings().context([file], **search.work), as_json)
+        symmetries = lib.linear_symmetries(file.system, effort=options["effort"], progress=search)
+    heading = f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); every symmetry is proved"
+    return print_list(
+        "find-symmetry", heading, symmetries, search, lib.Settings().context([file], **search.work), as_json
+    )

@@ -85,18 +85,18 @@ def command(system: str | None, **options: Any) -> int:
             from kahanmaps_cli.runs.search import symbols_and_eps
 
             symbols, eps = symbols_and_eps(options)
-            arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
-            reached: list[lib.Analysis] = []
+            asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
+            results: list[lib.Analysis] = []
             try:
-                lib.analyze(opt.load_system(system, options), **arguments, progress=search, reached=reached.append)
+                lib.analyze(opt.load_system(system, options), **asked, progress=search, on_result=results.append)
                 search("the page")
-                html = lib.report_html(reached[-1], explore=options["explore"], **how)
+                html = lib.report_html(results[-1], explore=options["explore"], **how)
             except lib.TimeLimit:
-                if not reached:
+                if not results:
                     raise
-                reached[-1].interrupt("stopped (--seconds)")
-                html = lib.report_html(reached[-1], **{**how, "pictures": False}, left_out=[search.ending])
-            status = 3 if search.is_over or reached[-1].conclusion.kind == "undecided" else 0
+                results[-1].interrupt("stopped (--seconds)")
+                html = lib.report_html(results[-1], **{**how, "pictures": False}, left_out=[search.ending])
+            status = 3 if search.is_over or results[-1].conclusion.kind == "undecided" else 0
         else:
             # Without SYSTEM, verify and the options of a random member need a member of the family.
             draws = not is_named and (is_drawn or options["source"] == "verify")

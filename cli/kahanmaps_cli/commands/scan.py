@@ -24,11 +24,15 @@ from kahanmaps_cli.screen.terminal import print_stdout
     "analysis",
     type=click.IntRange(lib.LEAST_EFFORT, lib.MOST_EFFORT),
     metavar="E",
-    help="Analyze a member of each slow class, with this effort.",
+    help="Analyze a member of each class of special members, with this effort.",
 )
-@click.option("--toml", "as_toml", is_flag=True, help="A member of each component as a system file, one after another.")
+@click.option("--toml", "as_toml", is_flag=True, help="Print a member of each component as a system file.")
 @click.option(
-    "--write-to", "folder", type=OutputFolder(), metavar="DIR", help="Write these to DIR, in the place of earlier ones."
+    "--write-to",
+    "folder",
+    type=OutputFolder(),
+    metavar="DIR",
+    help="Write these system files to DIR; those of an earlier scan are replaced.",
 )
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
@@ -41,21 +45,22 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze -1 --write-to out
       kahanmaps scan lorenz --over s,b,r --effort 3
 
-    The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
-    smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
-    as a condition over Q. It is confirmed at random members by the computation of `degrees`, and a rational member
-    tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
+    The degrees of the first iterates are measured for all members with parameters in GF(p), for several small primes p.
+    Members with smaller degrees than a generic member are special. They form points, lines, curves and surfaces; those
+    that appear modulo all primes are lifted to conditions over Q. A condition is confirmed at random members by the
+    computation of `degrees`, and the growth is that of a rational member. All this is evidence, and no proof.
 
-    With two or three parameters members on random lines of parameter space are tried besides, modulo primes at which
-    quadratic fields split: so a^2 - 2 = 0 is found as one curve. The effort is for everything together; what
-    exceeded it is told.
+    With two or three parameters, members on random lines of parameter space are tried as well, modulo primes at which
+    quadratic fields split, so that a^2 - 2 = 0 is found as one curve. The effort limits the whole scan; what it did not
+    allow is reported.
 
-    Without --eps: conditions that hold for every eps; with eps among the parameters also those that contain it. With
-    more than three parameters members on random lines and planes of parameter space are tried, which finds what has
-    codimension 1 and 2, as two linear conditions or a linear one and another. What can have been missed is told.
+    Without --eps the conditions hold for every eps; with eps among the parameters they may contain it. With more than
+    three parameters, only members on random lines and planes of parameter space are tried. This finds conditions of
+    codimension 1, and of codimension 2 where at least one of two equations is linear. The output says what may
+    have been missed.
 
-    Exit status: 0 done, whatever was found; 2 usage error; 3 the budget was spent: what was left out is told; 130
-    interrupted, with what was found up to then.
+    Exit status: 0 completed, whatever was found; 2 usage error; 3 the budget was spent, and what was not done is
+    reported; 130 interrupted, with the results up to then.
     """
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")

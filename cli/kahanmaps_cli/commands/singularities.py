@@ -20,33 +20,34 @@ from kahanmaps_cli.screen.terminal import formula, print_stdout
     "--steps",
     type=int,
     metavar="N",
-    help="Trace each hypersurface for N steps (default: 1000, 500, 250 in dimension 2, 3, 4, else 100).",
+    help="Follow each hypersurface for N steps (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
 )
 @opt.effort_options
 @opt.seed_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Trace the singularities of the map of SYSTEM: are they confined, and after how many steps?
+    """Test the singularities of the map of SYSTEM for confinement.
 
     \b
       kahanmaps singularities euler_top
       kahanmaps singularities lotka_volterra --eps 1/10 --steps 20
       kahanmaps singularities --vars x,y --rhs y --rhs '6*x^2 - 2' --json
 
-    The exceptional hypersurfaces (those contracted by the map, among them det(I - eps f'(x)) = 0) are computed over Q
-    and traced by power series modulo large primes: which dimensions do their images have, and when is the dimension
-    full again? Without --eps two values are compared.
+    The exceptional hypersurfaces, those that the map contracts, are computed over Q, together with the zeros of the
+    denominator det(I - eps f'(x)). Their images are followed along power series modulo large primes. A singularity is
+    confined if after some steps the image is a hypersurface again. Without --eps two values are tried and compared.
 
-    "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles. Z is the
-    hyperplane at infinity. Confinement is evidence for integrability, not proof: the singularities of henon_heiles are
-    confined, and its degrees grow exponentially. "not confined" comes with the number of steps that were tried. A map
-    that is not dominant (its image lies in a hypersurface) is not traced.
+    "ranks" are the dimensions of the images after 1, 2, ... steps, and "pole orders" the orders at which they lie at
+    infinity, for the first steps. Z is the hyperplane at infinity. Confined singularities are evidence for
+    integrability, and no proof: those of henon_heiles are confined, and its degrees grow exponentially. "not confined"
+    is given with the number of steps that were tried. Where the map is not dominant, so that its image lies in a
+    hypersurface, nothing is followed.
 
-    A composition too long to be expanded is traced map by map: its steps are single maps, and each hypersurface is
-    listed with the map that contracts it.
+    A composition too long to be multiplied out is followed map by map: steps are then single maps, and each
+    hypersurface is listed with the map that contracts it.
 
-    Where the polynomials are too large, ? stands for all hypersurfaces of equal multiplicity and behavior, known by
-    random points.
+    Where polynomials are too large, ? stands for all hypersurfaces with the same multiplicity and the same outcome,
+    which are represented by random points.
 
     Exit status: 0 done, 2 usage error, 3 undecided (the budget was spent, or two points or two eps differ).
     """
@@ -93,9 +94,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         print_stdout(f"\n# {runs[0].text if agree else verdict}")
     if verdict == lib.UNDECIDED and not quiet and not search.is_over:
         if any(run.stopped for run in runs):
-            why = "the budget was spent: give more --effort"
+            why = "work limit reached; raise --effort"
         elif not agree:
-            why = "the two values of eps disagree: try others with --eps"
+            why = "the two values of eps give different results; choose one with --eps"
         else:
             why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
         print_stderr(f"undecided: {why}")
@@ -113,10 +114,10 @@ def _run_record(file: lib.SystemFile, run: lib.SingularityRun) -> dict[str, Any]
         "maps_a_step": None if run.word is None else run.word.length,
         "hypersurfaces": [
             {
-                **lib.attributes(found, *of_each, "followed", "settled_at", "note", "stage"),
-                **{name: [getattr(step, of) for step in found.steps] for name, of in steps.items()},
-                "primes": [str(prime) for prime in found.primes],
+                **lib.attributes(surface, *of_each, "followed", "settled_at", "note", "stage"),
+                **{name: [getattr(step, of) for step in surface.steps] for name, of in steps.items()},
+                "primes": [str(prime) for prime in surface.primes],
             }
-            for found in run.hypersurfaces
+            for surface in run.hypersurfaces
         ],
     }

@@ -11,7 +11,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import InputError
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.commands.degrees import degree_options, is_done, measured
+from kahanmaps_cli.commands.degrees import degree_options, is_done, measure
 from kahanmaps_cli.commands.heights import height_options, require_heights, surveyed
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawing, picture
@@ -84,7 +84,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         def on_progress(sentence: str, name: str = file.label) -> None:
             progress(f"{name}: {sentence}")
 
-        found = measured(file, eps, options, on_progress)
+        found = measure(file, eps, options, on_progress)
         add(file.label, found)
         if not is_done(found, None):
             early.append(f"{file.label}: stopped early: {found.message}")

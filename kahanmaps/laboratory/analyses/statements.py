@@ -1,4 +1,4 @@
-"""What the report says of each result: the lines of its sections, in the order of the report."""
+"""The statements of the report about each result: the lines of its sections, in the order of the report."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
+from kahanmaps.laboratory.analysis_result import AnalysisResult, Statement
 from kahanmaps.laboratory.conclusion import doubt_of_heights
-from kahanmaps.laboratory.findings import Findings, Statement
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, under_map
 from kahanmaps.laboratory.singular.outcomes import SingularityOutcome
 from kahanmaps.laboratory.symmetry.commuting import CommutingField
@@ -19,59 +19,63 @@ from kahanmaps.laboratory.symmetry.symmetries import MATRICES
 
 PROVED, MEASURED, UNDECIDED, NOTE = Certainty.PROVED, Certainty.MEASURED, Certainty.UNDECIDED, Certainty.NOTE
 
-_POINTS = 8  # as many fixed points as three quadratic equations have
-_NAMES = 6  # that are listed one by one
-_DEGREES = 12  # that are shown
-_FIELDS = 6  # that are listed one by one
-_LONG = 300  # characters of a sentence with a formula
+MAX_POINTS = 8  # the number of fixed points that three quadratic equations have
+MAX_NAMES = 6  # listed one by one
+MAX_DEGREES = 12  # printed
+MAX_FIELDS = 6  # listed one by one
+MAX_CHARACTERS = 300  # of a sentence with a formula
 
 
-def of_vector_field(found: Findings) -> Iterator[Statement]:
-    """div f and the fixed points, the first of them only where there are many."""
-    search = found.fixed_points
+def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
+    """div f, and the fixed points or the first of many."""
+    search = result.fixed_points
     if search is None:
         return
-    divergence = format_polynomial(found.file.system.divergence)
+    divergence = format_polynomial(result.file.system.divergence)
     yield Statement(PROVED, f"div f = {divergence}{': the flow preserves volume' if divergence == '0' else ''}")
-    yield from (Statement(PROVED, one.text) for one in search.found[:_POINTS])
-    if len(search.found) > _POINTS:
-        more = counted(len(search.found) - _POINTS, "more set")
-        yield Statement(NOTE, f"and {more} of fixed points: --json lists them")
+    yield from (Statement(PROVED, points.text) for points in search.found[:MAX_POINTS])
+    if len(search.found) > MAX_POINTS:
+        more = counted(len(search.found) - MAX_POINTS, "more set")
+        yield Statement(NOTE, f"and {more} of fixed points, which --json lists")
     if search.undecided:
         yield Statement(UNDECIDED, f"not all fixed points were found: {search.undecided}")
     elif not search.found:
-        yield Statement(PROVED, "f = 0 has no solution, not over the complex numbers either: no fixed point")
+        yield Statement(PROVED, "f = 0 has no solution over the complex numbers: there is no fixed point")
     else:
         # Fixed points of the flow are those of the map where det(I - eps f'(x)) is not 0.
-        known = [one.are_fixed_by_map(found.eps) for one in search.found]
-        lost = [one.where for one, is_fixed in zip(search.found, known, strict=True) if is_fixed is False]
-        where = "" if all(known) else " where det(I - eps f'(x)) is not 0"
-        if lost:
-            where += f"; at eps = {found.eps} it is 0 at the {', the '.join(lost)}, where the map has no value"
+        are_fixed = [points.are_fixed_by_map(result.eps) for points in search.found]
+        undefined = [
+            points.where for points, is_fixed in zip(search.found, are_fixed, strict=True) if is_fixed is False
+        ]
+        where = "" if all(are_fixed) else " where det(I - eps f'(x)) is not 0"
+        if undefined:
+            where += f"; at eps = {result.eps} it is 0 at the {', the '.join(undefined)}, where the map is not defined"
         multiplier = "an eigenvalue lambda of f' becomes the multiplier (1 + eps*lambda)/(1 - eps*lambda) of the map"
         text = f"flow and map have the same fixed points{where}; {multiplier}"
-        if len(lost) == len(known):
-            text = f"at eps = {found.eps} det(I - eps f'(x)) is 0 at all of them: the map has no value there"
+        if len(undefined) == len(are_fixed):
+            text = f"at eps = {result.eps} det(I - eps f'(x)) is 0 at all of them, where the map is not defined"
         yield Statement(NOTE, text)
-    if found.equivalent is not None:
-        yield Statement(PROVED, found.equivalent.text)
+    if result.equivalent is not None:
+        yield Statement(PROVED, result.equivalent.text)
 
 
-def of_integrals(found: Findings) -> Iterator[Statement]:
-    """Formulas, what is measured along orbits, relations there, and the curves of a planar integral."""
-    if (search := found.integrals) is not None:
-        texts = [(one, one.short_text) for one in search.integrals] + [(one, one.text) for one in search.in_iterates]
-        yield from (Statement(one.verdict, f"{one.name} = {text}  [{one.origin}]") for one, text in texts)
+def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
+    """Formulas, measurements and relations along orbits, and the curves of a planar integral."""
+    if (search := result.integrals) is not None:
+        for integral in search.integrals:
+            yield Statement(integral.verdict, f"{integral.name} = {integral.short_text}  [{integral.origin}]")
+        for iterated in search.in_iterates:
+            yield Statement(iterated.verdict, f"{iterated.name} = {iterated.text}  [{iterated.origin}]")
         for timed in search.time_dependent:
             text = f"{timed.name} = {timed.text} at the n-th point, an integral that depends on n"
             yield Statement(timed.integral.verdict, text)
         profile = search.profile
         if search.by_theorems:
             number = counted(search.by_theorems, "independent integral")
-            status = MEASURED if search.symbols else PROVED  # of symbols random values are looked at
+            status = MEASURED if search.symbols else PROVED  # with symbols: at random values of them
             yield Statement(status, f"{number} by theorems: {search.theorems}")
         if not profile.nullities:
-            yield Statement(UNDECIDED, f"how many integrals there are was not measured: {search.reason}")
+            yield Statement(UNDECIDED, f"the number of integrals was not measured: {search.reason}")
         elif profile.period is not None:
             yield Statement(MEASURED, f"all orbits tried close after {counted(profile.period, 'step')}")
         else:
@@ -88,203 +92,205 @@ def of_integrals(found: Findings) -> Iterator[Statement]:
             relations += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
             yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relations)}")
             if not profile.agree:
-                yield Statement(NOTE, "the orbits that were compared do not agree")
-        yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations)
-        if integrals := list(dict.fromkeys(name for relation in found.relations for name in relation.integrals)):
+                yield Statement(NOTE, "the orbits that were compared disagree")
+        yield from (Statement(MEASURED, f"along orbits {relation.text}") for relation in result.relations)
+        if integrals := list(dict.fromkeys(name for relation in result.relations for name in relation.integrals)):
             text = "are constant on each orbit and differ between orbits, so they are integrals"
             if len(integrals) == 1:
                 text = "is constant on each orbit and differs between orbits, so it is an integral"
             yield Statement(NOTE, f"{_listed(integrals)} {text}")
-        if functions := list(dict.fromkeys(name for relation in found.relations for name in relation.functions_of_eps)):
+        if functions := list(
+            dict.fromkeys(name for relation in result.relations for name in relation.functions_of_eps)
+        ):
             depend = "depends" if len(functions) == 1 else "depend"
             yield Statement(NOTE, f"{_listed(functions)} {depend} on eps only")
         if search.reason and profile.nullities:
             yield Statement(NOTE, search.reason)
-    if isinstance(found.normal_form, SystemNormalForm):
-        number = counted(found.normal_form.form.m, "independent integral")
+    if isinstance(result.normal_form, SystemNormalForm):
+        number = counted(result.normal_form.form.m, "independent integral")
         yield Statement(PROVED, f"{number}, as a member of the commuting family")
-    if found.pencil is not None:
-        growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-        against = found.pencil.contradiction(growth)
-        follows = f"but {against}" if against else found.pencil.motion(growth)
-        text = "; ".join(filter(None, [found.pencil.text, follows]))
+    if result.pencil is not None:
+        growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
+        against = result.pencil.contradiction(growth)
+        follows = f"but {against}" if against else result.pencil.motion(growth)
+        text = "; ".join(filter(None, [result.pencil.text, follows]))
         yield Statement(UNDECIDED if against else MEASURED, text)
 
 
 def _listed(names: Sequence[str]) -> str:
-    """The names, only the first and the last one of many."""
-    return ", ".join(names) if len(names) <= _NAMES else f"{names[0]}, ..., {names[-1]}"
+    """The names, or the first and the last of many."""
+    return ", ".join(names) if len(names) <= MAX_NAMES else f"{names[0]}, ..., {names[-1]}"
 
 
-def of_densities(found: Findings) -> Iterator[Statement]:
-    """The densities, or why none was found."""
-    search = found.densities
+def of_densities(result: AnalysisResult) -> Iterator[Statement]:
+    """The densities, or the reason why none was found."""
+    search = result.densities
     if search is None:
         return
     if search.densities:
-        yield from (Statement(one.verdict, f"dx/phi is invariant, phi = {one.text}") for one in search.shown)
+        yield from (Statement(phi.verdict, f"dx/phi is invariant, phi = {phi.text}") for phi in search.shown)
         if len(search.densities) > 1:
-            names = [] if found.integrals is None else [one.name for one in found.integrals.integrals]
+            names = [] if result.integrals is None else [integral.name for integral in result.integrals.integrals]
             times = f"any function of {_listed(names)}" if names else "any integral"
-            yield Statement(NOTE, f"so is dx/phi for this phi times {times}")
+            yield Statement(NOTE, f"dx/phi is also invariant for this phi times {times}")
     else:
         yield Statement(MEASURED if search.shows_none else UNDECIDED, search.reason)
     if search.anti_invariant is not None:
-        text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.anti_invariant.text}"
+        text = f"|dx/phi| is invariant, and the map changes the sign of dx/phi, phi = {search.anti_invariant.text}"
         yield Statement(search.anti_invariant.verdict, text)
 
 
-def of_flow(found: Findings) -> Iterator[Statement]:
-    """A line for each thing kept, deformed or lost."""
-    if found.flow is not None:
-        yield from (Statement(Certainty(known), text) for known, text in found.flow.lines())
+def of_flow(result: AnalysisResult) -> Iterator[Statement]:
+    """A line for each structure of the flow that the map keeps, deforms or loses."""
+    if result.flow is not None:
+        yield from (Statement(Certainty(known), text) for known, text in result.flow.lines())
 
 
-def of_poisson_tensors(found: Findings) -> Iterator[Statement]:
-    """The tensor of a member of the family, and those found."""
-    search = found.poisson
-    if isinstance(found.normal_form, SystemNormalForm) and found.normal_form.form.m > 1:
-        text = f"with {found.normal_form.form.m} integrals in involution, as a member of the commuting family"
+def of_poisson_tensors(result: AnalysisResult) -> Iterator[Statement]:
+    """The tensor of a member of the commuting family, and the tensors of the search."""
+    search = result.poisson
+    if isinstance(result.normal_form, SystemNormalForm) and result.normal_form.form.m > 1:
+        text = f"with {result.normal_form.form.m} integrals in involution, as a member of the commuting family"
         yield Statement(PROVED, f"J - eps^2 f'(x)^2 J is an invariant Poisson tensor, {text}")
     if search is not None:
-        yield from (Statement(one.verdict, f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors)
+        yield from (Statement(P.verdict, f"{P.name}: {P.short_text}; {P.statement}") for P in search.tensors)
         if search.note:
             yield Statement(NOTE, search.note)
 
 
-def of_growth(found: Findings) -> Iterator[Statement]:
-    """Degrees with their recurrence, then heights."""
-    degrees, heights = found.degrees, found.heights
+def of_growth(result: AnalysisResult) -> Iterator[Statement]:
+    """The degrees with their recurrence, then the heights."""
+    degrees, heights = result.degrees, result.heights
     if degrees is not None:
-        shown = ", ".join(map(str, degrees.degrees[1 : _DEGREES + 1]))
-        more = ", ..." if len(degrees.degrees) > _DEGREES + 1 else ""
+        shown = ", ".join(map(str, degrees.degrees[1 : MAX_DEGREES + 1]))
+        more = ", ..." if len(degrees.degrees) > MAX_DEGREES + 1 else ""
         if shown:
             status = MEASURED if degrees.primes else PROVED  # by powers of a matrix
             yield Statement(status, f"degrees of the iterates: {shown}{more}")
         yield Statement(degrees.known, degrees.growth_text)
         if degrees.recurrence is not None:
-            known = MEASURED if degrees.explained is None else Certainty.EXPLAINED
+            known = MEASURED if degrees.derived is None else Certainty.DERIVED
             yield Statement(known, f"recurrence: {degrees.recurrence.text}")
             if degrees.recurrence.closed_form_text:
                 yield Statement(known, f"d_n = {degrees.recurrence.closed_form_text}")
         if degrees.enclosure is not None:
             yield Statement(PROVED, degrees.enclosure.text)
     if heights is not None:
-        doubt = doubt_of_heights(found)
+        doubt = doubt_of_heights(result)
         status = UNDECIDED if doubt or heights.kind is Growth.UNDECIDED else MEASURED
-        yield Statement(status, f"{heights.text}, but {doubt}" if doubt else heights.text)
+        yield Statement(status, f"{heights.text}; inconclusive: {doubt}" if doubt else heights.text)
 
 
-def of_singularities(found: Findings) -> Iterator[Statement]:
-    """The outcome at all values of eps, where they agree."""
-    if not found.singularities:
+def of_singularities(result: AnalysisResult) -> Iterator[Statement]:
+    """The outcome at all values of eps, if they agree."""
+    if not result.singularities:
         return
-    verdicts = {run.verdict for run in found.singularities}
-    values = ", ".join(format_number(run.eps) for run in found.singularities)
+    verdicts = {run.verdict for run in result.singularities}
+    values = ", ".join(format_number(run.eps) for run in result.singularities)
     if len(verdicts) > 1:
-        yield Statement(UNDECIDED, f"the eps {values} disagree: {', '.join(sorted(verdicts))}")
+        yield Statement(UNDECIDED, f"the values {values} of eps disagree: {', '.join(sorted(verdicts))}")
         return
-    first = min(found.singularities, key=lambda run: run.followed or 0)
-    at = f" (eps = {values})" if found.file.map.has_eps else ""
+    first = min(result.singularities, key=lambda run: run.followed or 0)
+    at = f" (eps = {values})" if result.file.map.has_eps else ""
     status = UNDECIDED if first.verdict == SingularityOutcome.UNDECIDED else MEASURED
     yield Statement(status, f"{first.text}{at}")
-    ends = [h.confined_at for run in found.singularities for h in run.hypersurfaces if h.confined_at is not None]
+    ends = [h.confined_at for run in result.singularities for h in run.hypersurfaces if h.confined_at is not None]
     if ends:
-        yield Statement(MEASURED, f"the last confinement comes after {counted(max(ends), first.unit)}")
+        yield Statement(MEASURED, f"the longest confined pattern has {counted(max(ends), first.unit)}")
 
 
-def of_symmetries(found: Findings) -> Iterator[Statement]:
-    """Groups with their generators."""
-    search = found.symmetries
+def of_symmetries(result: AnalysisResult) -> Iterator[Statement]:
+    """One-parameter groups, and the finite group by its generators."""
+    search = result.symmetries
     if search is None:
         return
-    told = []
-    if (linear := len(search.infinitesimal)) > _FIELDS:
-        told.append(f"a Lie algebra of affine symmetries, of dimension {linear}")
+    texts = []
+    if (linear := len(search.infinitesimal)) > MAX_FIELDS:
+        texts.append(f"a Lie algebra of affine symmetries, of dimension {linear}")
     else:
         fields = [f"({', '.join(x.rhs)})" for x in search.infinitesimal]
-        told += [f"a one-parameter group of symmetries, the flow of {field}" for field in fields]
+        texts += [f"a one-parameter group of symmetries, the flow of {field}" for field in fields]
     if search.group_text:
-        generators = "; ".join(f"the {one.kind} {one.text}" for one in search.generators)
-        told.append(f"{search.group_text}, generated by {generators}")
+        generators = "; ".join(f"the {t.kind} {t.text}" for t in search.generators)
+        texts.append(f"{search.group_text}, generated by {generators}")
     if search.group_of != MATRICES:
-        told += [f"{one.kind} {one.text}" for one in search.others]
-    if found.defect:
-        yield Statement(NOTE, f"of the vector field only: {found.defect}")
-    yield from (Statement(PROVED, text) for text in told)
+        texts += [f"{t.kind} {t.text}" for t in search.others]
+    if result.defect:
+        yield Statement(NOTE, f"these are symmetries of the vector field only: {result.defect}")
+    yield from (Statement(PROVED, text) for text in texts)
     yield from (Statement(UNDECIDED, text) for text in search.undecided)
-    if not (found.defect or told or search.undecided):
-        yield Statement(NOTE, "no affine symmetry of the kinds searched, apart from the identity")
+    if not (result.defect or texts or search.undecided):
+        yield Statement(NOTE, "the search found no affine symmetry but the identity")
 
 
-def of_structure(found: Findings) -> Iterator[Statement]:
-    """H, invariant hyperplanes, the commuting family and the normal form."""
-    structures = found.hamiltonian
+def of_structure(result: AnalysisResult) -> Iterator[Statement]:
+    """The Hamiltonian, invariant hyperplanes, the commuting family and the normal form."""
+    structures = result.hamiltonian
     if structures is not None and structures.hamiltonian is not None:
         H = format_polynomial(structures.hamiltonian.H)
         kind = "the standard J" if structures.hamiltonian.is_standard else "a constant skew J"
         yield Statement(PROVED, f"Hamiltonian with {kind}, H = {H}")
     elif structures is not None and structures.proved:
         yield Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}")
-    if found.file.is_quadratic:
-        yield from _hyperplanes(found)
-    if found.normal_form is not None and found.normal_form.text:
-        text = f"belongs to the commuting family: {found.normal_form.text}"
-        centre = f"({', '.join(map(format_number, found.centre))})" if found.centre and any(found.centre) else ""
-        if found.normal_form.T is not None or centre:
-            moved = "y" if found.normal_form.T is None else "T y"
+    if result.file.is_quadratic:
+        yield from _hyperplanes(result)
+    if result.normal_form is not None and result.normal_form.text:
+        text = f"belongs to the commuting family: {result.normal_form.text}"
+        centre = f"({', '.join(map(format_number, result.centre))})" if result.centre and any(result.centre) else ""
+        if result.normal_form.T is not None or centre:
+            moved = "y" if result.normal_form.T is None else "T y"
             text += f", in coordinates y with x = {' + '.join(filter(None, [centre, moved]))}"
         yield Statement(PROVED, text)
-    if found.tensor is not None:
-        text = "" if found.defect else ": the map is that over K, and inherits what it has (docs/beyond.md)"
-        yield Statement(PROVED, f"{found.tensor.text}{text}")
-    if isinstance(found.normal_form, SystemNormalForm):
-        form = found.normal_form.form
-        text = f"normal form: the planar map of h(X, Y) = {form.h_text} over Q[t]/({form.chi_text}), a block for each"
-        yield Statement(PROVED, f"{text} root t")
+    if result.tensor is not None:
+        text = "" if result.defect else ": the map is the Kahan map over K, and has what that one has (docs/beyond.md)"
+        yield Statement(PROVED, f"{result.tensor.text}{text}")
+    if isinstance(result.normal_form, SystemNormalForm):
+        form = result.normal_form.form
+        text = f"normal form: the planar map of h(X, Y) = {form.h_text} over Q[t]/({form.chi_text}), one block for"
+        yield Statement(PROVED, f"{text} each root t")
 
 
-def _hyperplanes(found: Findings) -> Iterator[Statement]:
-    """Those that the flow keeps, by what becomes of them under the map at the eps in force."""
-    system, eps = found.file.system, found.eps
-    fates: dict[str, list[str]] = {}
-    for one in affine_darboux(system).functions:
-        fate = "not birational" if found.defect else "invariant"
-        if eps is not None and not found.defect:
-            fate = under_map(system, one.function, eps)
-        fates.setdefault(fate, []).append(f"{format_polynomial(one.function)} = 0")
-    kind = {1: "point", 2: "line", 3: "plane"}.get(found.dim, "hyperplane")
-    for fate, planes in fates.items():
+def _hyperplanes(result: AnalysisResult) -> Iterator[Statement]:
+    """The hyperplanes that are invariant under the flow, grouped by their images under the map."""
+    system, eps = result.file.system, result.eps
+    planes_by_image: dict[str, list[str]] = {}
+    for darboux in affine_darboux(system).functions:
+        image = "not birational" if result.defect else "invariant"
+        if eps is not None and not result.defect:
+            image = under_map(system, darboux.function, eps)
+        planes_by_image.setdefault(image, []).append(f"{format_polynomial(darboux.function)} = 0")
+    kind = {1: "point", 2: "line", 3: "plane"}.get(result.dim, "hyperplane")
+    for image, planes in planes_by_image.items():
         are, it = f"the {kind} {planes[0]} is", "it"
         if len(planes) > 1:
             are, it = f"the {kind}s {', '.join(planes[:-1])} and {planes[-1]} are", "them"
         of_map = {
             "invariant": ", for flow and map",
             "contracted": f" for the flow; at eps = {eps} the map contracts {it}: det(I + eps f'(x)) is 0 there",
-            "undefined": f" for the flow; at eps = {eps} the map has no value on {it}: det(I - eps f'(x)) is 0 there",
-            "undecided": f" for the flow; what the map makes of {it} at eps = {eps} would take too long to decide",
+            "undefined": f" for the flow; at eps = {eps} the map is not defined on {it}: det(I - eps f'(x)) is 0 there",
+            "undecided": f" for the flow; deciding the image of {it} under the map at eps = {eps} would take too long",
             "not birational": " for the flow",
         }
-        yield Statement(PROVED, f"{are} invariant{of_map[fate]}")
+        yield Statement(PROVED, f"{are} invariant{of_map[image]}")
 
 
-def of_commuting_systems(found: Findings) -> Iterator[Statement]:
-    """The g that commute, with g there is -g."""
-    if isinstance(found.normal_form, SystemNormalForm) and (m := found.normal_form.form.m) > 1:
+def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
+    """The systems g whose Kahan maps commute with that of f; -g commutes as g does."""
+    if isinstance(result.normal_form, SystemNormalForm) and (m := result.normal_form.form.m) > 1:
         text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
-        split = all(factor.degree == 1 for factor in factors_of_chi(found.normal_form.form.A))
+        split = all(factor.degree == 1 for factor in factors_of_chi(result.normal_form.form.A))
         yield Statement(PROVED, text if split else f"{text} over the splitting field of chi")
-    search = found.commuting
+    search = result.commuting
     if search is None:
         return
     if search.every_g_commutes:
         yield Statement(PROVED, "the map is the identity and commutes with every other")
-    told: list[CommutingField] = []
-    for one in search.nontrivial:  # with g there is -g, whose map is the inverse
-        if not any(one.system == other.system.scaled(-1) for other in told):
-            told.append(one)
-            text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(one.rhs)})"
-            yield Statement(one.finding.verdict, text)
+    listed: list[CommutingField] = []
+    for g in search.nontrivial:  # with g there is -g, whose map is the inverse
+        if not any(g.system == other.system.scaled(-1) for other in listed):
+            listed.append(g)
+            text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(g.rhs)})"
+            yield Statement(g.finding.verdict, text)
     for k, family in enumerate(search.families):
         opposite = family.base.system.scaled(-1), [g.system for g in family.directions]
         if opposite not in [(other.base.system, [g.system for g in other.directions]) for other in search.families[:k]]:
@@ -294,11 +300,11 @@ def of_commuting_systems(found: Findings) -> Iterator[Statement]:
             which = "g and -g, g" if base else "all g"  # the negatives of these are among them
             letters = ", ".join(f"t{j}" for j in range(1, len(moved) + 1))
             text = f"commutes with the Kahan maps of {which} = {' + '.join([*base, *moved])}, for all {letters}"
-            if len(text) > _LONG:
+            if len(text) > MAX_CHARACTERS:
                 number = counted(len(moved), "parameter")
                 text = f"commutes with a linear family of {number}, which find-commuting writes out"
             yield Statement(family.finding.verdict, text)
     yield from (Statement(NOTE, text) for text in (*search.irrational, search.note) if text)
     yield from (Statement(UNDECIDED, text) for text in search.undecided)
-    if not (told or search.every_g_commutes or search.families or search.irrational or search.undecided):
+    if not (listed or search.every_g_commutes or search.families or search.irrational or search.undecided):
         yield Statement(PROVED, f"among the {search.kind_text} only 0, f and -f commute with f")

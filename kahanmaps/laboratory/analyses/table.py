@@ -1,4 +1,4 @@
-"""All analyses of the report, in the order in which they are done: each may use what was found before."""
+"""The steps of an analysis, in the order in which they run: each may use the results of those before it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, 
 from kahanmaps.family.tensor import TensorStructure, tensor_structure
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.analyses import statements
-from kahanmaps.laboratory.analyses.part import Of, Part, Run
-from kahanmaps.laboratory.findings import Findings
+from kahanmaps.laboratory.analyses.step import AnalysisContext, AnalysisStep, MapKinds
+from kahanmaps.laboratory.analysis_result import AnalysisResult
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -31,7 +31,7 @@ from kahanmaps.laboratory.singular.singularities import (
     default_eps,
     patterns_of,
 )
-from kahanmaps.laboratory.singular.singularities import singularities as follow
+from kahanmaps.laboratory.singular.singularities import singularities as find_singularities
 from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
@@ -40,206 +40,232 @@ from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 _POISSON_DIMENSIONS = (3, 4)  # in the plane Poisson tensors are densities, and in more dimensions they take long
 
 
-def _family(run: Run, **_: Any) -> SystemNormalForm | NoNormalForm:
+def _family(context: AnalysisContext, **_: Any) -> SystemNormalForm | NoNormalForm:
     """The normal form of a member of the commuting family, in coordinates with the centre as origin."""
-    known = run.found.hamiltonian
-    if known is None or known.hamiltonian is None:
-        return system_normal_form(run.field)
-    moved = known.hamiltonian if known.hamiltonian.centre is None else known.hamiltonian.about(known.hamiltonian.centre)
-    return system_normal_form(moved.system, moved)
+    structures = context.result.hamiltonian
+    if structures is None or structures.hamiltonian is None:
+        return system_normal_form(context.field)
+    hamiltonian = structures.hamiltonian
+    if hamiltonian.centre is not None:
+        hamiltonian = hamiltonian.about(hamiltonian.centre)
+    return system_normal_form(hamiltonian.system, hamiltonian)
 
 
-def _family_json(found: Findings) -> dict[str, Any]:
-    """What a member of the family is one by, and what follows: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
+def _family_json(result: AnalysisResult) -> dict[str, Any]:
+    """The structure of a member of the commuting family, with x = centre + T y and J = T [[0, I], [-I, 0]] T^T."""
     member = None
-    if isinstance(found.normal_form, SystemNormalForm):
-        form = found.normal_form.form
+    if isinstance(result.normal_form, SystemNormalForm):
+        form = result.normal_form.form
         member = {"chi": form.chi_text, "integrals_in_involution": form.m, "associated_maps": 2 ** (form.m - 1)}
-        member |= {**attributes(found.normal_form, "A", "T"), **attributes(found, "centre")}
-    return {"family": (found.normal_form.text or None) if found.normal_form is not None else None, "member": member}
+        member |= {**attributes(result.normal_form, "A", "T"), **attributes(result, "centre")}
+    return {"family": (result.normal_form.text or None) if result.normal_form is not None else None, "member": member}
 
 
-def _algebra(run: Run, **_: Any) -> TensorStructure | None:
-    """The algebra larger than Q over which it is a system; of a member of the family its normal form says more."""
-    return None if isinstance(run.found.normal_form, SystemNormalForm) else tensor_structure(run.field)
+def _algebra(context: AnalysisContext, **_: Any) -> TensorStructure | None:
+    """An algebra larger than Q over which f is defined; not for members of the family, whose normal form has more."""
+    return None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
 
 
-def _singularities(run: Run, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
-    """What becomes of contracted hypersurfaces, at two values of eps or the given one; none of too large a map."""
-    values = default_eps(run.map, run.seed) if run.found.eps is None else (run.found.eps,)
-    if not all(can_be_written(run.map, value, effort.part(1 / len(values))) for value in values):
+def _singularities(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
+    """The singularities at two values of eps or the given one; none where formulas would be too large."""
+    values = default_eps(context.map, context.seed) if context.result.eps is None else (context.result.eps,)
+    if not all(can_be_written(context.map, value, effort.part(1 / len(values))) for value in values):
         return []
     stages = zip(values, effort.share([1] * len(values)), strict=True)
-    return [follow(run.map, value, seed=run.seed, effort=stage, progress=progress) for value, stage in stages]
+    return [
+        find_singularities(context.map, value, seed=context.seed, effort=stage, progress=progress)
+        for value, stage in stages
+    ]
 
 
-def _degrees(run: Run, **given: Any) -> DegreeGrowth:
-    """Degrees of the iterates, with the patterns of singularities to explain them."""
-    runs = run.found.singularities if run.dim <= WRITTEN_DIMENSION else []
-    # Where they are known to the end and are those that `degrees` would ask for itself.
+def _degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
+    """The degrees of the iterates, derived from the singularity patterns where these are known."""
+    runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
+    # Used only where they are known for all steps, and are those that `degrees` would compute itself.
     known = patterns_of(runs) if runs else None
     patterns = None if known is None or known.running else known
-    return degree_growth(run.map, run.found.eps, patterns=patterns, seed=run.seed, **given)
+    return degree_growth(context.map, context.result.eps, patterns=patterns, seed=context.seed, **options)
 
 
-def _curves(run: Run, effort: Budget, **_: Any) -> Pencil | None:
-    """On which curves a planar map with one integral moves."""
-    proved = [one for one in run.integrals if one.verdict is Certainty.PROVED]
-    if run.dim != 2 or len(proved) != 1 or run.has_symbols:
+def _curves(context: AnalysisContext, effort: Budget, **_: Any) -> Pencil | None:
+    """The pencil of invariant curves of a planar map with one integral."""
+    proved = [integral for integral in context.integrals if integral.verdict is Certainty.PROVED]
+    if context.dim != 2 or len(proved) != 1 or context.has_symbols:
         return None
-    return pencil_of(proved[0].name, proved[0].function, run.found.eps, seed=run.seed, effort=effort)
+    return pencil_of(proved[0].name, proved[0].function, context.result.eps, seed=context.seed, effort=effort)
 
 
-def _curves_json(found: Findings) -> dict[str, Any]:
-    """The curves, and what the map is on them; null where the degrees contradict them."""
-    growth = found.degrees.growth if found.degrees is not None else Growth.UNKNOWN
-    if found.pencil is None or found.pencil.contradiction(growth):
+def _curves_json(result: AnalysisResult) -> dict[str, Any]:
+    """The curves, and how the map acts on them; null where the degrees contradict this."""
+    growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
+    if result.pencil is None or result.pencil.contradiction(growth):
         return {"invariant_curves": None}
-    return {"invariant_curves": {**found.pencil.to_json(), "motion": found.pencil.motion(growth)}}
+    return {"invariant_curves": {**result.pencil.to_json(), "motion": result.pencil.motion(growth)}}
 
 
-def _relations(run: Run, **_: Any) -> tuple[SparseRelation, ...]:
-    """Hirota-Kimura relations with few terms, of the lowest degrees that have some."""
-    profile = None if run.found.integrals is None else run.found.integrals.profile
+def _relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]:
+    """Hirota-Kimura relations with few terms, of the lowest degrees in which there are any."""
+    profile = None if context.result.integrals is None else context.result.integrals.profile
     if profile is None or profile.first_degree is None or profile.period is not None:
         return ()
-    found: tuple[SparseRelation, ...] = ()
-    maps = Laboratory(run.bare, (), run.found.eps, run.seed, algebraic=True).maps
+    relations: tuple[SparseRelation, ...] = ()
+    maps = Laboratory(context.file_without_claims, (), context.result.eps, context.seed, algebraic=True).maps
     top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
     for degree in range(profile.first_degree, min(top, profile.degree, 4) + 1):
-        first = 1 + len({name for relation in found for name in relation.names})
-        found += sparse_relations(maps, degree, run.map.variables, first=first) or ()
-    return found
+        first = 1 + len({name for relation in relations for name in relation.names})
+        relations += sparse_relations(maps, degree, context.map.variables, first=first) or ()
+    return relations
 
 
-def _poisson(run: Run, effort: Budget, **given: Any) -> PoissonSearch | None:
+def _poisson(context: AnalysisContext, effort: Budget, **options: Any) -> PoissonSearch | None:
     """Invariant tensors of low degree, with their Casimirs and the integrals in involution."""
-    if run.dim not in _POISSON_DIMENSIONS:
+    if context.dim not in _POISSON_DIMENSIONS:
         return None
-    found = find_poisson(run.bare, integrals=(), **run.asked, effort=effort, **given)
-    return with_brackets(found, run.integrals, effort)
+    search = find_poisson(context.file_without_claims, integrals=(), **context.settings, effort=effort, **options)
+    return with_brackets(search, context.integrals, effort)
 
 
-def _densities(run: Run, **given: Any) -> DensitySearch:
-    """One in closed form, or else a product of powers of factors of the integrals, and whether there are others."""
-    return with_factors(find_densities(run.bare, **run.asked, integrals=(), **given), run.integrals)
+def _densities(context: AnalysisContext, **options: Any) -> DensitySearch:
+    """A density in closed form, or a product of powers of factors of the integrals; and whether there are others."""
+    return with_factors(
+        find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
+    )
 
 
-def _flow(run: Run, **given: Any) -> FlowAndMap | None:
+def _flow(context: AnalysisContext, **options: Any) -> FlowAndMap | None:
     """The limits for eps -> 0 of integrals and of a density, and integrals and a density of the flow."""
-    if run.found.integrals is None:
+    if context.result.integrals is None:
         return None
-    flow = flow_and_map(run.found.integrals, known=run.found.integral_count, **given)
-    return None if flow is None else with_limit(flow, run.found.densities)
+    flow = flow_and_map(context.result.integrals, known=context.result.integral_count, **options)
+    return None if flow is None else with_limit(flow, context.result.densities)
 
 
-# The sections in the order of the report; others come after these.
+# The titles of sections in the order of the report; any other title comes after these.
 TITLES = (
     *("vector field", "integrals", "measure", "the flow", "Poisson tensors", "growth", "singularities", "symmetry"),
     *("structure", "commuting systems"),
 )
 
 ANALYSES = (
-    Part(
+    AnalysisStep(
         "Hamiltonian structure",
-        lambda run, **_: constant_structures(run.field, seed=run.seed) if run.dim <= MAX_DIMENSION else None,
-        result="hamiltonian",
+        lambda context, **_: (
+            constant_structures(context.field, seed=context.seed) if context.dim <= MAX_DIMENSION else None
+        ),
+        key="hamiltonian",
         json=lambda _: {},
     ),
-    Part(
+    AnalysisStep(
         "the commuting family",
         _family,
         "structure",
         statements.of_structure,
-        result="normal_form",
-        reads=("Hamiltonian structure", "a larger algebra"),
+        key="normal_form",
+        requires=("Hamiltonian structure", "a larger algebra"),
         json=_family_json,
     ),
-    Part(
+    AnalysisStep(
         "a larger algebra",
         _algebra,
-        result="tensor",
-        json=lambda found: {"algebra": found.tensor and attributes(found.tensor, "text", "C", "rank", chi="chi_text")},
+        key="tensor",
+        json=lambda result: {
+            "algebra": result.tensor and attributes(result.tensor, "text", "C", "rank", chi="chi_text")
+        },
     ),
-    Part(
+    AnalysisStep(
         "fixed points",
-        lambda run, effort, **_: fixed_points(run.field, effort),
+        lambda context, effort, **_: fixed_points(context.field, effort),
         "vector field",
         statements.of_vector_field,
-        result="fixed_points",
-        reads=("equivalent systems",),
+        key="fixed_points",
+        requires=("equivalent systems",),
     ),
-    Part(
+    AnalysisStep(
         "equivalent systems",
-        lambda run, effort, **_: equivalent_system(run.found.file, run.found.fixed_points, effort),
-        result="equivalent",
+        lambda context, effort, **_: equivalent_system(context.result.file, context.result.fixed_points, effort),
+        key="equivalent",
     ),
-    # Degrees make use of singularities; but in more dimensions these are slow, come last, and are not waited for.
-    Part(
+    # Degrees use the singularities. Above dimension 4 these are slow: they run last, and degrees do not wait for them.
+    AnalysisStep(
         "singularities",
         _singularities,
         "singularities",
         statements.of_singularities,
-        Of.MAPS_OVER_Q,
-        share=0.4,
+        MapKinds.OVER_Q,
+        weight=0.4,
         slow_above=WRITTEN_DIMENSION,
-        is_apart=True,
-        json=lambda found: {
-            "singularities": [attributes(run, "eps", "verdict", "followed", "text") for run in found.singularities]
+        is_independent=True,
+        json=lambda result: {
+            "singularities": [attributes(run, "eps", "verdict", "followed", "text") for run in result.singularities]
         },
     ),
-    Part("degrees", _degrees, "growth", statements.of_growth, Of.EVERY, share=0.25, reads=("heights",), is_apart=True),
-    Part(
+    AnalysisStep(
+        "degrees",
+        _degrees,
+        "growth",
+        statements.of_growth,
+        MapKinds.ALL,
+        weight=0.25,
+        requires=("heights",),
+        is_independent=True,
+    ),
+    AnalysisStep(
         "integrals",
-        lambda run, **given: find_integrals(run.bare, **run.asked, **given),
+        lambda context, **options: find_integrals(context.file_without_claims, **context.settings, **options),
         "integrals",
         statements.of_integrals,
-        Of.EVERY,
-        share=0.4,
-        reads=("the commuting family", "degrees", "invariant curves", "relations along orbits"),
+        MapKinds.ALL,
+        weight=0.4,
+        requires=("the commuting family", "degrees", "invariant curves", "relations along orbits"),
     ),
-    Part("invariant curves", _curves, of=Of.MAPS_OVER_Q, result="pencil", json=_curves_json),
-    Part(
+    AnalysisStep("invariant curves", _curves, applies_to=MapKinds.OVER_Q, key="pencil", json=_curves_json),
+    AnalysisStep(
         "relations along orbits",
         _relations,
-        of=Of.EVERY,
-        result="relations",
-        json=lambda found: {"hirota_kimura": [relation.text for relation in found.relations]},
+        applies_to=MapKinds.ALL,
+        key="relations",
+        json=lambda result: {"hirota_kimura": [relation.text for relation in result.relations]},
     ),
-    Part(
+    AnalysisStep(
         "Poisson tensors",
         _poisson,
         "Poisson tensors",
         statements.of_poisson_tensors,
-        Of.MAPS_OVER_Q,
-        result="poisson",
+        MapKinds.OVER_Q,
+        key="poisson",
     ),
-    Part("densities", _densities, "measure", statements.of_densities, Of.EVERY, share=0.25, reads=("integrals",)),
-    Part("the flow", _flow, "the flow", statements.of_flow, Of.MAPS_OVER_Q, share=0.06, result="flow"),
-    Part(
+    AnalysisStep(
+        "densities", _densities, "measure", statements.of_densities, MapKinds.ALL, weight=0.25, requires=("integrals",)
+    ),
+    AnalysisStep("the flow", _flow, "the flow", statements.of_flow, MapKinds.OVER_Q, weight=0.06, key="flow"),
+    AnalysisStep(
         "heights",
-        lambda run, **given: height_survey(run.map, run.found.eps, starts=2, max_digits=5_000, seed=run.seed, **given),
-        of=Of.EVERY,
-        share=0.08,
-        is_apart=True,
+        lambda context, **options: height_survey(
+            context.map, context.result.eps, starts=2, max_digits=5_000, seed=context.seed, **options
+        ),
+        applies_to=MapKinds.ALL,
+        weight=0.08,
+        is_independent=True,
     ),
-    Part(
+    AnalysisStep(
         "symmetries",
-        lambda run, **given: linear_symmetries(run.field, **given),
+        lambda context, **options: linear_symmetries(context.field, **options),
         "symmetry",
         statements.of_symmetries,
-        is_apart=True,
+        is_independent=True,
     ),
-    Part(
+    AnalysisStep(
         "commuting systems",
         # All g of a kind, for every eps.
-        lambda run, **given: (
-            find_commuting(run.system or run.map, seed=run.seed, **given) if run.found.eps is None else None
+        lambda context, **options: (
+            find_commuting(context.system or context.map, seed=context.seed, **options)
+            if context.result.eps is None
+            else None
         ),
         "commuting systems",
         statements.of_commuting_systems,
-        Of.FIELDS | Of.NUMBER_FIELDS,
-        result="commuting",
-        is_apart=True,
+        MapKinds.VECTOR_FIELDS | MapKinds.OVER_NUMBER_FIELDS,
+        key="commuting",
+        is_independent=True,
     ),
 )

@@ -39,7 +39,7 @@ class Ended(StrEnum):
     """What ends the walk along curves, or the search for degrees."""
 
     RECURRENCE = "recurrence"  # one was found, with terms to spare
-    EXPLAINED = "explained"  # by the singularities, and enough terms agree
+    DERIVED = "derived"  # from the singularity patterns, and enough measured terms agree
     PROVED = "proved"  # the degrees are those of powers of a matrix
     UNCONFIRMED = "unconfirmed"  # a recurrence fits, and the patterns of the singularities are not known to the end
     TERMS = "terms"  # as many as asked for

@@ -1,18 +1,17 @@
 """Degrees of the iterates of a Kahan map: d_n is the degree of Phi^n as a map of projective space to itself.
 
 It is measured as the degree of the rational curve t -> Phi^n(a + b t) for a random line over GF(p) (`curves`), with p
-and (where eps is not given) the residue of eps random. A line in special position, or a prime that divides what it
-should not, can only make a degree too small. So two lines, each with a prime and an eps of its own, are compared, and
-where they differ the larger degree stands.
+and (where eps is not given) the residue of eps random. A line in special position, or a bad prime, can only make a
+degree too small. So two lines, each with a prime and an eps of its own, are compared, and the larger degree counts.
 
-A recurrence of the first degrees can be that of another map: nothing is seen of a hypersurface that is contracted until
-its image meets points without a value, perhaps a hundred steps later. So these hypersurfaces are followed
-(`singularities`). Where the orders along all of them are known, the degrees for all times follow (`renewal`): they are
-explained, and the measured ones have to agree. Elsewhere a recurrence of the measured ones counts where there are terms
-enough beyond the last thing that happens to these hypersurfaces.
+A recurrence that fits the first degrees may fail later: an exceptional hypersurface (contracted by the map) lowers no
+degree before its image lies in the indeterminacy locus, perhaps a hundred steps later. So the singularity patterns of
+these hypersurfaces are computed (`singularities`). Where all of them are known, the degrees of all iterates are derived
+from them (`renewal`), and the measured degrees have to agree. Elsewhere a recurrence of the measured degrees is
+accepted only with enough terms beyond the last event of these patterns.
 
-The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for integrable maps as far as is
-known, and its logarithm is the algebraic entropy (bellon-viallet-1999).
+The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for all known integrable maps, and its
+logarithm is the algebraic entropy (bellon-viallet-1999).
 """
 
 from __future__ import annotations
@@ -54,24 +53,24 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 
-_MOST_TERMS = 10_000
+MAX_TERMS = 10_000
 _LINES = 2
-_OFTEN, _SELDOM = 64, 8  # up to so many terms a recurrence is looked for after each, then after so many
+_OFTEN, _SELDOM = 64, 8  # a recurrence is searched for after each of the first 64 terms, then after every 8
 _ENOUGH_QUOTIENTS = 6
-_AGREEING = 12  # terms beyond the pattern of a singularity and as many again, which explained degrees agree in
-_LARGE = 2000  # a degree up to which they do
+_AGREEING = 12  # so many measured terms beyond twice the longest pattern have to agree with the derived ones
+_LARGE = 2000  # a degree from which on no further measured terms have to agree
 _MATRIX_TERMS = 60  # of monomial maps
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
 
 @dataclass(frozen=True)
 class DegreeGrowth(PrintableResult):
-    """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and what they say of its complexity.
+    """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and their growth.
 
-    `eps` is None for generic eps (a random residue for each line). `patterns` is what the singularities say, None where
-    they were not asked. The degrees are measured, and so is what explains them: evidence, and no proof. `enclosure` has
-    bounds of the dynamical degree of planar maps that are proved, the lower one above 1; None where there are none.
-    `proof` is what proves the growth, where something does; degrees of monomial maps are exact, and no primes needed.
+    `eps` is None for generic eps (a random residue for each line). `patterns` are the singularity patterns, None if
+    they were not computed. Degrees and patterns are measured: evidence, and no proof. `enclosure` has proved bounds of
+    the dynamical degree of a planar map, the lower one above 1, or None. `proof` is a proof of the growth, or None. The
+    degrees of monomial maps are exact, and need no primes.
     """
 
     degrees: tuple[int, ...]
@@ -88,19 +87,19 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def fitted(self) -> Recurrence | None:
-        """The shortest linear recurrence of the degrees with terms left to check it, or None; see `unconfirmed`."""
+        """The shortest linear recurrence that further measured degrees confirm, or None; see `unconfirmed`."""
         return find_recurrence(self.degrees)
 
     @cached_property
-    def explained(self) -> Recurrence | None:
-        """The recurrence that follows from the singularities, where they are known and the measured degrees agree."""
+    def derived(self) -> Recurrence | None:
+        """The recurrence derived from the singularity patterns, if these are known and the measured degrees agree."""
         if self.patterns is None or not self.patterns.series or self.disagreement is not None:
             return None
         return recurrence_of(self.patterns.fraction, self.degrees)
 
     @cached_property
     def disagreement(self) -> int | None:
-        """The first n whose measured degree is not what the singularities say; None where they agree or say nothing."""
+        """The first n whose measured degree contradicts the singularity patterns; None if none does."""
         if self.patterns is None or not self.patterns.series:
             return None
         expected = coefficients(self.patterns.fraction, len(self.degrees))
@@ -108,30 +107,36 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def unconfirmed(self) -> str:
-        """Why the recurrence that fits may be that of other maps; empty where there is none, or it is confirmed."""
+        """Why the fitted recurrence may fail later; empty if there is none, or if it is confirmed."""
         if self.disagreement is not None:
             return (
-                f"the singularities do not explain the degree of iterate {self.disagreement} (another --seed or --eps)"
+                f"the measured degree of iterate {self.disagreement} contradicts the singularity patterns; "
+                "try another --seed or --eps"
             )
-        if self.fitted is None or self.patterns is None or self.explained is not None:
+        if self.fitted is None or self.patterns is None or self.derived is not None:
             return ""
         if self.patterns.running:
             return self.patterns.running
         if not self.patterns.lengths and any(d != self.degrees[1] ** n for n, d in enumerate(self.degrees)):
-            return "degrees drop where no contracted hypersurface meets points without a value (another --seed)"
+            return (
+                "degrees drop although no exceptional hypersurface is mapped into the indeterminacy locus; "
+                "try another --seed"
+            )
         if len(self.degrees) < (needed := self.patterns.terms_needed(self.fitted.order)):
             last = max(self.patterns.lengths)
-            return f"after a pattern of {last} steps {needed - 1} iterates are needed (--effort, --max-degree)"
+            return (
+                f"a singularity pattern of {last} steps calls for {needed - 1} iterates; raise --effort or --max-degree"
+            )
         return ""
 
     @property
     def recurrence(self) -> Recurrence | None:
-        """The linear recurrence of the degrees: explained, or the shortest with terms left to check it, or None.
+        """The linear recurrence of the degrees: the derived one, or else the fitted one if it is confirmed.
 
-        None also where it is not confirmed by terms beyond the last confinement, or singularities are undecided.
+        None if there is neither: a fitted one is confirmed by terms beyond the last confinement.
         """
-        if self.proof is None or self.explained is not None:
-            return self.explained or (None if self.unconfirmed else self.fitted)
+        if self.proof is None or self.derived is not None:
+            return self.derived or (None if self.unconfirmed else self.fitted)
         found = self.fitted
         if found is None or found.rate is None or (found.growth, found.power) != (self.proof.growth, self.proof.power):
             return None
@@ -139,7 +144,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth(self) -> Growth:
-        """How the degrees grow: proved, or if the recurrence goes on; else exponential if proved, or unknown."""
+        """The kind of growth: by a proof, by the recurrence, or by the bounds of the dynamical degree; else unknown."""
         if self.proof is not None:
             return self.proof.growth
         if self.ended == Ended.CONSTANT:
@@ -150,15 +155,15 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
-        """lim d_n^(1/n) as an algebraic number, proved or if the recurrence goes on, else None."""
+        """lim d_n^(1/n) as an algebraic number, by a proof or by the recurrence, else None."""
         if self.proof is not None:
             return self.proof.rate
         return None if self.recurrence is None else self.recurrence.rate
 
     @property
     def estimate(self) -> str | None:
-        """An estimate of the dynamical degree and no more, rounded: the last quotient d_n/d_{n-1} where these hardly
-        change, else d_n^(1/n) for the last n, which is not below it."""
+        """An estimate of the dynamical degree, rounded: the last quotient d_n/d_{n-1} where these hardly change, else
+        d_n^(1/n) for the last n, an upper bound."""
         if len(self.degrees) < 3 or self.degrees[-1] == 0:
             return None
         n = len(self.degrees) - 1
@@ -180,7 +185,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def kind_text(self) -> str:
-        """The kind of growth with its power or rate, or what can be said without a confirmed recurrence: one phrase."""
+        """The kind of growth with its power or rate, or an estimate without a confirmed recurrence: one phrase."""
         if self.growth is Growth.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
         if (found := self.proof or self.recurrence) is not None:
@@ -205,25 +210,25 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def basis(self) -> str:
-        """How the growth is known, by what proof, or how far confinement was looked for where it was not seen."""
+        """How the growth is known: with the proof, or with the number of steps searched for confinement."""
         if self.proof is not None:
             return f"{self.known}: {self.proof.reason}"
         return f"{self.known}: {self.patterns.limit}" if self.patterns and self.patterns.limit else str(self.known)
 
     @property
     def known(self) -> Certainty:
-        """How the growth is known; the bounds of `enclosure` are proved whatever this says."""
+        """How the growth is known; the bounds in `enclosure` are proved in any case."""
         if self.proof is not None:
             return Certainty.PROVED
-        if self.explained is not None:
-            return Certainty.EXPLAINED
+        if self.derived is not None:
+            return Certainty.DERIVED
         if self.recurrence is not None or self.ended == Ended.CONSTANT:
             return Certainty.MEASURED
         return Certainty.ESTIMATED if self.looks_exponential else Certainty.UNDECIDED
 
     @property
     def growth_text(self) -> str:
-        """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
+        """The kind of growth with its power or rate, and the number of steps searched for confinement: one phrase."""
         is_limited = self.recurrence is not None and self.patterns is not None and self.patterns.limit
         return self.kind_text + (f" ({self.basis})" if self.proof is not None or is_limited else "")
 
@@ -233,7 +238,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def text(self) -> str:
-        """Lines for people, a word and a tab at the front: degrees, growth, recurrence, how it ended."""
+        """The lines of the report, each a label, a tab and its value."""
         lines = [("degrees", ", ".join(map(str, self.degrees))), ("growth", self.growth_text)]
         if self.recurrence is not None:
             lines.append(("recurrence", self.recurrence.text))
@@ -241,15 +246,15 @@ class DegreeGrowth(PrintableResult):
             if self.recurrence.closed_form_text:
                 lines.append(("closed form", self.recurrence.closed_form_text))
         if self.patterns is not None:
-            if self.explained is not None:
+            if self.derived is not None:
                 lines.append(("generating function", self.patterns.series_text))
             lines.append(("singularities", self.patterns.text))
-            lines += [("contracted", text) for text in self.patterns.sentences]
-            lines += [("note", told) for told in (self.patterns.word_text,) if told]
+            lines += [("exceptional hypersurface", text) for text in self.patterns.sentences]
+            lines += [("note", self.patterns.word_text)] if self.patterns.word_text else []
         if self.enclosure is not None:
             lines.append(("proved", self.enclosure.text))
         lines += [("ended", self.message), *(("note", note) for note in self.notes)]
-        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+        return "\n".join(f"{label}\t{value}" for label, value in lines)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""
@@ -279,31 +284,31 @@ def degree_growth(
     enclosed: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DegreeGrowth:
-    """The degrees of the iterates of a map, for one exact `eps` or `time_step` = 2 eps, or generic eps.
+    """Measure the degrees of the iterates of a map, for one exact `eps` (or `time_step` = 2 eps), or for generic eps.
 
-    Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and it is explained by
-    the singularities or there are terms enough beyond the last confinement; with `max_terms` instead after the degrees
-    d_1, ..., d_max_terms. Stops in any case when the budget is spent, which doubles with each more of `effort`, or
-    before a degree above `max_degree`; a TimeLimit ends it with the degrees measured so far, unless `effort` is a
-    Budget: then this is a stage of something else, which the TimeLimit ends. `patterns` are those of the
-    singularities, which are followed here, for `steps` steps, where they are not given. Unless `enclosed` is false,
-    exponential growth in the plane is proved. Modulo random primes of 61 bits, so the answer is measured and not
-    proved, but for the bounds of the dynamical degree of planar maps; the same for the same `seed`. Raises InputError
-    for wrong values.
+    The search stops when a recurrence is confirmed by at least 6 terms and by as many as its order, and either it is
+    derived from the singularity patterns or there are enough terms beyond the last confinement; with `max_terms` it
+    stops after d_1, ..., d_max_terms instead. It stops in any case when the budget is spent, which doubles with each
+    increase of `effort` by 1, or before a degree above `max_degree`. A TimeLimit ends it with the degrees measured so
+    far; if `effort` is a Budget, the TimeLimit is raised to the caller. `patterns` are the singularity patterns; by
+    default they are computed here, for `steps` steps. Unless `enclosed` is false, exponential growth in the plane is
+    proved. The computation is modulo random primes of 61 bits, so that degrees are measured and not proved, except for
+    the bounds of the dynamical degree of planar maps. The same `seed` gives the same result. Raises InputError for
+    wrong values.
 
     Source: bellon-viallet-1999.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = degree_growth(load("euler_top").system)
-    >>> found.degrees[:6], str(found.growth), found.recurrence.closed_form
+    >>> growth = degree_growth(load("euler_top").system)
+    >>> growth.degrees[:6], str(growth.growth), growth.recurrence.closed_form
     ((1, 3, 9, 19, 33, 51), 'quadratic', '2*n^2 + 1')
     """
     eps = resolve_eps(eps, time_step)
     exact = None if eps is None else rational(eps)
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
-    if max_terms is not None and not 0 <= integer(max_terms, "max_terms") <= _MOST_TERMS:
-        raise InputError(f"found {max_terms} terms, expected 0 to {_MOST_TERMS}")
+    if max_terms is not None and not 0 <= integer(max_terms, "max_terms") <= MAX_TERMS:
+        raise InputError(f"found {max_terms} terms, expected 0 to {MAX_TERMS}")
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     if max_degree < 1:
@@ -321,7 +326,7 @@ def degree_growth(
 
 @dataclass
 class _Search:
-    """The lines, and the degrees found on them so far."""
+    """The lines, and the degrees measured on them so far."""
 
     map: MapFamily
     eps: fmpq | None
@@ -337,7 +342,7 @@ class _Search:
     measured: DegreeGrowth | None = None  # all but the bounds of the dynamical degree
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
-        """Step after step until something ends it."""
+        """Measure degree after degree until a reason to stop."""
         matrix = exponent_matrix(self.map, self.eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
             periodic = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
@@ -370,11 +375,11 @@ class _Search:
         self.lines = [line() for _ in range(_LINES)]
         try:
             while True:
-                self._look_at_fit(max_terms is None)
+                self._check_recurrence(max_terms is None)
                 if max_terms is not None and len(self.degrees) > max_terms:
-                    raise Stopped(Ended.TERMS, f"{counted(max_terms, 'iterate')} asked for and measured")
-                if len(self.degrees) > _MOST_TERMS:
-                    raise Stopped(Ended.TERMS, f"{_MOST_TERMS} iterates, and no more are worked out")
+                    raise Stopped(Ended.TERMS, f"{counted(max_terms, 'iterate')} measured, as requested")
+                if len(self.degrees) > MAX_TERMS:
+                    raise Stopped(Ended.TERMS, f"{MAX_TERMS} iterates, and no more are worked out")
                 progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
                 self._step(line)
                 if self.degrees[-1] == 0 and max_terms is None:
@@ -382,7 +387,7 @@ class _Search:
         except Stopped as end:
             ended, message = end.ended, end.message
         if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
-            self._follow()
+            self._compute_patterns()
         found = self.result(ended, message)
         contracted = self.patterns
         if contracted is not None and contracted.at and self.eps is None and not self.budget.is_spent:
@@ -405,8 +410,8 @@ class _Search:
         known: dict[str, Any] = {"patterns": self.patterns, "notes": tuple(self.notes), **more}
         return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, primes, residues, **known)
 
-    def _look_at_fit(self, may_stop: bool) -> None:
-        """Follow the singularities in good time, and stop where a recurrence is certain."""
+    def _check_recurrence(self, may_stop: bool) -> None:
+        """Compute the singularity patterns early, and stop when a recurrence is confirmed."""
         size = len(self.degrees)
         if size < 2 or (size > _OFTEN and size % _SELDOM):
             return
@@ -414,17 +419,19 @@ class _Search:
         # Above dimension 4 series of maps without short forms are slow and wait until degrees say something.
         soon = self.map.dim <= WRITTEN_DIMENSION or found is not None or self.lines[0].is_explicit
         if soon:
-            self._follow()
+            self._compute_patterns()
         if not may_stop:
             return
         known = self.patterns
         enough = found is not None and found.checked >= max(6, found.order)
-        explained = self.result(Ended.TERMS, "").explained
-        if explained is not None:
+        derived = self.result(Ended.TERMS, "").derived
+        if derived is not None:
             last = max(known.lengths, default=0) if known is not None else 0
-            same = found is not None and found.characteristic == explained.characteristic
+            same = found is not None and found.characteristic == derived.characteristic
             if (enough and same) or size > 2 * last + _AGREEING or self.degrees[-1] > _LARGE:
-                raise Stopped(Ended.EXPLAINED, "the singularities explain the degrees, and those measured agree")
+                raise Stopped(
+                    Ended.DERIVED, "the degrees are derived from the singularity patterns, and the measured ones agree"
+                )
             return
         if found is None or not enough:
             return
@@ -432,40 +439,40 @@ class _Search:
             raise Stopped(Ended.UNCONFIRMED, f"a recurrence of order {found.order} fits, but {known.running}")
         if known is None or size >= known.terms_needed(found.order):
             raise Stopped(
-                Ended.RECURRENCE, f"a recurrence of order {found.order} holds for {found.checked} terms to spare"
+                Ended.RECURRENCE, f"a recurrence of order {found.order} holds for {found.checked} further terms"
             )
 
-    def _follow(self) -> None:
-        """What the singularities say, if that was not asked before and the map is not affine."""
+    def _compute_patterns(self) -> None:
+        """Compute the singularity patterns, once, and unless the map is affine."""
         if self.map.root is None and self.patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
             given: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
             self.patterns = patterns_of_map(self.map, self.eps, **given)
 
     def _step(self, line: Callable[[], Line]) -> None:
-        """All lines one step on; those in special position are replaced by others."""
+        """Move all lines one step on, and replace those in special position."""
         n, known = len(self.degrees), self.degrees
 
-        def degree_on(one: Line) -> int:
-            """The degree of iterate n; -1 where that cannot be done on this line."""
+        def degree_on(curve: Line) -> int:
+            """The degree of iterate n on a line; -1 where this line does not give it."""
             try:
-                while one.steps < n:
-                    k = one.steps + 1
+                while curve.steps < n:
+                    k = curve.steps + 1
                     guess = known[k] if k < n else self.map.dim if k == 1 else known[1] * known[-1]
                     if k == n > 1 and known[-2]:
                         # Degrees are as good as log-concave, so that the last ratio bounds the next one. A guess too
                         # low costs a second attempt.
                         guess = min(guess, known[-1] * known[-1] // known[-2] + 4)
-                    one.step(guess)
-                    if k < n and one.degree != known[k]:
+                    curve.step(guess)
+                    if k < n and curve.degree != known[k]:
                         return -1
             except ZeroDivisionError:
                 return -1
-            return one.degree
+            return curve.degree
 
         while True:
-            found = [degree_on(one) for one in self.lines]
-            best = max(found)
-            if best >= 0 and min(found) == best:
+            degrees = [degree_on(curve) for curve in self.lines]
+            best = max(degrees)
+            if best >= 0 and min(degrees) == best:
                 self.degrees.append(best)
                 return
             self.replaced += 1
@@ -474,9 +481,9 @@ class _Search:
                     Ended.SINGULAR, f"iterate {n} exists nowhere: {self.map.denominator_name} = 0 on the image"
                 )
             if self.replaced > _REPLACEMENTS:
-                raise Stopped(Ended.LINES, f"random lines do not agree on the degree of iterate {n}: {found}")
+                raise Stopped(Ended.LINES, f"random lines disagree on the degree of iterate {n}: {degrees}")
             if best >= 0:
-                self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {found}")
-            for k, degree in enumerate(found):
+                self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {degrees}")
+            for k, degree in enumerate(degrees):
                 if degree < best or best < 0:
                     self.lines[k] = line()

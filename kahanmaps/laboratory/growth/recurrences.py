@@ -207,7 +207,7 @@ class Recurrence:
     def text(self) -> str:
         """The recurrence as an equation, with what speaks for it."""
         if self.measured is not None:
-            return f"{self.equation}, explained by the singularities; {self.terms} measured terms agree"
+            return f"{self.equation}, derived from the singularity patterns; {self.terms} measured terms agree"
         return f"{self.equation}, found from {self.terms - self.checked} terms, confirmed by {self.checked} more"
 
     @property

@@ -26,11 +26,11 @@ from kahanmaps.algebra.residues import chinese, rational_reconstruction, rationa
 from kahanmaps.algebra.work import count
 from kahanmaps.laboratory.modular_points import exponents_up_to, product_of
 from kahanmaps.laboratory.scan.members import solutions
-from kahanmaps.laboratory.scan.pieces import Rows
+from kahanmaps.laboratory.scan.modular_components import Rows
 
 RationalRows = tuple[tuple[fmpq, ...], ...]
 
-_MOST_PAIRS = 100_000  # of flats modulo two primes that are tried
+_MOST_PAIRS = 100_000  # of affine subspaces modulo two primes that are tried
 _MOST_CONJUGATES = 24  # hypersurfaces modulo a prime of which pairs are taken
 _LOW = 12  # heights up to which one prime may be bad
 _AT_LEAST = 3  # primes
@@ -47,16 +47,16 @@ def height_bound(primes: Sequence[int]) -> int:
     return isqrt((prod(low) - 1) // 2)
 
 
-def lifted_flats(found: Mapping[int, Sequence[Rows]], everywhere: bool = True) -> dict[RationalRows, tuple[int, ...]]:
+def lift_linear(found: Mapping[int, Sequence[Rows]], everywhere: bool = True) -> dict[RationalRows, tuple[int, ...]]:
     """Affine subspaces over Q whose residues are among those found modulo the primes: reduced rows, and these primes.
 
     They have to be found modulo all primes, if not `everywhere` modulo three.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
-    >>> lifted_flats(modulo)
+    >>> lift_linear(modulo)
     {((1, 0, -1/2), (0, 1, -3)): (31, 37, 41)}
     """
-    sets = {p: set(flats) for p, flats in found.items()}
+    sets = {p: set(subspaces) for p, subspaces in found.items()}
     done: dict[RationalRows, tuple[int, ...]] = {}
     spent = 0
     for p, q in sorted(combinations(sorted(found), 2), key=lambda pair: len(found[pair[0]]) * len(found[pair[1]])):
@@ -77,10 +77,10 @@ def lifted_flats(found: Mapping[int, Sequence[Rows]], everywhere: bool = True) -
     return done
 
 
-def flat_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
+def linear_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
     """The equations of an affine subspace, primitive polynomials.
 
-    >>> flat_equations(((fmpq(1), fmpq(0), fmpq(-1, 2)),), ["a", "b"])
+    >>> linear_equations(((fmpq(1), fmpq(0), fmpq(-1, 2)),), ["a", "b"])
     (2*a - 1,)
     """
     context = ring(names)
@@ -106,7 +106,7 @@ def residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
     return tuple(tuple(int(x.p) * pow(int(x.q), -1, p) % p for x in row) for row in rows)
 
 
-def lifted_forms(
+def lift_hypersurfaces(
     found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
 ) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
     """The irreducible hypersurfaces over Q behind those modulo the primes, and these primes.
@@ -115,10 +115,10 @@ def lifted_forms(
     all that are left, which is lifted from all primes but one, where it has to agree.
 
     >>> circle = {p: [[1, 0, 0, p - 1, 0, p - 1]] for p in (31, 37, 41)}
-    >>> lifted_forms(circle, ["a", "b"])
+    >>> lift_hypersurfaces(circle, ["a", "b"])
     [(a^2 + b^2 - 1, (31, 37, 41))]
     >>> lines = {p: [[0, 1, r], [0, 1, p - r]] for p, r in ((7, 3), (17, 6), (23, 5))}
-    >>> lifted_forms(lines, ["a", "b"])
+    >>> lift_hypersurfaces(lines, ["a", "b"])
     [(a^2 - 2*b^2, (7, 17, 23))]
     """
     known: list[tuple[fmpq_mpoly, tuple[int, ...]]] = []
@@ -132,7 +132,7 @@ def lifted_forms(
                 parts.setdefault(len(row), {}).setdefault(p, {})[(row,)] = group
         used: dict[int, set[tuple[int, ...]]] = {p: set() for p in rest}
         for by_prime in parts.values():
-            for rows, at in lifted_flats({p: list(some) for p, some in by_prime.items()}, False).items():
+            for rows, at in lift_linear({p: list(some) for p, some in by_prime.items()}, False).items():
                 known += [(factor, at) for factor in _factors(rows[0], names)]
                 for p in at:
                     used[p].update(by_prime[p][residues(rows, p) or ()])
@@ -182,7 +182,7 @@ def _product(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[int
     return [c * scale % p for c in row]
 
 
-def lifted_conjugates(
+def lift_conjugate_points(
     found: Mapping[int, Sequence[Sequence[int]]],
     names: Sequence[str],
     rng: random.Random,
@@ -193,7 +193,7 @@ def lifted_conjugates(
     They have to be there modulo all primes but one modulo which the equations have solutions.
 
     >>> roots = {p: [(x, x * x % p) for x in range(p) if (x**3 - 2) % p == 0] for p in (53, 59, 67, 71, 83, 89, 97)}
-    >>> [(equations, _)] = lifted_conjugates(roots, ["a", "b"], random.Random(0))
+    >>> [(equations, _)] = lift_conjugate_points(roots, ["a", "b"], random.Random(0))
     >>> equations
     (a^3 - 2, a^2 - b)
     """

@@ -1,4 +1,4 @@
-"""What a scan finds: components of parameter space, and what was seen of it."""
+"""The result of a scan: components of parameter space, and which part of it was searched."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.conclusion import Conclusion
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.scan.lift import MAX_FIELD_DEGREE, SPARE_BITS, height_bound
-from kahanmaps.laboratory.scan.pieces import degree_reached
+from kahanmaps.laboratory.scan.modular_components import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
 _LISTED = 12  # primes
@@ -30,8 +30,8 @@ class Component:
     """A condition on the parameters: `equations`, polynomials over Q that vanish on it, found modulo `primes`.
 
     `degrees` are d_1, ..., d_N there. `confirmed` of `tried` random members have them. `values` are those of a rational
-    member, None where none was found; `growth` what its degrees do, `verdict` what its analysis says, None where that
-    was not asked.
+    member, None where none was found; `growth` is the growth of its degrees, and `verdict` the verdict of its analysis,
+    None where none was requested.
     """
 
     equations: tuple[fmpq_mpoly, ...]
@@ -46,7 +46,7 @@ class Component:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether all members tried have the degrees."""
+        """Whether all members that were tried have these degrees."""
         return 0 < self.tried == self.confirmed
 
     @property
@@ -88,18 +88,19 @@ def growth_on(some: Sequence[Component]) -> DegreeGrowth | None:
 
 
 def _listed(texts: Sequence[str]) -> str:
-    """All of them, or the first ones and the last one."""
+    """All the texts, or the first three and the last one of many."""
     return ", ".join(texts if len(texts) <= _LISTED else [*texts[:3], "...", f"{texts[-1]} ({len(texts)} of them)"])
 
 
 @dataclass(frozen=True)
 class Scan(PrintableResult):
-    """What a scan found: components, the ones with the slowest growth first.
+    """The result of a scan: components, those with the slowest growth first.
 
-    `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
-    the number of slow members on no component modulo each of them: points over number fields, of a height above
-    `height`, or there by chance. `symmetric` are changes of parameters that permute the slow members, by their
-    images. `ended` is "complete", "budget" or "interrupted"; `omitted` says what was left out.
+    `generic` are the degrees d_1, ..., d_N of a generic member, `sweeps` the special members modulo each prime.
+    `unassigned` is the number of special members on no component modulo each of them: points over number fields, of a
+    height above `height`, or members that are special modulo this prime by chance. `symmetric` are changes of
+    parameters that permute the special members, by their images. `ended` is "complete", "budget" or "interrupted";
+    `omitted` names what was not done.
     """
 
     file: SystemFile
@@ -109,7 +110,7 @@ class Scan(PrintableResult):
     generic: Degrees
     components: tuple[Component, ...]
     sweeps: tuple[Sweep, ...]
-    left: tuple[int, ...]
+    unassigned: tuple[int, ...]
     symmetric: tuple[tuple[str, ...], ...]
     ended: str
     omitted: tuple[str, ...] = ()
@@ -121,7 +122,7 @@ class Scan(PrintableResult):
 
     @property
     def height(self) -> int:
-        """Numerators and denominators up to which conditions are found; 0 where too little was tried."""
+        """The bound of numerators and denominators up to which conditions are found; 0 with too few primes."""
         bounds = [height_bound([one.prime for one in some]) for some in self._kinds if len(some) > 2]
         return min(bounds, default=0)
 
@@ -135,7 +136,7 @@ class Scan(PrintableResult):
 
     @property
     def degree(self) -> int:
-        """Of the hypersurfaces with the same degrees, all together, up to which they are found."""
+        """The total degree up to which hypersurfaces with the same degrees of iterates are found."""
         count = len(self.over)
         enough = [
             degree_reached(0.75 * min(one.seen / one.prime for one in some), count)
@@ -154,11 +155,10 @@ class Scan(PrintableResult):
 
     @property
     def coverage(self) -> str:
-        """What was tried, and what can have been missed: a sentence or two."""
+        """A sentence on what was searched, and what is found by such a search."""
         if not self.height:
-            return (
-                f"members modulo three primes are needed, those modulo {counted(len(self.sweeps), 'prime')} were tried"
-            )
+            tried = counted(len(self.sweeps), "prime")
+            return f"conditions need members modulo three primes, and those modulo {tried} were tried"
         whole, lines, planes = (_listed([str(one.prime) for one in some]) for some in self._kinds)
         parts = [f"all members with parameters modulo {whole}"] if whole else []
         for width, what, some in ((1, "lines", lines), (2, "planes", planes)):
@@ -173,9 +173,9 @@ class Scan(PrintableResult):
             kinds.append(f"hypersurfaces of a total degree up to {self.degree} for each sequence of degrees")
         where = f"where one of the first {len(self.generic)} degrees is smaller"
         if planes:
-            kinds.append("affine spaces of codimension 2 and hypersurfaces of affine spaces with it")
+            kinds.append("affine spaces of codimension 2, and hypersurfaces of affine spaces that have codimension 2")
         if not whole:
-            kinds.append("nothing of smaller dimension, for which all members would have to be tried")
+            kinds.append("nothing of smaller dimension, which would need all members")
         fields = []
         if whole:
             fields.append(
@@ -192,16 +192,16 @@ class Scan(PrintableResult):
 
     @property
     def text(self) -> str:
-        """Lines for people, a word and a tab at the front."""
+        """The lines of the report, each a label, a tab and its value."""
         if not self.height:
-            lines = [  # where nothing was lifted, the numbers of slow members by degrees
-                ("slow", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {one.prime}")
+            lines = [  # where nothing was lifted, the numbers of special members by degrees
+                ("special", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {one.prime}")
                 for one in self.sweeps
                 for degrees, points in sorted(one.classes.items())
             ]
-            return "\n".join(f"{word}\t{rest}" for word, rest in [*lines, ("tried", self.coverage), *self._open])
+            return "\n".join(f"{word}\t{rest}" for word, rest in [*lines, ("searched", self.coverage), *self._open])
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
-        lines = [("in general", ", ".join(map(str, self.generic)))]
+        lines = [("generic", ", ".join(map(str, self.generic)))]
         for degrees, members in self.classes:
             growth = growth_on(members)
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
@@ -228,28 +228,28 @@ class Scan(PrintableResult):
             lines.append(("found", f"no condition on the parameters {where}"))
         for images in self.symmetric:
             image = f"({', '.join(images)})" if len(images) > 1 else images[0]
-            lines.append(("symmetry", f"{names} -> {image} permutes the slow members"))
-        lines.append(("tried", self.coverage))
-        if any(self.left):
-            counts = zip(self.left, self.sweeps, strict=True)
-            rest = _listed([f"{n} modulo {one.prime}" for n, one in counts if n or len(self.left) <= _LISTED])
+            lines.append(("symmetry", f"{names} -> {image} permutes the special members"))
+        lines.append(("searched", self.coverage))
+        if any(self.unassigned):
+            counts = zip(self.unassigned, self.sweeps, strict=True)
+            listed = _listed([f"{n} modulo {one.prime}" for n, one in counts if n or len(self.unassigned) <= _LISTED])
             most = 0  # the dimension of a variety with so many members
-            for n, one in zip(self.left, self.sweeps, strict=True):
+            for n, one in zip(self.unassigned, self.sweeps, strict=True):
                 dimension = len(self.over) - 1
                 while dimension > most and n < 0.5 * one.seen / one.prime ** (len(self.over) - dimension):
                     dimension -= 1
                 most = dimension
             what = "a curve" if most == 1 else f"a variety of dimension {most}"
             missed = f"; as many as {what} has, so one may have been missed" if most else ""
-            lines.append(("left", f"slow members on no component: {rest}{missed}"))
+            lines.append(("unassigned", f"special members on no component: {listed}{missed}"))
         elif not self.omitted:
-            lines.append(("left", "none: every slow member that was seen is on a component"))
+            lines.append(("unassigned", "none: every special member that was seen is on a component"))
         return "\n".join(f"{word}\t{rest}" for word, rest in [*lines, *self._open])
 
     @property
     def _open(self) -> list[tuple[str, str]]:
         why = "it was interrupted before" if self.ended == "interrupted" else "the budget was spent (--effort) before"
-        return [("open", f"{why} {', '.join(self.omitted)}")] if self.omitted else []
+        return [("not done", f"{why} {', '.join(self.omitted)}")] if self.omitted else []
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -263,10 +263,10 @@ class Scan(PrintableResult):
             "sweeps": [
                 {
                     **attributes(one, "prime", "seen", "complete", "width", "accidents"),
-                    "slow": sum(map(len, one.classes.values())),
-                    "left": left,
+                    "special": sum(map(len, one.classes.values())),
+                    "unassigned": unassigned,
                 }
-                for one, left in zip(self.sweeps, self.left, strict=True)
+                for one, unassigned in zip(self.sweeps, self.unassigned, strict=True)
             ],
             **attributes(self, "height", "coverage", "ended", "omitted"),
         }

@@ -1,10 +1,10 @@
 """Which members of a family of maps are integrable: components of parameter space where degrees grow more slowly.
 
-All members with parameters in GF(p) are tried for several small primes p (`sweep`). Those whose degrees are smaller
-than in general fall into classes by their degrees, these into pieces (`pieces`), and pieces that are there modulo all
-primes are lifted to conditions over Q (`lift`). A condition is *found modulo* these primes. It is *confirmed* where
-members on it, random modulo large primes, have the same degrees by the computation that `degrees` does. Nothing of this
-is a proof. The kind of growth is that of one rational member, as `degrees` has it.
+All members with parameters in GF(p) are tried for several small primes p (`sweep`). Those with smaller degrees than a
+generic member are special. They fall into classes by their degrees, and these into components modulo each prime
+(`modular_components`); components that appear modulo all primes are lifted to conditions over Q (`lift`). A condition
+is *found modulo* these primes. It is *confirmed* where members on it, random modulo large primes, have the same degrees
+by the computation that `degrees` does. Nothing of this is a proof. The kind of growth is that of one rational member.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from kahanmaps.invariants.growth import OF_DEGREES, Growth
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.curves import Ended
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.scan.conditions import beside, conditions
+from kahanmaps.laboratory.scan.conditions import conditions, points_outside
 from kahanmaps.laboratory.scan.members import Scanned, point_on
+from kahanmaps.laboratory.scan.parameter_symmetries import symmetries
 from kahanmaps.laboratory.scan.result import STEPS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Choice, Degrees, Sweep, TimeOver, sweep
-from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike
@@ -93,22 +93,22 @@ def scan(
     """The conditions on parameters under which the degrees of the iterates are smaller than in general.
 
     Args:
-        system: the family; its claims are not looked at.
+        system: the family; its claims are ignored.
         over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
         eps: an exact number, or None for generic eps: conditions that hold for every eps.
         time_step: 2 eps, in its place.
         terms: how many iterates are measured, by default as many as have small degrees, at most 7.
         primes: at least three primes, by default such that the members are some ten thousand.
-        effort: 1, or more: each more doubles the work for everything, each less halves it; what was left out is said.
-        seed: of everything random.
+        effort: an integer; each increase by 1 doubles the work. What was not done is reported.
+        seed: the random seed.
         jobs: threads, by default as many as processors; they need numba.
         analysis: the effort of an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
-        progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known, and so
-            does a TimeLimit.
+        progress: called with a message again and again; if it raises TimeOver, the scan ends with the result so far, as
+            it does at a TimeLimit.
 
     Returns:
-        A `Scan`. Found modulo primes and confirmed at members, which is evidence and no proof.
+        A `Scan`. Conditions are found modulo primes and confirmed at members, which is evidence and no proof.
 
     Raises:
         InputError: for unknown parameters, wrong primes, a map that exists nowhere.
@@ -184,8 +184,8 @@ def scan(
         points: set[Degrees] = set()
 
         def with_verdict(one: Component, _: Callable[[], None]) -> Component:
-            slow = one.growth is not None and one.growth.growth is not Growth.EXPONENTIAL
-            if one.values is None or not slow or one.degrees in points:
+            is_exponential = one.growth is None or one.growth.growth is Growth.EXPONENTIAL
+            if one.values is None or is_exponential or one.degrees in points:
                 return one
             if one.dimension == 0:
                 points.add(one.degrees)
@@ -196,16 +196,16 @@ def scan(
         known, missed = run.each(known, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
     sweeps = tuple(run.sweeps)
-    left = tuple(_left(one, known) for one in sweeps)
+    unassigned = tuple(_unassigned(one, known) for one in sweeps)
     symmetric: tuple[tuple[str, ...], ...] = ()
     try:
         symmetric = tuple(symmetries(sweeps, known, names))
     except TimeLimit:
         run.is_interrupted = True
-        run.omit(1, "changes of parameters that permute the slow members")
+        run.omit(1, "changes of parameters that permute the special members")
     ended = "interrupted" if run.is_interrupted else "budget" if run.omitted else "complete"
     found = file, names, exact, seed, sweeps[0].generic if sweeps else (), tuple(known)
-    return Scan(*found, sweeps, left, symmetric, ended, tuple(run.omitted))
+    return Scan(*found, sweeps, unassigned, symmetric, ended, tuple(run.omitted))
 
 
 @dataclass
@@ -287,7 +287,7 @@ class _Sweeping:
         """
         lines = [one for one in self.sweeps if one.on_lines]
         again: list[Choice] = [(one.prime, _MORE * round(one.seen / one.prime), 1) for one in lines]
-        is_lacking = any(_left(one, known) >= 0.5 * one.seen / one.prime for one in lines)
+        is_lacking = any(_unassigned(one, known) >= 0.5 * one.seen / one.prime for one in lines)
         if not is_lacking or _size(len(self.family.names), again) > most:
             return []
         self.sweeps[:] = [one for one in self.sweeps if not one.on_lines]
@@ -299,7 +299,7 @@ class _Sweeping:
         Where members are left, fewer than a curve has, or than a hypersurface on random lines.
         """
         sizes = ((one, one.prime if one.complete else one.seen / one.prime) for one in self.sweeps)
-        if primes is not None or not any(0 < _left(one, known) < 0.5 * size for one, size in sizes):
+        if primes is not None or not any(0 < _unassigned(one, known) < 0.5 * size for one, size in sizes):
             return []
         further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(len(self.family.names), ())]
         totals = accumulate((_size(len(self.family.names), [one]) for one in further), initial=self.total)
@@ -416,7 +416,7 @@ def _terms(
     room = usual if terms is None else _MOST_ROOM
     found = family.degrees(tried, eps, terms or _MOST_TERMS, room, rng).max(axis=0).tolist()
     if found[0] == NOWHERE:
-        raise InputError("the map has no value anywhere, whatever the parameters are")
+        raise InputError("the map is defined nowhere, whatever the parameters are")
     measured = sum(degree >= 0 for degree in found)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
@@ -452,10 +452,10 @@ def _confirmed(
     return replace(one, tried=len(known), confirmed=known.count(one.degrees), values=values)
 
 
-def _left(one: Sweep, components: Sequence[Component]) -> int:
-    """The number of slow members modulo a prime that are on no component with their degrees."""
+def _unassigned(one: Sweep, components: Sequence[Component]) -> int:
+    """The number of special members modulo a prime that are on no component with their degrees."""
     return sum(
-        len(beside(points, [other for other in components if other.degrees == degrees], one.prime))
+        len(points_outside(points, [other for other in components if other.degrees == degrees], one.prime))
         for degrees, points in one.classes.items()
     )
 

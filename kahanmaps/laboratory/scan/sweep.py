@@ -1,8 +1,8 @@
 """Degree sequences of the members of a family modulo a small prime, and the members whose degrees are smaller.
 
-The degrees of a special member are at most those of the generic one. So the largest at each step are the generic
-sequence, and a member with another one is *slow*. A line in special position looks the same: slow members are measured
-on further lines until none of them turns out to be generic after all.
+The degrees of any member are at most those of a generic one. So the largest degrees at each step are the generic
+sequence, and a member with another sequence is *special*. A generic member on a line in special position looks special,
+too: so special members are measured on further lines until none of them turns out to be generic.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Degrees = tuple[int, ...]
 Choice = tuple[int, int | None, int]  # of members: a prime, how many random subspaces of a dimension, None for all
 
 _SLICE = 512
-_LINES = (3, 12)  # of a slow member: at least, at most
+_LINES = (3, 12)  # on which a special member is measured: at least, at most
 
 
 class TimeOver(Exception):
@@ -33,7 +33,7 @@ class TimeOver(Exception):
 
 @dataclass(frozen=True)
 class Sweep:
-    """The slow members modulo one prime: `classes` has their points by degrees, `seen` members were tried.
+    """The special members modulo one prime: `classes` has their points by degrees, `seen` members were tried.
 
     `generic` are the degrees of the others. Where not `complete`, the members were on random affine subspaces of this
     `width`: on lines of parameter space, or on planes.
@@ -53,8 +53,8 @@ class Sweep:
         return not self.complete and self.width == 1
 
     @property
-    def slow(self) -> dict[Point, Degrees]:
-        """The degrees of every slow member."""
+    def special(self) -> dict[Point, Degrees]:
+        """The degrees of each special member."""
         return {point: degrees for degrees, points in self.classes.items() for point in points}
 
 
@@ -88,7 +88,7 @@ def sweep(
     check: Callable[[], None] = lambda: None,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Sweep:
-    """The slow members of a family modulo a prime below 2^13, by the degrees d_1, ..., d_terms.
+    """The special members of a family modulo a prime below 2^13, by the degrees d_1, ..., d_terms.
 
     The `count` parameters that vary are the symbols of the map, and perhaps eps as the last one, which is never 0;
     otherwise `eps` is an exact number, or None for generic eps, in GF(p^2). `room` and `jobs` are as for
@@ -120,19 +120,19 @@ def sweep(
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
     generic = found.max(axis=0)
     if generic[0] < 0:
-        raise InputError("the map has no value anywhere, whatever the parameters are")
-    slow, accidents = np.flatnonzero((found != generic).any(axis=1)), 0
+        raise InputError("the map is defined nowhere, whatever the parameters are")
+    special, accidents = np.flatnonzero((found != generic).any(axis=1)), 0
     for line in range(1, _LINES[1]):
-        if not len(slow):
+        if not len(special):
             break
-        before, found[slow] = found[slow], np.maximum(found[slow], measure([points[i] for i in slow]))
-        kept = slow[(found[slow] != generic).any(axis=1)]
-        accidents += len(slow) - len(kept)
-        if line >= _LINES[0] and (before == found[slow]).all():
+        before, found[special] = found[special], np.maximum(found[special], measure([points[i] for i in special]))
+        kept = special[(found[special] != generic).any(axis=1)]
+        accidents += len(special) - len(kept)
+        if line >= _LINES[0] and (before == found[special]).all():
             break
-        slow = kept
+        special = kept
     classes: dict[Degrees, list[Point]] = {}
-    for i in slow:
+    for i in special:
         classes.setdefault(tuple(int(d) for d in found[i]), []).append(points[i])
     return Sweep(
         prime, tuple(int(d) for d in generic), classes, len(points), on is None, accidents, 1 if on is None else on[1]

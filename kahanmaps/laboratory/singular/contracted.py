@@ -1,18 +1,17 @@
-"""The hypersurfaces that a map contracts, where none of their polynomials is written: as points, by what happens there.
+"""The exceptional hypersurfaces of a map without their polynomials: by points, and by what happens along curves there.
 
-Let M and M' be the matrices of a map F and of its inverse, both linear in the point. A hypersurface that is contracted
-goes to where the inverse has no value. So it is a pole, a factor of det M(X), or infinity Z = 0, or a zero of
-det M'(F(X)). Of these forms only det M, det M' and their factors over Q are written, which are short. On a random line
-modulo a prime their zeros are points. Those that share all orders from the first step on stand for one hypersurface.
+Let M and M' be the matrices of a map F and of its inverse, both linear in the point. The image of a hypersurface that F
+contracts lies in the indeterminacy locus of the inverse. So the hypersurface is a pole, a factor of det M(X), or
+infinity Z = 0, or a zero of det M'(F(X)). Of these forms only det M, det M' and their factors over Q are expanded,
+which are short. On a random line modulo a prime their zeros are points. Points that share all multiplicities from the
+first step on represent one hypersurface.
 
-What is known along a curve are the orders of forms, each a product of powers of hypersurfaces. The exponents are the
-orders at the points themselves, and so linear equations give the orders of the hypersurfaces and their degrees. Where
-these do not suffice, as hypersurfaces are zeros of one form, forms are factored on surfaces through the curves.
-
-The components over GF(p) of the zeros of forms, on a surface: told apart where one form over Q has several.
-
-Restricted to a generic ruled surface, an irreducible factor of a form in many variables stays irreducible (Bertini),
-with its degree. So a polynomial of two variables is factored where that form could not even be written down.
+Along a curve only the orders of forms are known, and each form is a product of powers of hypersurfaces. The exponents
+are the orders at the points themselves, and so linear equations give the multiplicities and degrees of the
+hypersurfaces. Where these equations do not suffice, because several hypersurfaces are zeros of one form over Q, the
+forms are factored on surfaces through the curves: restricted to a generic ruled surface, an irreducible factor of a
+form in many variables stays irreducible (Bertini), with its degree. So a polynomial of two variables is factored where
+the form itself would be too large.
 """
 
 from __future__ import annotations
@@ -53,11 +52,11 @@ class HypersurfaceComponent:
 
     @property
     def kind(self) -> Kind:
-        """What two components have to differ in if they are to be told apart."""
+        """The data by which components are distinguished."""
         return self.exponents, self.degree
 
     def roots(self, t: int) -> list[int]:
-        """The points u in GF(p) that it has at this t."""
+        """The coordinates u in GF(p) of its points with this t."""
         p = int(self.equation.context().modulus())
         on_line = [0] * (self.degree + 1)
         for (i, j), c in self.equation.terms():
@@ -68,7 +67,7 @@ class HypersurfaceComponent:
 def components(
     equation: Equation, forms: Sequence[tuple[Any, bool]], curve: Sequence[nmod_poly], direction: Sequence[int]
 ) -> list[HypersurfaceComponent]:
-    """The components of the zeros of forms on the surface curve(t) + u direction, in projective space over GF(p).
+    """The components of the zero sets of forms on the surface curve(t) + u direction, in projective space over GF(p).
 
     With each of the forms over Q stands whether it is one at the image of the point under the map of the equation.
     `direction` is a random vector: then degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
@@ -101,10 +100,10 @@ def components(
     ]
 
 
-_LEAST_LINES, _MOST_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
+_MIN_LINES, _MAX_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
 _REPEATED = 4  # so many times orders of forms are told apart, and then the same way again
-_FIRST = 12  # steps that tell hypersurfaces apart
-_MOST_DIGITS = 1000  # in forms that are factored
+_FIRST = 12  # steps by which hypersurfaces are distinguished
+_MAX_DIGITS = 1000  # in forms that are factored
 _TRIES = 16  # lines on a surface, for a point of a component
 _PRECISION = 8  # of the orders at points themselves
 _BITS = 31  # of primes: with larger ones python-flint does not order the factors of polynomials in several variables
@@ -114,7 +113,7 @@ Key = tuple[Any, ...]
 
 
 class OrbitDataUnknown(ArithmeticError):
-    """Why the orders along the hypersurfaces are not known."""
+    """Raised where the multiplicities along the hypersurfaces cannot be determined."""
 
 
 @dataclass(frozen=True)
@@ -150,8 +149,8 @@ class _Curve:
     forms: _Forms
     limits: Range
 
-    def course(self, tracked: AlongCurves) -> TestCurve:
-        """The curve as it is followed."""
+    def test_curve(self, tracked: AlongCurves) -> TestCurve:
+        """The curve with the functions tracked along it."""
         return TestCurve([self.equation], self.point, self.direction, self.limits, tracked)
 
     @property
@@ -171,14 +170,14 @@ class _Curve:
 
     @cached_property
     def key(self) -> Key:
-        """What tells hypersurfaces apart: whether it is contracted, which forms vanish there, and the first orders.
+        """The key of its hypersurface: whether it is contracted, which forms vanish there, and the first rows.
 
-        Raises OrdersUnknown where there is no first step.
+        Raises OrbitDataUnknown where there is no first step.
         """
-        run = self.course(self).steps(_FIRST)[0]
+        run = self.test_curve(self).steps(_FIRST)[0]
         if not run:
             raise OrbitDataUnknown(
-                "the budget was spent (--effort), or a curve touches a hypersurface in too high an order"
+                "work limit reached (raise --effort), or a curve touches a hypersurface in too high an order"
             )
         is_contracted = image_of([self.inverse], run[0].limit) is None
         return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
@@ -203,12 +202,12 @@ class _Curve:
         return components(self.equation, self.forms.all, curve, self.across)
 
     def through(self, one: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """The same with a point of a component on the surface through a curve. Raises OrdersUnknown without any."""
+        """The same with a point of a component on the surface through a curve. Raises OrbitDataUnknown without any."""
         for t in range(1, _TRIES):
             for u in one.roots(t):
                 point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
                 return replace(self, point=point)
-        raise OrbitDataUnknown("a hypersurface without points modulo a prime")
+        raise OrbitDataUnknown("a hypersurface has no point modulo a prime")
 
     @cached_property
     def census(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
@@ -225,7 +224,7 @@ class _Resolved:
 
     `exponents` are those of the hypersurfaces in the forms; `solved` turns orders back, exactly or not. Without it
     forms are factored on surfaces: `places` has the keys of the hypersurfaces with components of a kind, `keys` those
-    of all, in their order, and `told` what was found after so many steps.
+    of all, in their order, and `multiplicities` the results after each number of steps.
     """
 
     curve: _Curve
@@ -233,33 +232,35 @@ class _Resolved:
     solved: fmpq_mat | None
     keys: Sequence[Key]
     places: dict[Kind, set[Key]]
-    told: dict[int, fmpq_mat] = field(default_factory=dict)
+    multiplicities: dict[int, fmpq_mat] = field(default_factory=dict)
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """What is tracked."""
+        """The functions tracked along the curve."""
         return self.curve.functions
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Those of the steps but the last. Raises OrdersUnknown."""
+        """Those of the steps but the last. Raises OrbitDataUnknown."""
         found, mus = [], divided(run, self.curve.own, self.curve.excess)
         for t, (mu, level) in enumerate(zip(mus, self.curve.levels(run)[1:], strict=False)):
             column = fmpq_mat(len(level), 1, list(level))
-            if t not in self.told:
-                self.told[t] = self._on_surface(column, run[t].curve) if self.solved is None else self.solved * column
-            nu = self.told[t]
+            if t not in self.multiplicities:
+                self.multiplicities[t] = (
+                    self._on_surface(column, run[t].curve) if self.solved is None else self.solved * column
+                )
+            nu = self.multiplicities[t]
             if self.exponents * nu != column or any(entry.q != 1 or entry < 0 for entry in nu.entries()):
-                raise OrbitDataUnknown("the orders of hypersurfaces do not follow from those of forms")
+                raise OrbitDataUnknown("the multiplicities of hypersurfaces do not follow from the orders of forms")
             found.append((mu, *(int(entry) for entry in nu.entries())))
         return tuple(found)
 
     def _on_surface(self, level: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
-        """The orders along a curve by the factors of forms on a surface through it. Raises OrdersUnknown."""
+        """The orders along a curve by the factors of forms on a surface through it. Raises OrbitDataUnknown."""
         nu, largest = fmpq_mat(len(self.keys), 1), max(level.entries())
         if largest == 0:
             return nu
         # With the same orders of forms they are often the same; else as few terms are taken as show them.
-        same = [one for one in self.told.values() if self.exponents * one == level]
+        same = [one for one in self.multiplicities.values() if self.exponents * one == level]
         if len(same) >= _REPEATED and all(one == same[0] for one in same):
             return same[0]
         terms = 1 + max((int(max(one.entries())) for one in same), default=1)
@@ -276,7 +277,7 @@ class _Resolved:
                 places = self.places.get(one.kind, set())
                 key = next(iter(places)) if len(places) == 1 else self.curve.through(one, cut).key
                 if key not in self.keys:
-                    raise OrbitDataUnknown("a hypersurface that was not met before")
+                    raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
                 nu[self.keys.index(key), 0] += one.order
         return nu
 
@@ -286,19 +287,19 @@ def contracted(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) ->
 
     Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
     point. Nothing but points modulo random primes is followed. Where the forms do not suffice to tell the hypersurfaces
-    apart, their degrees are 0 and their orders those of the forms. Raises OrdersUnknown.
+    apart, their degrees are 0 and their orders those of the forms. Raises OrbitDataUnknown.
     """
     here = map_.at(eps)
 
     def factors(one: Equation) -> tuple[Any, ...]:
         form = kernel_minors([[*row[:-1], None] for row in one.polynomials()], counted_product)[-1]
-        return (form,) if map_.digits > _MOST_DIGITS else tuple(factor for factor, _ in factored(form))
+        return (form,) if map_.digits > _MAX_DIGITS else tuple(factor for factor, _ in factored(form))
 
     infinity = here.equations[0].polynomials()[0][0].context().gens()[-1]
     poles = tuple(form for form in factors(here.equations[0]) if form != infinity)
     forms = _Forms(poles, factors(here.inverse.equations[0]), infinity)
     kinds: dict[Key, list[_Curve]] = {}
-    for line in range(_MOST_LINES):
+    for line in range(_MAX_LINES):
         if limits.budget.is_spent:
             break
         field = GF(random_prime(rng, _BITS))
@@ -311,14 +312,14 @@ def contracted(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) ->
         for curve in curves:
             kinds.setdefault(curve.key, []).append(curve)
         # A hypersurface that splits over an extension has points modulo some primes only.
-        if line >= _LEAST_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
+        if line >= _MIN_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
             kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
                 return degree, _resolved(kinds, forms, degree, zeros)
             except OrbitDataUnknown:
                 continue  # a hypersurface without points modulo the primes so far
     if limits.budget.is_spent or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
-        raise OrbitDataUnknown("the contracted hypersurfaces could not be told apart at random points")
+        raise OrbitDataUnknown("the exceptional hypersurfaces could not be distinguished by random points")
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
         key: [(curve, curve) for curve in curves] for key, curves in kinds.items()
     }
@@ -326,7 +327,7 @@ def contracted(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) ->
 
 
 def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
-    """The contracted hypersurfaces with their degrees and orders. Raises OrdersUnknown."""
+    """The exceptional hypersurfaces with their degrees and patterns. Raises OrbitDataUnknown."""
     keys = list(kinds)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
     total = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]
@@ -344,12 +345,12 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
             sizes = fmpq_mat(len(keys), 1)
             for one, curve in census:
                 if curve.key not in kinds:
-                    raise OrbitDataUnknown("a hypersurface that was not met before")
+                    raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
                 places.setdefault(one.kind, set()).add(curve.key)
                 sizes[keys.index(curve.key), 0] += one.degree
                 followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, places)))
     if exponents * sizes != column or sum(sizes.entries(), fmpq(0)) != zeros:
-        raise OrbitDataUnknown("not all hypersurfaces were met")
+        raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
     # Orders on hypersurfaces that are not contracted have no part in what follows.
     chosen = [k for k, key in enumerate(keys) if key[0]]
     return _followed(followed, [int(size) for size in sizes.entries()], chosen)
@@ -358,14 +359,14 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
 def _followed(
     curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
-    """The contracted hypersurfaces with the orders in these columns, modulo two primes. Raises OrdersUnknown."""
+    """The exceptional hypersurfaces with these columns of their patterns, by two primes. Raises OrbitDataUnknown."""
     found = []
     for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
             by_prime = {curve.prime: (curve, tracked) for curve, tracked in pairs}
-            orders = [curve.course(tracked).orders(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
+            orders = [curve.test_curve(tracked).orders(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
             if len(orders) < 2:
-                raise OrbitDataUnknown("a hypersurface with points modulo one prime only")
+                raise OrbitDataUnknown("a hypersurface has points modulo one prime only")
             if orders[0].known != orders[1].known:
                 raise OrbitDataUnknown(POINTS_DIFFER)
             along = orders[0].of(columns)
@@ -393,15 +394,15 @@ def _on_line(
     at_images = [evaluate(form, map_.field, image) for form in forms.images]
     excess = []  # how often each divides the common factor
     for value in at_points:
-        rest, exponent = common, 0
-        while value.degree() > 0 and (rest % value).is_zero():
-            rest, exponent = rest // value, exponent + 1
+        quotient, exponent = common, 0
+        while value.degree() > 0 and (quotient % value).is_zero():
+            quotient, exponent = quotient // value, exponent + 1
         excess.append(exponent)
     if sum(k * int(value.degree()) for k, value in zip(excess, at_points, strict=True)) != common.degree():
         raise OrbitDataUnknown("the minors of the equation have a common factor of another kind")
     product = reduce(nmod_poly.__mul__, [*at_points, *at_images])
     if product.is_zero():
-        raise OrbitDataUnknown("the map or its inverse has no value anywhere")
+        raise OrbitDataUnknown("the map or its inverse is defined nowhere")
     radical = product // product.gcd(product.derivative())
     every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
     points = [tuple((x + s * v) % p for x, v in zip(a, b, strict=True)) for s in roots_modulo(radical)]

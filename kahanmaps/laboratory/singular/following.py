@@ -1,8 +1,9 @@
-"""The orders along a contracted hypersurface, step after step: all that the degrees of the iterates need of it.
+"""The multiplicities along an exceptional hypersurface, step by step: its singularity pattern.
 
 A curve through a generic point of the hypersurface is a power series in t. After each step a power of t is divided out:
-its exponent mu says how deep the image lies where the map has no value. The orders nu of the critical hypersurfaces at
-the image say how deep it lies on those. Series are followed for as long as it takes until the orders are known.
+its exponent mu is the multiplicity with which the image lies in the indeterminacy locus. The orders nu of the critical
+hypersurfaces along the image are the multiplicities with which it lies in these. Series are followed until the pattern
+is known for all steps.
 """
 
 from __future__ import annotations
@@ -37,18 +38,19 @@ _CHECKED = 4  # further orders have to follow a recurrence than tell it
 _FREE_STEPS = 100  # for which a hypersurface is followed that is one again
 
 
-_SHOWN = 6  # events in words
+_SHOWN = 6  # events in a sentence
 Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 
 
 @dataclass(frozen=True)
 class OrbitData:
-    """The rows (mu, nu_1, nu_2, ...) of the steps 1, 2, ..., and how they go on.
+    """A singularity pattern: the rows (mu, nu_1, nu_2, ...) of the steps 1, 2, ..., and their continuation.
 
-    `is_settled`: they are known for all steps. By the recurrences whose characteristic polynomials are given for the
-    columns; or after (T, j) as in `returns` the hypersurface is the j-th one, and goes on like that; else all later
-    rows are zero, as far as was looked, which is `followed` steps, but for the orders of the hypersurfaces in `beyond`,
-    on which its points come to lie again and again: these are not known.
+    `is_settled`: the rows are known for all steps. There are three cases. The columns satisfy the `recurrences`, given
+    by their characteristic polynomials. Or `returns` is (T, j): after T steps the image is the j-th hypersurface, and
+    its pattern continues this one. Or all later rows are zero, as far as they were computed (`followed` steps), except
+    for the multiplicities of the hypersurfaces in `beyond`, in which the images lie again and again: these are not
+    known.
     """
 
     rows: tuple[tuple[int, ...], ...]
@@ -60,34 +62,32 @@ class OrbitData:
 
     @property
     def known(self) -> tuple[object, ...]:
-        """What two points on one hypersurface have to agree on."""
+        """The data in which two points on one hypersurface have to agree."""
         return self.rows[: 2 * self.settled_at], self.is_settled, self.returns, self.beyond
 
     @cached_property
     def settled_at(self) -> int:
-        """The step after which rows follow from those before."""
+        """The step after which all rows follow from earlier ones."""
         if self.recurrences:
             return max(int(characteristic.degree()) for characteristic in self.recurrences)
         return len(self.rows)
 
     @property
     def sentences(self) -> list[str]:
-        """In words: at which steps powers are divided out, which lowers degrees, and which hypersurfaces are met."""
+        """Two phrases: at which steps the degree drops, and in which exceptional hypersurfaces the images lie."""
         rows = self.rows[: self.settled_at]
-        costs = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
-        meets = [
-            f"C{j} at step {t}" + (f" (order {nu})" if nu > 1 else "")
+        drops = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
+        incidences = [
+            f"C{j} at step {t}" + (f" (multiplicity {nu})" if nu > 1 else "")
             for t, row in enumerate(rows, 1)
             for j, nu in enumerate(row[1:], 1)
             if nu
         ]
         if self.beyond:
-            meets.append(f"then {', '.join(f'C{k + 1}' for k in self.beyond)} for ever, which lowers no degree")
-        told = []
-        for verb, events in (("costs", costs), ("meets", meets)):
-            more = ", ..." if len(events) > _SHOWN else ""
-            told.append(f"{verb} {', '.join(events[:_SHOWN]) or 'nothing'}{more}")
-        return told
+            names = ", ".join(f"C{k + 1}" for k in self.beyond)
+            incidences.append(f"{names} at all later steps, which lowers no degree")
+        lowers = f"lowers the degree by {_shortened(drops)}" if drops else "lowers no degree"
+        return [lowers, f"its image lies in {_shortened(incidences) or 'no exceptional hypersurface'}"]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -117,9 +117,13 @@ class OrbitData:
             return fmpz_poly([0, *entries]), fmpz_poly([1])
         characteristic = self.recurrences[column]
         order = int(characteristic.degree())
-        below = fmpz_poly(characteristic.coeffs()[::-1])
-        above = (below * fmpz_poly(entries[:order])).truncate(order)
-        return fmpz_poly([0, 1]) * above, below
+        denominator = fmpz_poly(characteristic.coeffs()[::-1])
+        numerator = (denominator * fmpz_poly(entries[:order])).truncate(order)
+        return fmpz_poly([0, 1]) * numerator, denominator
+
+
+def _shortened(events: Sequence[str]) -> str:
+    return ", ".join(events[:_SHOWN]) + (", ..." if len(events) > _SHOWN else "")
 
 
 NO_ORBIT_DATA = OrbitData(())
@@ -177,9 +181,9 @@ NOTHING = Tracked()
 class Range:
     """How far hypersurfaces are followed: along series for `shown` steps, and for `reach` steps in all.
 
-    Memory can only come back where the image of a hypersurface meets points without a value. Beyond the first steps
-    its image is therefore followed as a point, which is cheap. Where it meets such points along series again, which is
-    not: for at most `along` steps, or `enough` if orders repeat and each step uses up terms, so that series are long.
+    A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
+    point of the image is followed, which is fast. Where it reaches the locus, series are needed, which are slow: for
+    at most `along` steps, or `enough` if multiplicities repeat and each step uses up terms, so that series are long.
     All of it stops when the `budget` is spent.
     """
 
@@ -192,7 +196,7 @@ class Range:
 
 @dataclass(frozen=True)
 class TestCurve:
-    """The curve point + t direction over GF(p), what moves it and how far, and what is looked at along it."""
+    """The curve point + t direction over GF(p), with the equations of the map and the functions tracked along it."""
 
     equations: Sequence[Equation]
     point: Sequence[int]
@@ -208,9 +212,9 @@ class TestCurve:
     def steps(
         self, count: int, tangents: Sequence[Sequence[int]] = (), most: int = _MAX_PRECISION
     ) -> tuple[list[JetStep], bool]:
-        """So many steps along series as long as needed, and whether these are all: the budget or precision may end it.
+        """`count` steps along series as long as needed, and whether the budget and the precision allowed all of them.
 
-        With tangents nothing is tracked.
+        With tangents no function is tracked.
         """
         precision = 8
         functions = () if tangents else self.tracked.functions
@@ -229,9 +233,9 @@ class TestCurve:
                 precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
     def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[JetStep, ...]:
-        """The same where it does not end early. Raises PrecisionTooLow."""
-        run, is_whole = self.steps(count, tangents)
-        if not is_whole:
+        """`count` steps. Raises PrecisionTooLow if it ends early."""
+        run, is_complete = self.steps(count, tangents)
+        if not is_complete:
             raise PrecisionTooLow
         return tuple(run)
 
@@ -248,10 +252,10 @@ class TestCurve:
             for t, (_, *nu) in enumerate(rows, 1):
                 if t >= up and any(nu) and self.tracked.functions:
                     if sorted(nu)[-2:] not in ([1], [0, 1]):
-                        raise NotGeneric("a point where several critical hypersurfaces meet")
+                        raise NotGeneric("a point on several critical hypersurfaces")
                     return OrbitData(rows[:t], (), t, True, (t, nu.index(1)))
             hit, reached = self._next_hit(run[-1].limit, len(run), reach)
-            if hit is None or not self.tracked.functions:  # nothing is asked beyond the next point without a value
+            if hit is None or not self.tracked.functions:  # nothing is needed beyond the next indeterminacy point
                 return OrbitData(rows[:up], (), reached, True)
             steps = hit
 
@@ -263,17 +267,17 @@ class TestCurve:
         """
         steps, limits, most = first, self.limits, _FIRST_ALONG
         while True:
-            run, is_whole = self.steps(steps, most=most)
+            run, is_complete = self.steps(steps, most=most)
             rows = self.tracked.rows(run)
             last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
             hit = None
-            if is_whole and len(rows) - last >= _CONSTANT:
+            if is_complete and len(rows) - last >= _CONSTANT:
                 hit, reached = self._next_hit(run[-1].limit, len(run), limits.reach)
                 if hit is None:
                     return OrbitData(rows[:last], (), reached, True)
             found = [find_recurrence(column) for column in zip(*rows, strict=True)]
             repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
-            is_cut = not is_whole and not limits.budget.is_spent  # by the precision
+            is_cut = not is_complete and not limits.budget.is_spent  # by the precision
             is_far = len(run) >= min(limits.reach, limits.along)
             if rows and repeats and (is_far or (is_cut and (most == _MOST_ALONG or len(rows) >= limits.enough))):
                 laws = tuple(one.characteristic for one in found if one is not None)
@@ -290,7 +294,7 @@ class TestCurve:
                     if mu or any(order for k, order in enumerate(nu) if k not in beyond)
                 )
                 return OrbitData(rows[: max(others, default=1)], (), limits.reach, True, None, beyond)
-            if not is_whole or steps >= longest:
+            if not is_complete or steps >= longest:
                 return OrbitData(rows, (), len(rows), False)
             steps = longest
 

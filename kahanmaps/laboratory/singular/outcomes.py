@@ -1,10 +1,10 @@
-"""What becomes of a hypersurface under the Kahan map: points on it modulo large primes, followed along series.
+"""The images of a hypersurface under iterates of the map: points on it modulo large primes, followed along series.
 
 Source: grammaticos-ramani-papageorgiou-1991.
 
 Where the polynomials of hypersurfaces are too large to be written down, points on them are zeros on a random line. For
 an equation M(x) x~ = r(x) that is linear in both points det dPhi(x) is det M'(x~)/det M(x) up to its sign, with the M'
-of the inverse map. So away from poles and infinity contracted hypersurfaces are the zeros of E(X) = det M'(X~), where
+of the inverse map. So away from poles and infinity exceptional hypersurfaces are the zeros of E(X) = det M'(X~), where
 (X~ : Z~) is the image of X. On a line E is a polynomial of one variable. Source: petrera-suris-2016, eq. (Jac).
 """
 
@@ -47,21 +47,21 @@ from kahanmaps.laboratory.singular.jets import (
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapFamily
 
-_MOST_WITH_TANGENTS = 1024
-_FEW_TERMS = 64  # of series that tell points apart
+_MAX_TANGENT_PRECISION = 1024
+_KEY_PRECISION = 64  # terms of the series by which points are told apart
 _TRIES = 40
-_LINES = 6  # on which critical points are looked for, and more while some have no point
+_MIN_LINES = 6  # on which critical points are searched, and more while a multiplicity has no point
 _POINTS = 2  # each modulo a prime of its own
-_LONGEST = 60  # characters of a polynomial in a sentence
+MAX_CHARACTERS = 60  # characters of a polynomial in a sentence
 
-FIRST_STEPS = 12  # that are shown
+FIRST_STEPS = 12  # that are printed
 
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there.
+    """A point modulo p where the differential degenerates, its multiplicity as a zero of E, and the gradient there.
 
-    Or a pole: then E stands for det(I - eps f').
+    For a pole, E stands for det(I - eps f').
     """
 
     point: tuple[int, ...]
@@ -142,7 +142,7 @@ def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> 
 
 
 class SingularityOutcome(StrEnum):
-    """What becomes of a hypersurface."""
+    """The outcome for a hypersurface."""
 
     CONFINED = "confined"
     NOT_CONFINED = "not confined"
@@ -152,13 +152,13 @@ class SingularityOutcome(StrEnum):
 
 CONFINED, NOT_CONFINED, NOT_CONTRACTED, UNDECIDED = SingularityOutcome
 NO_POINT = "no point was followed"
-BUDGET_SPENT = "the budget was spent before two points were followed (--effort)"
-POINTS_DIFFER = "the orders along two curves through it modulo different primes are not the same (another --seed)"
+BUDGET_SPENT = "work limit reached before two points of it were followed; raise --effort"
+POINTS_DIFFER = "its multiplicities along two curves modulo different primes differ; try another --seed"
 
 
 @dataclass(frozen=True)
 class Hypersurface:
-    """An irreducible hypersurface over Q and what becomes of it under the map, at one exact eps.
+    """An irreducible hypersurface over Q and its singularity pattern, at one exact eps.
 
     `is_pole`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian determinant of
     the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?" where it is
@@ -168,7 +168,7 @@ class Hypersurface:
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
-    cannot be said: its pattern is still running. `orders` are those of this pattern. In a composition that is
+    cannot be said: its pattern has not settled. `orders` are those of this pattern. In a composition that is
     followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
     `generic` is its polynomial over Q[eps], empty where it is not known.
     """
@@ -190,32 +190,38 @@ class Hypersurface:
     generic: str = ""
 
     def sentence(self, at: str) -> str:
-        """A sentence: what it is (`at` which eps), when it comes back, what it costs, which of C1, C2, ... it meets."""
-        text, most = (self.generic, 2 * _LONGEST) if self.generic else (self.polynomial, _LONGEST)
+        """Describe its pattern: where its images lie, when they lower the degree, and whether it is confined.
+
+        `at` names the eps of the polynomial, where that is not the one over Q[eps].
+        """
+        text, most = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
         cut = text if len(text) <= most else f"{text[:most]} ..."
         name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
         if self.orders.returns:
             after, other = self.orders.returns
-            outcome = f"comes back as C{other + 1} after {counted(after, 'step')}"
+            outcome = f"mapped onto C{other + 1} after {counted(after, 'step')}"
         elif self.confined_at is not None:
-            outcome = f"a hypersurface again after {counted(self.confined_at, 'step')}"
+            outcome = f"confined after {counted(self.confined_at, 'step')}"
         elif self.orders.recurrences:
-            outcome = f"its orders repeat after {counted(self.orders.settled_at, 'step')}"
+            outcome = f"its multiplicities satisfy a recurrence of order {self.orders.settled_at}"
         else:
-            outcome = f"followed for {counted(self.followed, 'step')}"
+            outcome = f"not confined within {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
-        parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted{by}", outcome]
+        parts = [
+            f"{name}, degree {self.degree}{', a factor of the denominator' if self.is_pole else ''}: contracted{by}",
+            outcome,
+        ]
         return "; ".join([", ".join(parts), *self.orders.sentences])
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data: what is known of it beside its first steps."""
+        """Plain data, without the first steps."""
         names = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
         found = attributes(self, *names, "followed", "settled_at", "note", "stage", "generic")
         return {**found, "orders": self.orders.to_json()}
 
 
 @dataclass(frozen=True)
-class Written:
+class HypersurfaceForm:
     """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown).
 
     `excess` is its exponent in the factor by which the minors of an equation exceed the map, and `stage` the number of
@@ -237,8 +243,8 @@ class Tracking:
     and steps are single maps of a word of `period`.
     """
 
-    critical: Sequence[Written] = ()
-    excess: Sequence[Written] = ()
+    critical: Sequence[HypersurfaceForm] = ()
+    excess: Sequence[HypersurfaceForm] = ()
     stage: int | None = None
     period: int = 1
 
@@ -268,15 +274,15 @@ _UNKNOWN, NONE_TRACKED = Hypersurface(), Tracking()
 def outcome_of(
     map_: MapFamily,
     eps: fmpq,
-    one: Written,
+    form: HypersurfaceForm,
     text: str,
     rng: random.Random,
     limits: Range,
     tracking: Tracking = NONE_TRACKED,
 ) -> Hypersurface:
-    """The hypersurface on which a form over Q vanishes, with what becomes of it, at one exact eps (half the time step).
+    """The hypersurface of a form over Q with its singularity pattern, at one exact eps (half the time step).
 
-    The form is irreducible, in the variables (X : Z), and `text` stands for it; two points modulo two random primes are
+    The form is irreducible, in the variables (X : Z), and `text` is its name; two points modulo two random primes are
     followed. Source: grammaticos-ramani-papageorgiou-1991.
     """
     outcomes: dict[int, Hypersurface] = {}  # by the primes
@@ -288,33 +294,33 @@ def outcome_of(
         try:
             equations = tracking.equations(map_, eps, field)
             # A random point of the hypersurface modulo p, on a line, and its tangent space.
-            p, size = field.prime, one.form.context().nvars()
+            p, size = field.prime, form.form.context().nvars()
             a, b = ([rng.randrange(p) for _ in range(size)] for _ in range(2))
-            line = evaluate(one.form, field, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)])
-            tracked = tracking.along(one.form, field)
+            line = evaluate(form.form, field, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)])
+            tracked = tracking.along(form.form, field)
             roots = roots_modulo(line) if line.degree() > 0 else []
             if not roots or p in outcomes:
                 continue
             point = [(x + roots[0] * v) % p for x, v in zip(a, b, strict=True)]
             at = [field.convert(x) for x in point]
-            slopes = [int(evaluate(slope, field, at)) for slope in gradient(one.form)]
+            slopes = [int(evaluate(slope, field, at)) for slope in gradient(form.form)]
             tangents = _tangents(point, slopes, field) if any(slopes) else None
             if tangents is not None:
                 outcomes[p] = _outcome_at(equations, point, tangents, rng, limits, tracked=tracked)
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
-            note = BUDGET_SPENT if limits.budget.is_spent else "the series lost all their terms"
+            note = BUDGET_SPENT if limits.budget.is_spent else "its series have too few terms"
             break
     if len(outcomes) == _POINTS:
         first, second = outcomes.values()
         found, note = _agreed(first, second, limits.budget.is_spent)
-    known = replace(found, polynomial=text, degree=int(one.form.total_degree()), is_pole=one.is_pole, note=note)
-    return replace(known, multiplicity=one.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
+    known = replace(found, polynomial=text, degree=int(form.form.total_degree()), is_pole=form.is_pole, note=note)
+    return replace(known, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
 
 def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hypersurface, str]:
-    """The outcome at two points, with a note where it is not the same: a budget that `is_over` may have ended one."""
+    """The outcome at two points, with a note if they differ; a spent budget (`is_over`) may be the reason."""
     first, second = ((each.status, each.contracted_at, each.confined_at, each.orders.known) for each in (one, other))
     if first == second:
         return one, ""
@@ -322,7 +328,7 @@ def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hype
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """As `unwritten`, with the poles and infinity: without any polynomial."""
+    """As `unwritten`, with the poles and infinity; without any polynomial."""
     found = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
@@ -340,7 +346,7 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: R
 
 
 def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
-    """The contracted hypersurfaces without their polynomials, told apart by multiplicity and outcome of random points.
+    """The exceptional hypersurfaces without polynomials, distinguished by multiplicity and outcome of random points.
 
     At one exact `eps` (half the time step), on lines modulo random primes; the poles, or the others but for infinity.
     One with a multiplicity of which no point was found is undecided. Source: zander-2021.
@@ -348,8 +354,8 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
     found: dict[tuple[Any, ...], Hypersurface] = {}
     alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}  # the places in `found` of points with the same orders
     degrees: dict[int, int] = {}
-    for line in range(4 * _LINES):
-        if limits.budget.is_spent or (line >= _LINES and set(degrees) <= {key[0] for key in found}):
+    for line in range(4 * _MIN_LINES):
+        if limits.budget.is_spent or (line >= _MIN_LINES and set(degrees) <= {key[0] for key in found}):
             break
         field = GF(random_prime(rng))
         try:
@@ -364,7 +370,7 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             if tangents is None or limits.budget.is_spent:
                 continue
             direction = [rng.randrange(field.prime) for _ in critical.point]
-            run, _ = TestCurve(equations, critical.point, direction, limits).steps(limits.shown, most=_FEW_TERMS)
+            run, _ = TestCurve(equations, critical.point, direction, limits).steps(limits.shown, most=_KEY_PRECISION)
             orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             known = alike.setdefault(orders, [])
             if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
@@ -413,31 +419,33 @@ def _outcome_at(
     limits: Range,
     tracked: AlongCurves = NOTHING,
 ) -> Hypersurface:
-    """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
+    """The outcome for the hypersurface with these tangents at a point, with its singularity pattern."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
-    course = TestCurve(equations, point, direction, limits, tracked)
-    run, is_whole = course.steps(limits.shown, tangents, _MOST_WITH_TANGENTS)
+    curve = TestCurve(equations, point, direction, limits, tracked)
+    run, is_complete = curve.steps(limits.shown, tangents, _MAX_TANGENT_PRECISION)
     status, down, up = _by_ranks([step.rank for step in run], full)
-    if not is_whole and (status != NOT_CONFINED or not tracked.functions):
+    if not is_complete and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
         return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
     orders = NO_ORBIT_DATA
     if up is None:
-        orders = course.orders(limits.shown)
+        orders = curve.orders(limits.shown)
         # Beyond the steps that are shown it may be a hypersurface again, whose orders go on as those of another one do.
         longest = min(limits.along, limits.reach)
-        while up is None and is_whole and not orders.is_settled and len(run) < longest:
-            run, is_whole = course.steps(min(2 * len(run), longest), tangents, _MOST_WITH_TANGENTS)
+        while up is None and is_complete and not orders.is_settled and len(run) < longest:
+            run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)
             status, down, up = _by_ranks([step.rank for step in run], full)
     if up is None:
-        if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
+        if (
+            not is_complete and not orders.is_settled
+        ):  # what grows by a recurrence, as at superattracting points, is known
             raise PrecisionTooLow
     else:
-        orders = course.orbit_data_until_return(up)
-    if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = list(course.all_steps(orders.settled_at + 2, tangents))
+        orders = curve.orbit_data_until_return(up)
+    if is_complete and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
+        run = list(curve.all_steps(orders.settled_at + 2, tangents))
         status, down, up = _by_ranks([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only

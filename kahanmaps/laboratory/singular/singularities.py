@@ -1,10 +1,10 @@
-"""Singularity confinement: what becomes of the hypersurfaces that the Kahan map contracts, and of its poles.
+"""Singularity confinement: the images of the exceptional hypersurfaces (contracted by the map) and of its poles.
 
-A hypersurface on which the differential of the map degenerates may be contracted to something smaller: two points on it
-have the same image, and memory is lost. The singularity is confined if, followed along curves through the hypersurface,
-later images are a hypersurface again. Degrees of iterates drop below their maximum only where contracted hypersurfaces
-meet points without a value. Hypersurfaces are found exactly over Q, for an exact eps; what becomes of them is computed
-at random points modulo large primes, which is evidence and no proof.
+A hypersurface on which the differential of the map degenerates may be contracted to something smaller: different points
+have the same image, and the memory of the initial point is lost. The singularity is confined if, along curves through
+the hypersurface, a later image is a hypersurface again. Degrees of iterates drop below their maximum only where images
+of exceptional hypersurfaces lie in the indeterminacy locus. The hypersurfaces are computed exactly over Q, for an exact
+eps; their images at random points modulo large primes, which is evidence and no proof.
 Source: grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
 """
 
@@ -78,12 +78,12 @@ _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random ones, where det dPhi is looked at
 _MAX_DEGREE = 20_000  # of a composition
-_STOPPED = "the budget was spent before all singularities were followed (--effort)"
-_DIFFERENT = "the singularities at two values of eps differ (--eps)"
+_STOPPED = "work limit reached before all singularities were traced; raise --effort"
+_DIFFERENT = "the singularities at the two values of eps differ; choose one with --eps"
 
 
 class TooLongFormula(InputError):
-    """Why the singularities of a composition are not followed."""
+    """Raised where a composition is too long for its singularities to be followed."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class SingularityRun(PrintableResult):
 
     @property
     def verdict(self) -> str:
-        """What all hypersurfaces together say.
+        """The verdict on all hypersurfaces together.
 
         "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"; where that
         has no meaning at this eps, "singular everywhere" or "not dominant".
@@ -138,13 +138,13 @@ class SingularityRun(PrintableResult):
 
     @property
     def followed(self) -> int | None:
-        """For how many steps those hypersurfaces were followed that are not confined; None where all are."""
+        """The number of steps for which all unconfined hypersurfaces were followed; None if all are confined."""
         steps = [h.followed for h in self.hypersurfaces if h.status == NOT_CONFINED]
         return min(steps, default=None)
 
     @property
     def text(self) -> str:
-        """The verdict, with the number of steps after which confinement was no longer looked for."""
+        """The verdict, with the number of steps searched for confinement."""
         if self.followed is None or self.verdict not in (NOT_CONFINED, "some confined"):
             return self.verdict
         others = ", others not" if self.verdict == "some confined" else ""
@@ -152,12 +152,12 @@ class SingularityRun(PrintableResult):
 
     @property
     def unit(self) -> str:
-        """What steps of hypersurfaces are."""
+        """The unit of the steps of hypersurfaces."""
         return "step" if self.word is None else "single map"
 
     @property
     def shape(self) -> tuple[Any, ...]:
-        """What does not depend on eps if eps is generic: degrees, kinds and patterns."""
+        """Data that are the same for all generic eps: degrees, kinds and patterns."""
         patterns = sorted(
             (h.degree, h.is_pole, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
             for h in self.hypersurfaces
@@ -175,7 +175,7 @@ def singularities(
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SingularityRun:
-    """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their outcome.
+    """Compute the exceptional hypersurfaces and poles of a Kahan map at one exact eps, and their singularity patterns.
 
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
@@ -229,29 +229,29 @@ def singularities(
             ) from None
         at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
         return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
-    below = map_form.denominator
+    denominator = map_form.denominator
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
-    run = SingularityRun(exact_eps, affine(below * (-1) ** (map_.dim * len(over.factors)), map_), map_form.degree)
-    is_undefined = bool(below.is_zero())  # det(I - eps f'(x)) = 0 for all x
+    run = SingularityRun(exact_eps, affine(denominator * (-1) ** (map_.dim * len(over.factors)), map_), map_form.degree)
+    is_undefined = bool(denominator.is_zero())  # det(I - eps f'(x)) = 0 for all x
     if is_undefined or not _is_dominant(map_, exact_eps):
         return replace(run, is_undefined=is_undefined, is_dominant=False)
     if map_form.degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
-    every, critical_degree = written(map_form)
+    forms, critical_degree = written(map_form)
     if critical_degree is None and len(over.factors) > 1:
         known = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
         if known is not None:
             return known
-    tracking = Tracking(*followed_forms(map_form, every)) if critical_degree else NONE_TRACKED
-    found: list[Hypersurface] = []
+    tracking = Tracking(*followed_forms(map_form, forms)) if critical_degree else NONE_TRACKED
+    hypersurfaces: list[Hypersurface] = []
     is_cut = False
-    for one in every:
+    for form in forms:
         if is_cut := limits.budget.is_spent:
             break
         try:
-            text = name_of(one.form, map_)
+            text = name_of(form.form, map_)
             progress(f"following {text[:40]}")
-            found.append(outcome_of(map_, exact_eps, one, text, rng, limits, tracking))
+            hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
             if isinstance(effort, Budget):  # a stage of something else, which ends, too
                 raise
@@ -259,16 +259,17 @@ def singularities(
             break
     if critical_degree is None and not is_cut:
         progress("following critical points")
-        too_large = "the hypersurfaces that this map contracts are too large to be written down"
-        found += unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
-    is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in found))
-    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(found), stopped=is_cut)
+        too_large = "the polynomials of the exceptional hypersurfaces are too large"
+        unnamed = unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
+        hypersurfaces += unnamed
+    is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_cut)
 
 
 def _map_by_map(
     map_: MapFamily, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
 ) -> SingularityRun | None:
-    """The same for a composition whose maps are followed one by one; None where one of them is too large."""
+    """The run for a composition whose maps are followed one by one; None where one of them is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
     found = followed_map_by_map(map_, run.eps, rng, limits, progress)
     return found and replace(run, word=found[0], hypersurfaces=tuple(found[1]), stopped=limits.budget.is_spent)
@@ -276,15 +277,15 @@ def _map_by_map(
 
 @dataclass(frozen=True)
 class Patterns:
-    """What the outcomes of contracted hypersurfaces say of degrees: how many of them tell how they go on.
+    """The singularity patterns of a map, and the degrees that follow from them.
 
-    Degrees drop below powers of the first only where the images of contracted hypersurfaces meet points without a
-    value, so that nothing new can be seen in them before the last pattern has come to its end. `lengths` are the
-    different numbers of steps after which patterns had settled, `searched` is the number of steps those were followed
-    for that are not confined (None if all are), `some_confined` tells whether others are (None: not known). `running`
-    is empty, or says why the patterns are not known to the end. `series` are the coefficients above and below in the
-    generating function of the degrees that follow from the patterns, empty where these do not tell it, and `contracted`
-    are the hypersurfaces `at` one of the eps that were tried. Steps are those of the map, but for what is told of the
+    Degrees drop below powers of the first one only where images of exceptional hypersurfaces lie in the indeterminacy
+    locus; so a recurrence may change until the last pattern has settled. `lengths` are the different numbers of steps
+    after which patterns have settled; `searched` is the number of steps for which unconfined hypersurfaces were
+    followed (None if all are confined); `some_confined` says whether others are confined (None: not known). `running`
+    is empty, or the reason why the patterns are not known for all steps. `series` has the coefficients of the numerator
+    and the denominator of the generating function of the degrees, and is empty where it does not follow. `contracted`
+    are the exceptional hypersurfaces `at` one of the eps that were tried. Steps are those of the map, except for the
     hypersurfaces of a `word` of maps that is followed map by map.
     """
 
@@ -298,7 +299,7 @@ class Patterns:
     word: Word | None = field(default=None, compare=False)
 
     def terms_needed(self, order: int) -> int:
-        """The number of terms, d_0 included, from which a recurrence of this order can be told from all others.
+        """The number of terms, including d_0, that determine a recurrence of this order.
 
         With two rational generating functions of degrees r and R that agree in r + R + 1 terms they are the same; R is
         at most 1 more than the sum of the lengths of different patterns (hypersurfaces of the same pattern count once).
@@ -308,8 +309,8 @@ class Patterns:
     @property
     def fraction(self) -> Fraction:
         """The generating function of the degrees, numerator and denominator, where it is known."""
-        above, below = self.series
-        return fmpz_poly(list(above)), fmpz_poly(list(below))
+        numerator, denominator = self.series
+        return fmpz_poly(list(numerator)), fmpz_poly(list(denominator))
 
     @property
     def series_text(self) -> str:
@@ -318,29 +319,29 @@ class Patterns:
 
     @property
     def sentences(self) -> list[str]:
-        """A sentence for each contracted hypersurface, where degrees follow: when it comes back and what it costs."""
+        """A sentence on the singularity pattern of each exceptional hypersurface, where the degrees are derived."""
         at = f" at eps = {self.at}" if self.at else ""
         return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
 
     @property
     def word_text(self) -> str:
-        """What steps are in these sentences, where these are not those of the map; else empty."""
+        """A note on the steps in these sentences if they are steps of single maps; else empty."""
         return self.word.text if self.word is not None and self.word.length > 1 and self.series else ""
 
     @property
     def limit(self) -> str:
-        """What was not seen, and how far it was looked for; empty where everything is confined."""
+        """The number of steps searched for confinement; empty if everything is confined."""
         if self.searched is None:
             return ""
         return f"{'no other' if self.some_confined else 'no'} confinement within {counted(self.searched, 'step')}"
 
     @property
     def text(self) -> str:
-        """One line: the longest pattern, and how far others were followed."""
+        """One line: the longest pattern, and the number of steps for which the others were followed."""
         if self.running:
             return self.running
         longest = max(self.lengths, default=0)
-        ends = f"nothing new after step {longest}" if longest else "none that lowers degrees"
+        ends = f"all singularity patterns have settled by step {longest}" if longest else "none lowers the degree"
         return f"{ends}; {self.limit}" if self.limit else ends
 
     def to_json(self) -> dict[str, Any]:
@@ -370,7 +371,7 @@ def _ascending(coefficients: Sequence[int]) -> str:
 
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
-    """What runs at one eps, or at two that stand for all, say together; `at`: the map depends on eps."""
+    """The patterns from runs at one eps, or at two that represent all; `at`: the map depends on eps."""
     found = set()
     for run in runs:
         if not run.is_dominant:
@@ -450,7 +451,7 @@ def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budge
 
 
 def _not_dominant(eps: fmpq) -> Patterns:
-    return _unknown(f"the map is not dominant at eps = {format_number(eps)}, and no singularity is followed")
+    return _unknown(f"the map is not dominant at eps = {format_number(eps)}, so that no singularity is followed")
 
 
 def _unknown(reason: str) -> Patterns:
@@ -466,16 +467,16 @@ def _patterns(
     for h in critical:
         name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
         if h.status == UNDECIDED:
-            return _unknown(f"what becomes of {name} is undecided: {h.note or 'its series ended'}")
+            return _unknown(f"the pattern of {name} is undecided: {h.note or 'its series ended'}")
         if h.settled_at is None:
-            return _unknown(f"the pattern of {name} is still running after {h.followed} steps (--steps)")
+            return _unknown(f"the pattern of {name} has not settled after {h.followed} steps; raise --steps")
     lengths = {h.settled_at for h in critical if h.settled_at}
     open_ones = [h.followed for h in critical if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
     if all(h.orders.is_settled and h.degree for h in critical) and map_degree > 0:
         if needed([h.orders for h in critical]) is None:
             return _unknown(
-                "some images meet a hypersurface that lowers degrees for ever, to orders that are not known"
+                "some images lie in a hypersurface that lowers the degree at all steps, with unknown multiplicities"
             )
         degrees = (map_degree,) if word is None else word.degrees
         fraction = degree_series(degrees, [(h.degree, h.orders) for h in critical], [h.stage or 0 for h in critical])
@@ -498,7 +499,7 @@ def _patterns(
 
 
 def steps_by_default(dim: int) -> int:
-    """For how many steps hypersurfaces are followed in this dimension unless told otherwise."""
+    """The default number of steps for which hypersurfaces are followed in this dimension."""
     return _REACH.get(dim, _LEAST_REACH)
 
 

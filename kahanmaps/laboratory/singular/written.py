@@ -1,4 +1,4 @@
-"""The hypersurfaces that a map may contract, by their polynomials; of a composition those of each map by itself.
+"""The polynomials of the hypersurfaces that a map may contract; for a composition, those of each of its maps.
 
 A composition multiplied out has the hypersurfaces of all its maps, moved back by those before: long polynomials. Map by
 map they are as short as those of the maps. Curves through them are followed through the word of the maps, one map a
@@ -27,7 +27,7 @@ from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.singular.following import Range
-from kahanmaps.laboratory.singular.outcomes import Hypersurface, Tracking, Written, outcome_of
+from kahanmaps.laboratory.singular.outcomes import Hypersurface, HypersurfaceForm, Tracking, outcome_of
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map, MapFamily
@@ -52,38 +52,42 @@ class Word:
 
     @property
     def text(self) -> str:
-        """What a step is, and what is counted instead."""
-        return f"a step is {counted(self.length, 'map')}, which are followed one by one: steps are those of single maps"
+        """A note on the steps of single maps."""
+        return (
+            f"{counted(self.length, 'map')} make one iterate and are followed one by one: these steps are single maps"
+        )
 
 
-def written(map_: HomogeneousMap) -> tuple[list[Written], int | None]:
-    """The poles of a map and the factors of its Jacobian determinant, with the degree of that; exact.
+def written(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
+    """The poles of a map and the factors of its Jacobian determinant, with the degree of the determinant; exact.
 
-    Where the determinant is too large its degree is None, and only infinity is there beside the poles.
+    Where the determinant is too large the degree is None, and the list has only the poles and infinity.
     """
-    forms, _, below = map_
-    found: dict[str, Written] = {}
-    for factor, _ in factored(below):
+    forms, _, denominator = map_
+    found: dict[str, HypersurfaceForm] = {}
+    for factor, _ in factored(denominator):
         if not is_infinity(factor):
-            found[str(factor)] = Written(factor, True, 0)
+            found[str(factor)] = HypersurfaceForm(factor, True, 0)
     if map_.degree <= 1:
         return list(found.values()), 0
     critical_degree = len(forms) * (map_.degree - 1)
     critical = _critical_factors(forms, critical_degree)
     if critical is None:
         infinity = forms[0].context().gens()[-1]
-        poles = [Written(one.form, one.is_pole, None) for one in found.values()]
-        return [*poles, Written(infinity, False, None)], None
+        poles = [HypersurfaceForm(one.form, one.is_pole, None) for one in found.values()]
+        return [*poles, HypersurfaceForm(infinity, False, None)], None
     for factor, multiplicity in critical:
-        found[str(factor)] = Written(factor, str(factor) in found, multiplicity)
+        found[str(factor)] = HypersurfaceForm(factor, str(factor) in found, multiplicity)
     return list(found.values()), critical_degree
 
 
-def followed_forms(map_: HomogeneousMap, among: list[Written], stage: int = 0) -> tuple[list[Written], list[Written]]:
-    """Of the forms of a map those that it contracts, and those in the common factor of the minors of its equation."""
+def followed_forms(
+    map_: HomogeneousMap, among: list[HypersurfaceForm], stage: int = 0
+) -> tuple[list[HypersurfaceForm], list[HypersurfaceForm]]:
+    """The forms that a map contracts, and those in the common factor of the minors of its equation."""
     contracted = [replace(one, stage=stage) for one in among if one.multiplicity]
     common = [] if map_.factor.is_constant() else factored(map_.factor)
-    return contracted, [Written(factor, False, None, k, stage) for factor, k in common]
+    return contracted, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in common]
 
 
 def followed_map_by_map(
@@ -218,7 +222,7 @@ def affine(form: Any, map_: MapFamily) -> str:
 
 
 def name_of(form: Any, map_: MapFamily) -> str:
-    """The same; Z for infinity."""
+    """The name of a form in output: its affine polynomial, or Z for infinity."""
     return "Z" if is_infinity(form) else affine(form, map_)
 
 

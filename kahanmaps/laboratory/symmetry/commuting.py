@@ -1,8 +1,9 @@
 """All quadratic systems g, of a given shape, whose Kahan map commutes with that of f at equal eps, for every eps.
 
-Three steps. The Lie bracket [f, g] vanishes: a linear space of candidates. The next terms of the commutator, in powers
-of eps, vanish: polynomial equations on that space, solved over Q. Both are necessary, so no commuting system is
-lost. Every solution is then judged by itself, as an identity in x and eps: proved, or supported at random points.
+The search has three stages. The Lie bracket [f, g] vanishes: this gives a linear space of candidates. The next terms of
+the commutator, in powers of eps, vanish: these are polynomial equations on that space, solved over Q. Both conditions
+are necessary, so that no solution is discarded. Then every solution is certified as an identity in x and eps: proved,
+or supported at random points.
 
 A quadratic system in n variables over a number field K of degree m is one in n m variables over Q, and its Kahan map is
 that over K (docs/beyond.md). So the g over K whose maps commute with that of f are among the rational ones for this
@@ -63,7 +64,7 @@ MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
 
 @dataclass(frozen=True)
 class CommutingField:
-    """One g that commutes: the system, B with g = B f if that was the shape, and the finding on it.
+    """A system g that commutes with f, the matrix B if the shape is g = B f, and the finding on it.
 
     `trivial` says "0", "f" or "-f" where g is that, else it is empty.
     """
@@ -107,11 +108,11 @@ class CommutingFamily:
 
 @dataclass
 class CommutingSystems(PrintableResult):
-    """What was found. `complete` says that there are no other rational g of that shape.
+    """The result of the search; if `complete`, there are no other rational g of this shape.
 
-    `dimension` is that of the space of g with [f, g] = 0; `irrational` tells of solutions outside Q; `discarded` counts
-    solutions of the equations that do not commute; `every_g_commutes` where f = 0, and then nothing is listed;
-    `undecided` says in sentences what remains open.
+    `dimension` is that of the space of g with [f, g] = 0; `irrational` describes solutions that are not rational;
+    `discarded` counts solutions of the equations that do not commute; `every_g_commutes` where f = 0, and then nothing
+    is listed; `undecided` has sentences on what was not decided.
     """
 
     system: QuadraticSystem
@@ -126,16 +127,16 @@ class CommutingSystems(PrintableResult):
     order: int = 2  # the highest power of eps of which equations were taken
     undecided: list[str] = field(default_factory=list)
     root: str = ""  # the algebraic number in f, where there is one
-    note: str = ""  # on a shape that was tried before this one, and given up
+    note: str = ""  # on another shape that was tried first
 
     @property
     def complete(self) -> bool:
-        """Whether every rational g of the shape that commutes was found."""
+        """Whether all rational g of this shape that commute were found."""
         return not self.undecided
 
     @property
     def kind_text(self) -> str:
-        """Which g were tried."""
+        """The kind of g that were searched."""
         over = f" over the number field of a {self.root}" if self.root else ""
         if self.shape == "linear":
             return f"fields g = B f (B a constant {'matrix' if over else 'rational matrix'}{over})"
@@ -148,7 +149,7 @@ class CommutingSystems(PrintableResult):
 
     @property
     def verdict(self) -> Certainty:
-        """The weakest verdict on what was found; undecided where the list may not be complete."""
+        """The weakest verdict on the solutions; undecided where the list may not be complete."""
         found = [g.finding.verdict for g in self.solutions] + [family.finding.verdict for family in self.families]
         return combined([*found, *([] if self.complete else [Certainty.UNDECIDED])])
 
@@ -178,13 +179,14 @@ def commuting_systems(
     progress: Callable[[str], None] = lambda _: None,
     C: fmpq_mat | None = None,
 ) -> CommutingSystems:
-    """All rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
+    """Find all rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
     `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2; None: these
     where the dimension is at most 3 and little work finds all of them, else those, which a `note` says. Exact over Q;
     what no lemma proves is supported at random points, with a probability of error below 2^-error_bits. Each more of
     `effort` doubles the work that the search may take. With a matrix C, for which C f' = f' C, only g with C g' = g' C.
-    Raises InputError for another shape or a bound that is not positive. What is too large is told in `undecided`.
+    Raises InputError for another shape or a bound that is not positive. What was too large to be searched is reported
+    in `undecided`.
     Source: petrera-suris-2016.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2 + 1", "y^2 - x*y"])
@@ -199,7 +201,7 @@ def commuting_systems(
             found = commuting_systems(system, "quadratic", **options, effort=Budget(QUICK_UNITS))
             if found.complete:
                 return found
-            note = f"the {found.kind_text} were tried first, and little work did not find all (--shape quadratic)"
+            note = f"the {found.kind_text} were tried first, and a short search did not find all; try --shape quadratic"
         found = commuting_systems(system, "linear", **options, effort=budget, C=C)
         return replace(found, note=note)
     if shape not in SHAPES:
@@ -261,7 +263,7 @@ class _Search:
         others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
         for k, weights in enumerate([*trivial, *others]):
             if self.budget.is_spent and weights not in trivial:
-                found.undecided.append(f"{SPENT}: {len(others) + 3 - k} solutions were not judged")
+                found.undecided.append(f"{SPENT}: {len(others) + 3 - k} solutions were not certified")
                 return
             self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
             finding = certify_field(f, field_at(self.space, weights), self.settings)

@@ -1,9 +1,10 @@
 """Linear and affine symmetries of a Kahan map, and its reversing symmetries.
 
-The map goes along with affine changes of variables. So an affine T(x) = S x + r with f(T(x)) = S f(x) is a symmetry,
-T Phi T^{-1} = Phi, and one with f(T(x)) = -S f(x) a reversing symmetry, T Phi T^{-1} = Phi^{-1}, both for every eps.
-Conversely the term of first order in eps gives these equations. They are identities of polynomials of degree 2, and
-are verified on coefficients, exactly: everything reported is proved. What was searched is said in `searched`.
+Kahan's method is equivariant under affine changes of variables. So an affine T(x) = S x + r with f(T(x)) = S f(x) is a
+symmetry, T Phi T^{-1} = Phi, and one with f(T(x)) = -S f(x) a reversing symmetry, T Phi T^{-1} = Phi^{-1}, both for
+every eps. Conversely, the term of first order in eps gives these equations. They are identities of polynomials of
+degree 2, and are verified exactly, coefficient by coefficient: every symmetry reported is proved. `searched` lists the
+searches that were completed.
 """
 
 from __future__ import annotations
@@ -52,17 +53,17 @@ class Symmetry:
 
     @property
     def kind(self) -> str:
-        """Which of the two it is, in words."""
+        """\"symmetry\" or \"reversing symmetry\"."""
         return "reversing symmetry" if self.reversing else "symmetry"
 
     @property
-    def obvious(self) -> bool:
+    def is_trivial(self) -> bool:
         """Whether S is I or -I and r = 0."""
         return not any(e != 0 for e in self.r) and self.S in (QQ.identity(len(self.r)), -QQ.identity(len(self.r)))
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data: S, r, what it is, the action as text."""
-        return {**attributes(self, "kind", "S", "r", "text", "obvious"), "verdict": "proved"}
+        """Plain data: S, r, the kind, the action as text."""
+        return {**attributes(self, "kind", "S", "r", "text", trivial="is_trivial"), "verdict": "proved"}
 
 
 @dataclass(frozen=True)
@@ -94,11 +95,11 @@ class Infinitesimal:
 
 @dataclass
 class Symmetries(PrintableResult):
-    """What was found. `complete` says that each search in `searched` came to its end.
+    """The symmetries that were found, and the searches that were completed.
 
     `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;
     `signed` are all signed permutations (with a translation where needed), of the variables or of scaled ones (see
-    signed_permutations.py), `others` linear symmetries that are none.
+    signed_permutations.py), `others` further linear symmetries.
     `generators` generate a group whose linear parts are `order` matrices (None: not known): those of `signed`, or of
     `others` as well where there are no infinitesimal symmetries, so that all are finite in number: see `group_of`.
     """
@@ -116,7 +117,7 @@ class Symmetries(PrintableResult):
 
     @property
     def complete(self) -> bool:
-        """Whether each search came to its end."""
+        """Whether every search was completed."""
         return not self.undecided
 
     @property
@@ -129,11 +130,10 @@ class Symmetries(PrintableResult):
 
     @property
     def group_text(self) -> str:
-        """What the group is: 4 signed permutations, 2 of them reversing; empty where there is but the identity."""
+        """The group in words: 4 signed permutations, 2 of them reversing; empty for the trivial group."""
         if self.order is None or self.order == 1:
             return ""
-        back = self.reversing_order
-        return f"{self.order} {self.group_of}, {f'{back} of them reversing' if back else 'none of them reversing'}"
+        return f"{self.order} {self.group_of}, {self.reversing_order or 'none'} of them reversing"
 
     @property
     def symmetries(self) -> list[Symmetry]:
@@ -146,7 +146,7 @@ class Symmetries(PrintableResult):
         return [t for t in (*self.signed, *self.others) if t.reversing]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each finite symmetry that is known, for `pandas.DataFrame(found.rows())` and the like."""
+        """A row for each finite symmetry that is known, for `pandas.DataFrame(symmetries.rows())` and the like."""
         return [{"kind": t.kind, "action": t.text} for t in (*self.symmetries, *self.reversing)]
 
     def to_json(self) -> dict[str, Any]:
@@ -177,35 +177,38 @@ def linear_symmetries(
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Symmetries:
-    """Affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
+    """Find affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
 
-    Searched: the Lie algebra of affine symmetries, and a scaling; signed permutations, also of scaled variables, with a
-    translation where needed (dimension at most 12); in dimension at most 3, where that algebra has no linear element,
-    all rational matrices. All exact and proved. Each more of `effort` doubles the work of the search.
+    The search covers the Lie algebra of affine symmetries, and a scaling; signed permutations, also of scaled
+    variables, with a translation where needed (dimension at most 12); in dimension at most 3, where that algebra has no
+    linear element, all rational matrices. The result is exact and proved. Each increase of `effort` by 1 doubles the
+    work that the search may take.
     Source: cmoq-2013.
 
-    >>> found = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
-    >>> found.order, [t.text for t in found.generators]
+    >>> symmetries = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
+    >>> symmetries.order, [t.text for t in symmetries.generators]
     (48, ['(x, y, z) -> (z, x, -y)', '(x, y, z) -> (-x, -z, y)'])
     """
     system = as_system(system)
     budget = budget_for("symmetries", effort)
-    found = Symmetries(system)
+    symmetries = Symmetries(system)
     progress("infinitesimal symmetries")
-    _add_infinitesimal(found)
+    _add_infinitesimal(symmetries)
     progress("signed permutations")
-    _add_signed(found, budget)
+    _add_signed(symmetries, budget)
     if system.dim <= MAX_GENERAL:
         progress("all matrices")
-        _add_general(found, budget)
-    return found
+        _add_general(symmetries, budget)
+    return symmetries
 
 
-def _add_infinitesimal(found: Symmetries) -> None:
-    f = found.system
+def _add_infinitesimal(symmetries: Symmetries) -> None:
+    f = symmetries.system
     n = f.dim
     if n > MAX_LINEAR:
-        found.undecided.append(f"infinitesimal symmetries are computed up to dimension {MAX_LINEAR}, found {n}")
+        symmetries.undecided.append(
+            f"infinitesimal symmetries are computed up to dimension {MAX_LINEAR}, not in dimension {n}"
+        )
         return
     gens = ring(f.variables).gens()
     columns = []
@@ -227,20 +230,22 @@ def _add_infinitesimal(found: Symmetries) -> None:
     def infinitesimal(vector: Sequence[fmpq], weight: int) -> Infinitesimal:
         return Infinitesimal(f.variables, fmpq_mat(n, n, vector[: n * n]), tuple(vector[n * n :]), weight)
 
-    found.infinitesimal = [infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
+    symmetries.infinitesimal = [infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
     scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
     if f.is_homogeneous:  # S = I, rather than another one
-        found.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
+        symmetries.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
     elif scalings:
         vector = min(scalings, key=lambda v: sum(e != 0 for e in v))
-        found.scaling = infinitesimal([e / vector[-1] for e in vector[:-1]], 1)
-    found.searched.append("affine infinitesimal symmetries and scalings: all")
+        symmetries.scaling = infinitesimal([e / vector[-1] for e in vector[:-1]], 1)
+    symmetries.searched.append("affine infinitesimal symmetries and scalings: all")
 
 
-def _add_signed(found: Symmetries, budget: Budget) -> None:
-    f = found.system
+def _add_signed(symmetries: Symmetries, budget: Budget) -> None:
+    f = symmetries.system
     if f.dim > MAX_SIGNED:
-        found.undecided.append(f"signed permutations are tried up to dimension {MAX_SIGNED}, found {f.dim}")
+        symmetries.undecided.append(
+            f"signed permutations are tried up to dimension {MAX_SIGNED}, not in dimension {f.dim}"
+        )
         return
     done = True
     for sign in (1, -1):
@@ -252,22 +257,22 @@ def _add_signed(found: Symmetries, budget: Budget) -> None:
                 break
             r = translation(f, S, sign, budget)
             if r is not None:
-                found.signed.append(Symmetry(f.variables, S, r, sign < 0))
-    found.signed.sort(key=lambda t: (t.reversing, not t.obvious, any(e != 0 for e in t.r)))
+                symmetries.signed.append(Symmetry(f.variables, S, r, sign < 0))
+    symmetries.signed.sort(key=lambda t: (t.reversing, not t.is_trivial, any(e != 0 for e in t.r)))
     if not done:
-        found.undecided.append(
-            "there are too many signed permutations, or the budget is spent: not all were tried (--effort)"
+        symmetries.undecided.append(
+            "not all signed permutations were tried: they are too many, or the work limit was reached; raise --effort"
         )
         return
-    found.searched.append("signed permutations, with a translation: all")
-    found.order = len({_key(t.S) for t in found.signed})  # for f = 0 each is both kinds
-    if any(abs(entry) not in (0, 1) for t in found.signed for entry in t.S.entries()):
-        found.group_of = SCALED
-    found.generators = _generators(found.signed)
+    symmetries.searched.append("signed permutations, with a translation: all")
+    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 each is both kinds
+    if any(abs(entry) not in (0, 1) for t in symmetries.signed for entry in t.S.entries()):
+        symmetries.group_of = SCALED
+    symmetries.generators = _generators(symmetries.signed)
 
 
 def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
-    """Elements whose linear parts generate those of all: of high order first, and none that the others make."""
+    """A minimal set of elements whose linear parts generate those of all, elements of high order first."""
 
     def order(matrix: fmpq_mat) -> int:
         power, count = matrix, 1
@@ -303,20 +308,22 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
     return group
 
 
-def _add_general(found: Symmetries, budget: Budget) -> None:
+def _add_general(symmetries: Symmetries, budget: Budget) -> None:
     """All rational S with f(S x) = sign S f(x), by its polynomial equations."""
-    f = found.system
+    f = symmetries.system
     n = f.dim
-    if any(x.is_linear for x in found.infinitesimal):
-        found.searched.append("other matrices: not searched, since there are infinitesimal linear symmetries")
+    if any(x.is_linear for x in symmetries.infinitesimal):
+        symmetries.searched.append("other matrices: not searched, since there are infinitesimal linear symmetries")
         return
     if f.digits > LONG_COEFFICIENTS:
-        found.undecided.append(f"other matrices are searched for coefficients of up to {LONG_COEFFICIENTS} digits only")
+        symmetries.undecided.append(
+            f"other matrices are searched for coefficients of up to {LONG_COEFFICIENTS} digits only"
+        )
         return
     context = ring([f"s{i + 1}{j + 1}" for i in range(n) for j in range(n)])
     gens = context.gens()
     matrix = [list(gens[i * n : (i + 1) * n]) for i in range(n)]
-    known = {_key(t.S) for t in found.signed if not any(e != 0 for e in t.r)}
+    known = {_key(t.S) for t in symmetries.signed if not any(e != 0 for e in t.r)}
     complete = True
     for sign in (1, -1):
         equations = matrix_equations(f, matrix, sign)
@@ -325,17 +332,19 @@ def _add_general(found: Symmetries, budget: Budget) -> None:
             # In a family of solutions all are singular: invertible ones would be a group with infinitesimal symmetries.
             S = fmpq_mat(n, n, list(component.point))
             if not component.free and S.det() != 0 and _key(S) not in known:
-                found.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
+                symmetries.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
         left = [part for part in solved.unsolved if not is_singular(part, n)]
         if left:
             complete = False
-            found.undecided.append(f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solved.reason}")
+            symmetries.undecided.append(
+                f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solved.reason}"
+            )
     if complete:
-        found.searched.append("rational matrices S, without a translation: all")
+        symmetries.searched.append("rational matrices S, without a translation: all")
     # Without infinitesimal symmetries the affine group is finite, and so is what its elements generate.
-    if complete and found.others and found.order is not None and not found.infinitesimal:
-        found.generators = _generators([*found.signed, *found.others])
-        found.order, found.group_of = len(_generated([t.S for t in found.generators], n)), MATRICES
+    if complete and symmetries.others and symmetries.order is not None and not symmetries.infinitesimal:
+        symmetries.generators = _generators([*symmetries.signed, *symmetries.others])
+        symmetries.order, symmetries.group_of = len(_generated([t.S for t in symmetries.generators], n)), MATRICES
 
 
 def _key(matrix: fmpq_mat) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 Phi(x) = x + 2 eps (I - eps f'(x))^{-1} f(x): where f(x) = 0 the map has the derivative (I - eps f')^{-1} (I + eps f'),
 and an eigenvalue lambda of f' becomes the multiplier (1 + eps lambda)/(1 - eps lambda). Where det(I - eps f'(x)) = 0 an
 equilibrium is no fixed point: the equation does not determine its image. Everything is exact. Points that are not
-rational, and sets of positive dimension, are told by equations. Source: cmoq-2013.
+rational, and sets of positive dimension, are given by equations. Source: cmoq-2013.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ class FixedPoints:
 
     @property
     def where(self) -> str:
-        """The set in words: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
+        """As a phrase: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
         point = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
         kind = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
         if not self.equations:
             return f"{kind} of fixed points {point}" if self.dimension else f"fixed point {point}"
         size = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""
         size = size or counted(self.count or 0, "fixed point")
-        if len(self.equations) > len(self.coordinates):  # a basis that nobody reads, and not shorter than f = 0
+        if len(self.equations) > len(self.coordinates):  # a basis that is not shorter than f = 0
             return f"{size} {point} with f = 0{'' if self.count is None else ', not rational'}"
         return f"{size} {point} with {', '.join(f'{format_polynomial(p)} = 0' for p in self.equations)}"
 
@@ -70,7 +70,7 @@ class FixedPoints:
 
     @property
     def text(self) -> str:
-        """Where it is, and the eigenvalues."""
+        """The set with the eigenvalues there."""
         return f"{self.where}, eigenvalues of f': {self.eigenvalues_text} = 0"
 
     def are_fixed_by_map(self, eps: fmpq | None) -> bool | None:
@@ -106,14 +106,14 @@ class FixedPoints:
 
 @dataclass(frozen=True)
 class FixedPointSearch:
-    """All fixed points, rational ones first; `undecided` says what kept others from being found, else it is empty."""
+    """All fixed points, rational ones first; `undecided` is the reason why some may be missing, or empty."""
 
     found: tuple[FixedPoints, ...]
     undecided: str
 
     def __str__(self) -> str:
-        told = [one.text for one in self.found] or ["no fixed point"] * (not self.undecided)
-        return "\n".join([*told, *([f"undecided: {self.undecided}"] if self.undecided else [])])
+        texts = [points.text for points in self.found] or ["no fixed point"] * (not self.undecided)
+        return "\n".join([*texts, *([f"undecided: {self.undecided}"] if self.undecided else [])])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -121,10 +121,10 @@ class FixedPointSearch:
 
 
 def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSearch:
-    """All equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
+    """Compute all equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
 
-    Each more of `effort` doubles the work that the search may take; in dimension above 6 nothing is searched. What is
-    not found is told.
+    Each increase of `effort` by 1 doubles the work that the search may take; above dimension 6 nothing is searched.
+    What may be missing is reported in `undecided`.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> print(fixed_points(pendulum))
@@ -137,7 +137,7 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     """
     system = as_system(system)
     if system.dim > MAX_DIMENSION:
-        return FixedPointSearch((), f"they are sought up to dimension {MAX_DIMENSION}")
+        return FixedPointSearch((), f"they are computed up to dimension {MAX_DIMENSION}")
     context = ring(system.variables)
     budget = budget_for("fixed points", effort)
     solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), budget)

@@ -1,7 +1,7 @@
-"""What a set of points of GF(p)^k is made of: affine subspaces, hypersurfaces of them, single points.
+"""The components of a set of points of GF(p)^k: affine subspaces, hypersurfaces of these, single points.
 
 The points with one degree sequence are the points of some varieties without those of smaller ones, and may hold points
-by chance besides. So pieces are found from few random points, and count where they hold about as many points as a
+by chance. So components are found from few random points, and count where they hold about as many points as a
 variety of their dimension has, p^d.
 """
 
@@ -23,53 +23,53 @@ Rows = tuple[tuple[int, ...], ...]
 Form = tuple[int, ...]
 
 MAX_DEGREE = 6  # of hypersurfaces with the same degrees, all together
-_SHARE = 0.5  # of the points of a piece that must be there: special ones are missing
+_SHARE = 0.5  # of the points of a component that must be there: special ones are missing
 _SPARE = 1.2  # points for each coefficient of a hypersurface
-_TRIES, _MANY = 80, 3000  # samples; of more than 3 parameters, where all points of one have to be on one piece
+_TRIES, _MANY = 80, 3000  # samples; of more than 3 parameters, where all points of a sample have to be on one component
 _FEW = 12  # of those for hypersurfaces of degree 3 and more, of which one with points on two is the more useless
 _MOST_DEGREE = 12  # of a product
 _MOST_POINTS = 400  # that are taken for single ones
 
 
 @dataclass
-class Pieces:
-    """The pieces of a set of points modulo `prime`.
+class ModularComponents:
+    """The components of a set of points modulo `prime`.
 
-    `flats` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
-    `forms` has irreducible hypersurfaces by the affine subspace they are in (no rows: the whole space). Each
+    `linear` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
+    `hypersurfaces` has irreducible hypersurfaces by the affine subspace they are in (no rows: the whole space). Each
     is the coefficients of the monomials of `exponents_up_to`, in their order, in the variables that are free there.
     """
 
     prime: int
-    flats: dict[int, list[Rows]] = field(default_factory=dict)
-    forms: dict[Rows, list[Form]] = field(default_factory=dict)
+    linear: dict[int, list[Rows]] = field(default_factory=dict)
+    hypersurfaces: dict[Rows, list[Form]] = field(default_factory=dict)
 
 
-def pieces(
+def find_components(
     points: Sequence[Point],
     prime: int,
     seen: int,
     smallest: int,
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
-) -> Pieces:
-    """The pieces of a set of points, of `seen` that were tried, from the dimension `smallest` on.
+) -> ModularComponents:
+    """The components of a set of points, of `seen` that were tried, from the dimension `smallest` on.
 
     That is 0 where all of GF(p)^k was tried, and k - 1 for points on random lines. `check` is called now and then, and
     may raise.
 
     >>> line = [(a, (2 * a + 3) % 31) for a in range(31)]
-    >>> found = pieces([*line, (5, 5)], 31, 31**2, 0, random.Random(0))
-    >>> found.flats
+    >>> components = find_components([*line, (5, 5)], 31, 31**2, 0, random.Random(0))
+    >>> components.linear
     {1: [((1, 15, 17),)], 0: [((1, 0, 26), (0, 1, 26))]}
     """
     import numpy as np
 
     count = len(points[0])
-    found = Pieces(prime)
+    components = ModularComponents(prime)
     rest = np.array(points, dtype=np.int64)
 
-    def flats(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
+    def affine_subspaces(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
         """Affine subspaces with so many of the points, and which of these are in them."""
         for _ in range(_TRIES if count <= 3 else _MANY):
             check()
@@ -87,27 +87,27 @@ def pieces(
     for dimension in range(count - 1, max(smallest, 1) - 1, -1):
         # Of the dimension that is looked for: affine ones, then others in affine ones of one dimension more.
         needed = max(_SHARE * seen / prime ** (count - dimension), dimension + 3)
-        for rows, inside in flats(dimension, needed):
-            found.flats.setdefault(dimension, []).append(rows)
+        for rows, inside in affine_subspaces(dimension, needed):
+            components.linear.setdefault(dimension, []).append(rows)
             rest = rest[~inside]
         if dimension == count - 1:
             for form, inside in _hypersurfaces(rest, needed, prime, rng, check):
-                found.forms.setdefault((), []).append(form)
+                components.hypersurfaces.setdefault((), []).append(form)
                 rest = rest[~inside]
             continue
-        for rows, inside in flats(dimension + 1, needed):
+        for rows, inside in affine_subspaces(dimension + 1, needed):
             free = [k for k in range(count) if k not in pivots(rows)]
             places, kept = np.flatnonzero(inside), np.ones(len(rest), dtype=bool)
             for form, some in _hypersurfaces(rest[inside][:, free], needed, prime, rng, check):
-                found.forms.setdefault(rows, []).append(form)
+                components.hypersurfaces.setdefault(rows, []).append(form)
                 kept[places[some]] = False
                 places = places[~some]
             rest = rest[kept]
     if not smallest and len(rest) <= _MOST_POINTS:
         equations = ([[*(int(i == j) for j in range(count)), -y] for i, y in enumerate(x)] for x in rest.tolist())
         single = [tuple(map(tuple, echelon(rows, prime))) for rows in equations]
-        found.flats.setdefault(0, []).extend(single)
-    return found
+        components.linear.setdefault(0, []).extend(single)
+    return components
 
 
 def _hypersurfaces(

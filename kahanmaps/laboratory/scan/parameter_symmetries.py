@@ -1,4 +1,4 @@
-"""Changes of parameters that permute the slow members of a family: projective ones of a few kinds.
+"""Changes of parameters that permute the special members of a family: projective ones of a few kinds.
 
 Exchanges, cycles and signs, these with a shift or a factor for each parameter, and permutations of the homogeneous
 coordinates (a : b : ... : 1), which families have whose parameters are ratios.
@@ -26,10 +26,11 @@ _MOST_POINTS = 24
 
 
 def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Changes of parameters that generate all which were found; the images of the parameters.
+    """Generators of the changes of parameters that were found, as images of the parameters.
 
-    Each keeps the degrees of slow members modulo each prime modulo which all were tried, and the hypersurfaces over Q,
-    as far as they do not go to infinity. Named are those that move a component, or keep one that is not affine.
+    Each preserves the degrees of the special members modulo each prime for which all members were tried, and the
+    hypersurfaces over Q, except for what is mapped to infinity. Only changes that move a component, or
+    preserve one that is not affine, are reported.
 
     >>> a, b = ring(["a", "b"]).gens()
     >>> lines = [Component((line,), 1, (1,), ()) for line in (a - 3 * b, a + 3 * b, 3 * a - b, 3 * a + b)]
@@ -37,13 +38,13 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     >>> symmetries([Sweep(7, (2,), {(1,): points}, 49, True, 0)], lines, ["a", "b"])
     [('b', 'a'), ('a', '-b')]
     """
-    complete = [(one.prime, one.slow) for one in sweeps if one.complete]
+    complete = [(one.prime, one.special) for one in sweeps if one.complete]
     if not complete or not components:
         return []
     found: list[Change] = []
     known = _generated(found, len(names))
     for change in _changes(len(names), components):
-        if change in known or not all(_permutes(change, p, slow) for p, slow in complete):
+        if change in known or not all(_permutes(change, p, special) for p, special in complete):
             continue
         if _matters(change, components, names):
             found.append(change)
@@ -57,14 +58,14 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     return texts
 
 
-def _permutes(change: Change, p: int, slow: Mapping[Point, Degrees]) -> bool:
-    """Whether all slow members modulo a prime go to such with the same degrees, or to infinity."""
+def _permutes(change: Change, p: int, special: Mapping[Point, Degrees]) -> bool:
+    """Whether all special members modulo a prime go to such with the same degrees, or to infinity."""
     rows = residues(change, p)
     count(20)
-    for point, degrees in slow.items() if rows is not None else ():
+    for point, degrees in special.items() if rows is not None else ():
         *image, below = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows or ())
         count(5)
-        if below and slow.get(tuple(x * pow(below, -1, p) % p for x in image)) != degrees:
+        if below and special.get(tuple(x * pow(below, -1, p) % p for x in image)) != degrees:
             return False
     return True
 

@@ -1,4 +1,4 @@
-"""What is known of one map: the results of all analyses, as far as there was time for them."""
+"""The results of an analysis of one map, as far as its steps have run."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch
 
 @dataclass(frozen=True)
 class Statement:
-    """One line of a report and how it is known."""
+    """One line of a report, and how it is known."""
 
     status: Certainty
     text: str
 
 
 @dataclass
-class Findings:
-    """The results of the parts, None for those not reached; `further` has those that no other part reads."""
+class AnalysisResult:
+    """The results of the steps, None for those that have not run; `further` has those that no other step uses."""
 
     file: SystemFile
     eps: fmpq | None
@@ -61,21 +61,21 @@ class Findings:
     commuting: CommutingSystems | None = None
     hamiltonian: ConstantStructures | None = None
     normal_form: SystemNormalForm | NoNormalForm | None = None  # in coordinates with the centre as origin
-    tensor: TensorStructure | None = None  # over which algebra larger than Q it is a system
+    tensor: TensorStructure | None = None  # an algebra larger than Q over which f is defined
     further: dict[str, Any] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
-    pending: list[str] = field(default_factory=list)  # the parts that were not gone through yet
-    units: int = 0  # of counted work that the parts took
+    pending: list[str] = field(default_factory=list)  # names of the steps that have not run yet
+    units: int = 0  # of counted work that the steps took
 
-    def __getitem__(self, result: str) -> Any:
-        """The result of a part, None if it was not reached."""
-        return getattr(self, result, self.further.get(result))
+    def __getitem__(self, key: str) -> Any:
+        """The result of a step, None if it has not run."""
+        return getattr(self, key, self.further.get(key))
 
-    def __setitem__(self, result: str, value: Any) -> None:
-        if hasattr(self, result):
-            setattr(self, result, value)
+    def __setitem__(self, key: str, value: Any) -> None:
+        if hasattr(self, key):
+            setattr(self, key, value)
         else:
-            self.further[result] = value
+            self.further[key] = value
 
     @property
     def dim(self) -> int:
@@ -84,7 +84,7 @@ class Findings:
 
     @property
     def centre(self) -> tuple[fmpq, ...] | None:
-        """The origin of the coordinates of `normal_form`; None where H has no centre, or that was not reached."""
+        """The origin of the coordinates of `normal_form`; None where H has no centre, or that step has not run."""
         if self.hamiltonian is not None and self.hamiltonian.hamiltonian is not None:
             return self.hamiltonian.hamiltonian.centre
         return None if self.normal_form is None else (fmpq(0),) * self.dim
@@ -92,17 +92,17 @@ class Findings:
     @property
     def integral_count(self) -> int:
         """The number of independent integrals: found, shown by orbits, or given by theorems; see `count_is_exact`."""
-        known = self.integrals.codimension if self.integrals is not None else 0
+        codimension = self.integrals.codimension if self.integrals is not None else 0
         family = self.normal_form.form.m if isinstance(self.normal_form, SystemNormalForm) else 0
-        return max(known, family)
+        return max(codimension, family)
 
     @property
     def count_is_exact(self) -> bool:
-        """Whether there are no more than `integral_count` integrals: else it is a lower bound."""
+        """Whether `integral_count` is the exact number; otherwise it is a lower bound."""
         return self.integrals is not None and self.integrals.is_exact
 
     @property
     def integrals_were_counted(self) -> bool:
-        """Whether `integral_count` says anything: it is 0 as well where the orbits were not reached or not defined."""
+        """Whether `integral_count` was determined: it is also 0 where no orbit was followed."""
         measured = self.integrals is not None and bool(self.integrals.profile.nullities)
         return measured or self.integral_count > 0

@@ -1,0 +1,103 @@
+"""One step of an analysis: what it computes and how the report states it; and the context in which it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import Flag, auto
+from math import inf
+from typing import Any
+
+from kahanmaps.algebra.printing import plain
+from kahanmaps.algebra.work import Budget
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.laboratory.analysis_result import AnalysisResult, Statement
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.integrals import FoundIntegral
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+class MapKinds(Flag):
+    """The kinds of maps to which a step applies."""
+
+    VECTOR_FIELDS = auto()  # Kahan maps of vector fields over Q
+    OTHER_MAPS = auto()  # other birational maps over Q
+    OVER_NUMBER_FIELDS = auto()  # both, over number fields
+    OVER_Q = VECTOR_FIELDS | OTHER_MAPS
+    ALL = OVER_Q | OVER_NUMBER_FIELDS
+
+
+@dataclass(frozen=True)
+class AnalysisStep:
+    """One analysis, a row of `table.py`.
+
+    `run(context, effort=..., progress=...)` returns the result, or None where the step does not apply. The result is
+    stored as `result[key]`. In JSON it has this key, too, with the value of its `to_json`, unless `json` gives other
+    entries. `statements` yields the lines of the section `title`; that section is complete after this step and those in
+    `requires`.
+    """
+
+    name: str
+    run: Callable[..., Any]
+    title: str = ""
+    statements: Callable[[Any], Iterable[Statement]] | None = None
+    applies_to: MapKinds = MapKinds.VECTOR_FIELDS
+    weight: float = 0.1  # its share of the budget, relative to the weights of the other steps
+    key: str = ""  # by default the name
+    requires: tuple[str, ...] = ()
+    # Above this dimension the step is slow: it runs last, with a quarter of its weight, and no other step uses it.
+    slow_above: float = inf
+    # A second process may run it: it exchanges results with steps of this kind only, and its result can be pickled.
+    is_independent: bool = False
+    json: Callable[[Any], dict[str, Any]] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", self.key or self.name)
+
+    def to_json(self, result: AnalysisResult) -> dict[str, Any]:
+        """Its entries in JSON."""
+        return {self.key: plain(result[self.key])} if self.json is None else self.json(result)
+
+
+class AnalysisContext:
+    """The map under analysis, the results so far, and the options that all steps share."""
+
+    def __init__(
+        self, result: AnalysisResult, laboratory: Laboratory, symbols: Sequence[str], progress: Callable[[str], None]
+    ) -> None:
+        file = result.file
+        self.result, self.seed = result, result.seed
+        self.map, self.dim, self.root = file.map, file.dim, laboratory.root
+        self.system = file.system if file.is_quadratic else None
+        # No step may read what a file claims of its system. With symbols the file itself is needed.
+        self.file_without_claims = (
+            file if symbols or self.system is None else SystemFile.from_system(self.system, file.name)
+        )
+        self.settings: dict[str, Any] = {"symbols": symbols, "eps": result.eps, "seed": result.seed}
+        self.has_symbols, self.progress = bool(laboratory.symbols), progress
+
+    @property
+    def field(self) -> QuadraticSystem:
+        """The vector field; it exists for every step that applies to `MapKinds.VECTOR_FIELDS` only."""
+        assert self.system is not None
+        return self.system
+
+    @property
+    def integrals(self) -> tuple[FoundIntegral, ...]:
+        """The integrals that were found in closed form."""
+        return () if self.result.integrals is None else self.result.integrals.integrals
+
+    def applies(self, step: AnalysisStep) -> bool:
+        """Whether the step applies to a map of this kind over this field of numbers."""
+        if self.root is not None:
+            return MapKinds.OVER_NUMBER_FIELDS in step.applies_to
+        kind = MapKinds.OTHER_MAPS if self.system is None else MapKinds.VECTOR_FIELDS
+        return kind in step.applies_to
+
+    def weight(self, step: AnalysisStep) -> float:
+        """The weight of the step in this dimension."""
+        return step.weight / 4 if self.dim > step.slow_above else step.weight
+
+    def run(self, step: AnalysisStep, budget: Budget) -> Any:
+        """The result of the step, within a budget."""
+        return step.run(self, effort=budget, progress=lambda text: self.progress(f"{step.name}: {text}"))
