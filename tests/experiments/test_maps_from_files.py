@@ -75,5 +75,5 @@ def test_no_eps_is_asked_for_where_no_map_depends_on_it():
     spec = parse_spec(WITHOUT_EPS, "maps.toml")
     tasks = [task for experiment in spec.experiments for task in experiment.tasks()]
     assert [perform(task, None, spec.documents)["outcome"] for task in tasks] == ["ok"] * 5
-    with pytest.raises(InputError, match=r"axes\.eps: missing, expected the paper's epsilon"):
+    with pytest.raises(InputError, match=r"axes\.eps: missing, expected half the time step"):
         parse_spec(WITHOUT_EPS.replace('"lyness", "somos_4"', '"lyness", "euler_top"'), "maps.toml")
