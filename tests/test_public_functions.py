@@ -249,7 +249,7 @@ REFUSED = [
     ('km.orbit("euler_top", [1, 2, 3], "1/10")', "expected either steps="),
     ('km.orbit(FISH, [1, 2], "1/10", at=3)', r"found at = 3, expected a sequence of steps, at=\[3\]"),
     ('km.orbit(FISH, None, "1/5", 2)', "found the initial point None"),
-    ('km.orbit(FISH, [0.5, 1], "1/5", 2)', "found the machine number"),
+    ('km.orbit(FISH, [0.5, 1], "1/5", 2)', "found the floating-point number"),
     ('km.orbit(FISH, [float("nan"), 0.0], "1/5", 3, arithmetic="float")', "expected finite numbers"),
     ('km.orbit(FISH, [1, 2], "1/5", 2, arithmetic=complex)', "expected exact, float"),
     ('km.orbit(FISH, [1, 2], "1/5", 2, arithmetic=DualField(km.QQ))', r"found the arithmetic DualField\(QQ\)"),

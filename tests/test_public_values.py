@@ -38,7 +38,7 @@ def test_maps_are_called_and_composed():
     assert identity(x) == identity.inverse(x) == x != phi(x)
     assert (phi @ identity)(x) == phi(x)
     assert identity.determinant(x) == 1
-    with pytest.raises(InputError, match="one dimension"):
+    with pytest.raises(InputError, match="the same field and dimension"):
         phi @ km.KahanMap(km.load("weierstrass").system, "1/10")
     with pytest.raises(TypeError):
         phi @ 3
@@ -95,7 +95,7 @@ def test_arrays_of_residues_are_exact_or_refused(prime):
         if max(map(max, rows)) <= np.iinfo(kind).max:
             assert np.asarray(walk, dtype=kind).tolist() == rows
         else:
-            with pytest.raises(InputError, match=r"found the coordinate \d+.*, expected integers.*take dtype=object"):
+            with pytest.raises(InputError, match=r"found the coordinate \d+.*, expected integers.*use dtype=object"):
                 np.asarray(walk, dtype=kind)
     if prime < 2**53:
         assert np.asarray(walk, dtype=float).tolist() == rows

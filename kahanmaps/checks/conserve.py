@@ -108,7 +108,7 @@ def functions_along(
         file: the system.
         requested: pairs of a name, which may be empty, and a text: an expression, the name of an integral of the file,
             or "known" for all integrals that follow from theorems or are claimed by the file.
-        in_floats: whether the orbit is in floating-point numbers.
+        in_floats: whether the orbit is in floating point.
         taken: the names of other columns.
 
     Raises:

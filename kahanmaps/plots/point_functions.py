@@ -1,4 +1,4 @@
-"""Functions of points in machine numbers, many points at a time: coordinates, integrals, whatever a picture shows."""
+"""Functions of points in floating point, many points at a time: coordinates, integrals, whatever a picture shows."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class Style:
             ("{} dots per inch", self.dpi, 30, 2400),
         ):
             if value is not None and not low <= value <= high:
-                # An integer may be beyond the range of machine floats.
+                # An integer may be beyond the range of floating-point numbers.
                 found = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
                 raise InputError(f"found {what.format(found)}, expected {low} to {high}")
         self.require_pixels(*self.inches(aspect=0.75))

@@ -1,5 +1,5 @@
 "use strict";
-// A map M(x, eps) x~ = r(x, eps) in machine numbers, and the page that draws its orbits.
+// A map M(x, eps) x~ = r(x, eps) in floating point, and the page that draws its orbits.
 // A polynomial is a list of terms [coefficient, power of each variable ..., power of eps].
 
 function valueOf(terms, at) {

@@ -70,7 +70,10 @@ def test_the_document_says_all_by_itself_and_keeps_its_parameters(tmp_path):
         ('{ file = "field.toml", involution = true }', "whose square is not the identity"),
         ('{ file = "field.toml", parameters = { a = "1/0" } }', "division by 0"),
         ('{ file = "field.toml" }, { system = "euler_top" }', "the same dimension: got 2, 3"),
-        ('{ file = "field.toml" }, { map = { variables = ["y", "x"], map = { image = ["x", "y"] } } }', "in the same order"),
+        (
+            '{ file = "field.toml" }, { map = { variables = ["y", "x"], map = { image = ["x", "y"] } } }',
+            "in the same order",
+        ),
         ('{ map = { variables = ["x", "y"], map = { image = ["x^2", "y"] } } }', "at least 2 preimages"),
     ],
 )

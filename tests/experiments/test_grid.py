@@ -32,7 +32,7 @@ def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
     ("text", "values"),
     [
         ("1..3", ["1", "2", "3"]),
-        ("0.1..0.3 step 0.1", ["1/10", "1/5", "3/10"]),  # machine numbers would end at 0.2
+        ("0.1..0.3 step 0.1", ["1/10", "1/5", "3/10"]),  # floating-point numbers would end at 0.2
         ("0..1 step 0.3", ["0", "3/10", "3/5", "9/10"]),  # the end is not met
         ("0..1 step 2", ["0"]),
         ("1/2..-1/2 step -1/3", ["1/2", "1/6", "-1/6", "-1/2"]),

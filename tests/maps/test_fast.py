@@ -1,4 +1,4 @@
-"""Float orbits: a second implementation in machine numbers, tested against the exact one.
+"""Float orbits: a second implementation in floating point, tested against the exact one.
 
 Specified here: numbers are rounded once, to the nearest double; short orbits are close to the exact ones; the method
 has order 2. On disk a .npy file is complete and readable at every moment, also after the program was killed: an

@@ -1,1 +1,1 @@
-"""Float orbits: steps in floating-point numbers, one by one and many at once."""
+"""Float orbits: steps in floating point, one by one and many at once."""

@@ -1,4 +1,4 @@
-"""Classical one-step methods in floating-point numbers, for comparison: explicit RK4 and implicit midpoint.
+"""Classical one-step methods in floating point, for comparison: explicit RK4 and implicit midpoint.
 
 Both use the time step h = 2 eps. The midpoint equation y = x + (h/2) f(y), x~ = x + h f(y), is solved by Newton's
 method from y = x until the corrections are round-off; the orbit ends if Newton's method does not converge.

@@ -226,7 +226,7 @@ class FloatEnsemble:
         if code == RUNNING:
             return OrbitEnd("completed", self.step, counted(self.step, "step"))
         if code == SINGULAR:
-            return OrbitEnd("singular", last, f"{self._matrix} is singular in floating-point numbers at step {last}")
+            return OrbitEnd("singular", last, f"{self._matrix} is singular in floating point at step {last}")
         return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of floating-point numbers")
 
     def interrupt(self) -> None:

@@ -1,4 +1,4 @@
-"""Orbits in floating-point numbers, one at a time.
+"""Orbits in floating point, one at a time.
 
 This implementation is independent of the exact one and tested against it. Exact numbers are converted only by
 `to_floats`. The modules of this folder: `steps` defines a step, `straight_line_program` its operations, `machine_code`

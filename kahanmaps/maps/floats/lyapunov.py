@@ -41,7 +41,7 @@ _MIN_COMPILED_WORK = 10_000  # orbits times steps below which compiling does not
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov:
-    """The Lyapunov exponents of an ensemble in floating-point numbers, largest first.
+    """The Lyapunov exponents of an ensemble in floating point, largest first.
 
     `unit` is the time of a step: 2 eps, or 1 for a map without a time step, whose exponents are per step. `exponents`
     (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them; `half` are the

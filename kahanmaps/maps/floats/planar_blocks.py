@@ -1,4 +1,4 @@
-"""The normal form in floating-point numbers: one planar map for each root of chi, in a canonical form.
+"""The normal form in floating point: one planar map for each root of chi, in a canonical form.
 
 At a root r of chi the Kahan map of a member is planar, with a binary cubic h_r (see kahanmaps/family/planar.py). In
 coordinates (U, V) = 2 eps (u, v), with half the second derivatives A = a U + b V, B = b U + c V, C = c U + d V of

@@ -1,4 +1,4 @@
-"""Steps of maps in floating-point numbers: straight-line programs, or for large maps numpy arrays.
+"""Steps of maps in floating point: straight-line programs, or for large maps numpy arrays.
 
 A step maps the rows of a state to those of its image. For a map they are its coordinates, and the step solves
 M(x) x~ = r(x), where M(x) = I - eps f'(x) for Kahan maps; for a normal form they are the coordinates of its planar

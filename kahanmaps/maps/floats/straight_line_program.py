@@ -1,4 +1,4 @@
-"""Straight-line programs for steps of maps in floating-point numbers.
+"""Straight-line programs for steps of maps in floating point.
 
 `StraightLineProgram` records the operations on its values. Coefficients are folded in: there are no multiplications by
 0 or 1, and no common subexpressions are computed twice. A program is run in two ways, with the same results to the last

@@ -1,4 +1,4 @@
-"""The arithmetic of an orbit: exact, modulo a prime, in balls, or in floating-point numbers."""
+"""The arithmetic of an orbit: exact, modulo a prime, in balls, or in floating point."""
 
 from __future__ import annotations
 

@@ -516,7 +516,7 @@ def _normal_form(
     if isinstance(normal_form, NoNormalForm):
         return normal_form
     if arithmetic.kind == "float" and normal_form.T is not None and method is None:
-        return NoNormalForm("in floating-point numbers it requires J = [[0, I], [-I, 0]]")
+        return NoNormalForm("in floating point it requires J = [[0, I], [-I, 0]]")
     if arithmetic.kind in ("ball", "mod"):
         from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
 

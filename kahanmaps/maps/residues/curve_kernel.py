@@ -1,4 +1,4 @@
-"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in floating-point numbers.
+"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in integers of 64 bits.
 
 An element a + b w of GF(p^2), with w^2 = nu no square modulo p, is a pair of doubles that hold integers in [0, p); a
 polynomial is an array (2, length). Sums of products stay below 2^53 by the choice of p and of the largest length, so

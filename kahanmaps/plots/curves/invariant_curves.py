@@ -6,7 +6,7 @@ kappa (u^3 + 3 u v^2), if it has one; if h has a repeated factor they are those 
 of complex roots has one plane with complex coordinates, those of the normal form at the root with positive imaginary
 part.
 
-The steps are taken in floating-point numbers of 256 bits, so that all digits that can be drawn are right. What comes
+The steps are taken in floating point of 256 bits, so that all digits that can be drawn are right. What comes
 closer to infinity than 2^96 counts as a pole, and ends the orbit.
 """
 
@@ -34,7 +34,7 @@ MAX_STARTS = 7  # as many colors as there are
 BITS = 256
 _POLE_BITS = 96
 _PROGRESS_EVERY = 2_000  # steps
-_LARGEST = 1e60  # of what is drawn: cubes of it are still machine numbers
+_LARGEST = 1e60  # of what is drawn: cubes of it are still floating-point numbers
 
 Numbers = NDArray[Any]
 
@@ -185,7 +185,7 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
         h = tuple(map(_machine, coefficients))
         if not np.isfinite(h).all():
             raise InputError(
-                "the normal form leaves the range of machine numbers: its coefficients are too large to draw"
+                "the normal form leaves the range of floating-point numbers: its coefficients are too large to draw"
             )
         found.append(InvariantPlane(index, complex(_machine(root)), text, shape, h, PlanarBlock(*coefficients), matrix))
     return sorted(found, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
@@ -238,5 +238,5 @@ def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
 
 
 def _machine(value: Any) -> Any:
-    """A ball as a machine number."""
+    """A ball as a floating-point number."""
     return complex(float(value.real.mid()), float(value.imag.mid())) if isinstance(value, acb) else float(value.mid())

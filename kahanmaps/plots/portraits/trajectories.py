@@ -74,7 +74,7 @@ def float_normal_form(file: SystemFile) -> tuple[NormalForm | None, str]:
     if isinstance(found, NoNormalForm):
         return None, found.reason
     if found.T is not None:
-        return None, "in machine numbers only J = [[0, I], [-I, 0]] has one"
+        return None, "in floating point only J = [[0, I], [-I, 0]] has one"
     return found.form, ""
 
 
@@ -101,7 +101,7 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
             f"found {steps} steps of {ensemble.n} orbits, expected at most {most} points: take fewer steps"
         )
     points = np.concatenate(list(ensemble.records(steps, 1, progress=progress)))
-    words = {"overflow": "left the range of machine floats", "singular": "met a singular matrix I - eps f'"}
+    words = {"overflow": "left the range of floating-point numbers", "singular": "met a singular matrix I - eps f'"}
     ended = {text: int((ensemble.status == status).sum()) for status, text in words.items()}
     return Trajectories(
         ensemble.system.variables,
@@ -128,5 +128,5 @@ def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: i
     orbits = np.array(points)
     orbits[~np.isfinite(orbits).all(axis=2)] = np.nan
     gone = int(np.isnan(orbits[-1]).any(axis=1).sum())
-    ended = {"left the range of machine floats": gone} if gone else {}
+    ended = {"left the range of floating-point numbers": gone} if gone else {}
     return Trajectories(system.variables, orbits, np.arange(steps + 1), ended)
