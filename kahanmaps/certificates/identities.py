@@ -27,6 +27,7 @@ from kahanmaps.errors import InputError
 
 MAX_DIMENSION = 6
 MAX_TERMS = 20_000  # of one side of an identity, multiplied out: some ten seconds for Coq
+MAX_PRODUCTS = 20_000_000  # of terms, to multiply one side out: some ten seconds for PARI
 
 
 class FalseClaim(InputError):
@@ -181,7 +182,7 @@ def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmp
     n = data.dim
     powers = [[value**0] for value in (*data.numerators, data.determinant)]
     letters = ring(data.names).gens()
-    total = letters[0] * 0
+    total, products = letters[0] * 0, 0
     for exponents, coefficient in polynomial.terms():
         term = letters[0] ** 0 * coefficient
         for letter, exponent in zip(letters[n:], exponents[n:], strict=True):
@@ -189,6 +190,9 @@ def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmp
         for k, exponent in enumerate((*map(int, exponents[:n]), degree - sum(map(int, exponents[:n])))):
             while len(powers[k]) <= exponent:
                 powers[k].append(_times(powers[k][-1], (*data.numerators, data.determinant)[k]))
+            products += len(term) * len(powers[k][exponent])
+            if products > MAX_PRODUCTS:
+                raise InputError(f"the identities take more than {MAX_PRODUCTS} products of terms to multiply out")
             term = _times(term, powers[k][exponent])
         total += term
     return total

@@ -150,6 +150,15 @@ def test_what_cannot_be_certified_is_said_in_one_sentence(system, arguments, mes
         certificate(load(system), **arguments)
 
 
+def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note(monkeypatch):
+    monkeypatch.setattr("kahanmaps.certificates.identities.MAX_PRODUCTS", 100)
+    with pytest.raises(InputError, match="more than 100 products of terms"):
+        certificate(load("euler_top"), "gp", ["F1"])
+    text = certificate(load("weierstrass"), "gp")
+    assert "Not in this certificate: modified_H: the identities take more than 100 products" in text
+    assert "dx/phi is invariant" in text
+
+
 def test_the_conserved_polynomials_have_the_same_cofactor_over_Z():
     formulas = Formulas(load("euler_top"))
     data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
