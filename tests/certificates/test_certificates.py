@@ -80,6 +80,15 @@ def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker,
     assert run(checker, wrong, tmp_path).returncode != 0
 
 
+def test_a_check_that_raises_an_error_ends_gp_with_a_status_that_is_not_0(tmp_path):
+    # gp goes on with the next line after an error, unless recover is 0 (PARI/GP 2.17).
+    text = certificate(load("lotka_volterra"), "gp", ["volume"])
+    wrong = text.replace("det(A) = matdet(A);", "det(A) = matdet([A]);")
+    assert wrong != text
+    assert run("gp", wrong, tmp_path).returncode != 0
+    assert run("gp", wrong.replace("default(recover, 0);", ""), tmp_path).returncode == 0
+
+
 @pytest.mark.parametrize("checker", PROGRAMS)
 def test_variables_with_the_names_of_words_of_the_programs_are_renamed(checker, tmp_path):
     text = certificate(System("I' = fun; fun' = -I"), checker, integrals={"O": "(I^2 + fun^2)/3"})
