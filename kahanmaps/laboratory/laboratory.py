@@ -148,7 +148,7 @@ class Laboratory:
         self.seed = derive_seed(seed, self.symbols, subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
         self.primes = tuple(map_.prime for map_ in self.maps)
-        self.asked = file, self.free_symbols, self.eps, seed, self.primes  # with which all results of searches begin
+        self.request = file, self.free_symbols, self.eps, seed, self.primes  # with which all results of searches begin
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
         """The map modulo a prime; the residue `eps` counts only where eps is no given number. Raises BadPrime."""

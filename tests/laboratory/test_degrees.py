@@ -119,12 +119,12 @@ def test_the_budget_and_the_degree_are_limits():
     henon_heiles = load("henon_heiles").system
     found = degree_growth(henon_heiles, effort=Budget(100_000))
     assert (found.ended, found.degrees, found.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
-    assert found.message == "the budget was spent at iterate 8 (--effort)"
+    assert found.message == "work limit reached at iterate 8; raise --effort"
     assert found.to_json() == degree_growth(henon_heiles, effort=Budget(100_000)).to_json()
     known = degree_growth(load("lotka_volterra").system).patterns
     found = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
     assert (found.ended, found.enclosure) == ("derived", None)
-    assert found.notes == ("the budget was spent before bounds of the dynamical degree were proved (--effort)",)
+    assert found.notes == ("work limit reached before bounds of the dynamical degree were proved; raise --effort",)
     found = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
     assert (found.ended, found.growth) == ("budget", Growth.BOUNDED)
     found = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)

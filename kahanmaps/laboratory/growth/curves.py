@@ -142,7 +142,7 @@ class Line:
 
     def _require_budget(self) -> None:
         if self._budget.is_spent:
-            raise Stopped(Ended.BUDGET, f"the budget was spent at iterate {self.steps + 1} (--effort)")
+            raise Stopped(Ended.BUDGET, f"work limit reached at iterate {self.steps + 1}; raise --effort")
 
     def _image(self, equation: Equation, length: int) -> list[nmod_poly]:
         """The coordinates of the next curve as power series, to `length` terms."""

@@ -88,7 +88,7 @@ class HeightSurvey(PrintableResult):
     @property
     def text(self) -> str:
         """One sentence: the kind, and how many orbits say so; or where they disagree; and that it was cut, if so."""
-        total, cut = len(self.orbits), "" if self.is_whole else "; the survey ended early (--effort)"
+        total, cut = len(self.orbits), "" if self.is_whole else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
             # Each eps may have a kind of its own, the same for all its starts.

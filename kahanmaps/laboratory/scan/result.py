@@ -11,6 +11,7 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
+from kahanmaps.algebra.work import SPENT
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
@@ -248,8 +249,8 @@ class Scan(PrintableResult):
 
     @property
     def _open(self) -> list[tuple[str, str]]:
-        why = "it was interrupted before" if self.ended == "interrupted" else "the budget was spent (--effort) before"
-        return [("not done", f"{why} {', '.join(self.omitted)}")] if self.omitted else []
+        why = "the scan was interrupted" if self.ended == "interrupted" else SPENT
+        return [("not done", f"{', '.join(self.omitted)}: {why}")] if self.omitted else []
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -37,7 +37,7 @@ from kahanmaps.checks.claims import Certainty, Finding, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
 from kahanmaps.display_protocols import PrintableResult
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.family.tensor import GENERATOR, over_algebra
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.symmetry.commuting_proofs import affine, certify_family, certify_field
@@ -263,7 +263,7 @@ class _Search:
         others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
         for k, weights in enumerate([*trivial, *others]):
             if self.budget.is_spent and weights not in trivial:
-                found.undecided.append(f"{SPENT}: {len(others) + 3 - k} solutions were not certified")
+                found.undecided.append(f"{counted(len(others) + 3 - k, 'solution')} not certified: {SPENT}")
                 return
             self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
             finding = certify_field(f, field_at(self.space, weights), self.settings)
