@@ -117,7 +117,7 @@ def test_ctrl_c_before_anything_is_found_ends_the_process_at_once(kahanmaps, mon
         ends.append(status)
         raise SystemExit(status)
 
-    monkeypatch.setattr("kahanmaps.laboratory.scan.scan._terms", interrupted)
+    monkeypatch.setattr("kahanmaps.laboratory.scan.scan._choose_terms", interrupted)
     monkeypatch.setattr("os._exit", ended)
     assert kahanmaps("scan zhukovski_volterra_2 --over a1").out == ""
     assert ends == [130]
