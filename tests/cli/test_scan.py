@@ -39,7 +39,7 @@ def test_blocks_say_degrees_growth_and_where(plane):
         "at g =\t2",
         "degrees\t2, 4, 8, 13\tquadratic growth, dynamical degree 1, derived",
         "at g =\t1",
-        "growth\tthat of one member; singularities were followed for 40 steps",
+        "growth\tthat of one member; singularities were traced for 40 steps",
         "searched\tall members with parameters modulo 31, 37, 41; found are single points, where one of the first 4 "
         "degrees is smaller, over Q with numerators and denominators up to 23; points over number fields of degree d "
         "up to 6, with coefficients up to H where 2^12 (2 H + 1)^(d + 1) is below the product of the primes modulo "

@@ -74,7 +74,7 @@ def test_the_plane_modulo_a_prime_has_every_slow_member(found):
     sweep = next(one for one in found.sweeps if one.prime == 13)
     drawn = [tuple(point) for line in axes.lines for point in line.get_xydata().tolist()]
     assert sorted(drawn) == sorted(sweep.special)
-    a, b = {text.get_text(): text.xy for text in axes.texts}["2*a*b - a - b = 0"]
+    a, b = {text.get_text(): text.xy for text in axes.texts}[label_of("2*a*b - a - b = 0")]
     assert (2 * a * b - a - b) % 13 == 0
     with pytest.raises(InputError, match="expected one modulo which all members were tried: 11, 13, 17"):
         plot_scan(found, modulo=19)
