@@ -74,6 +74,6 @@ def test_an_orbit_that_closes_has_each_of_its_points_once():
 def test_a_map_defined_nowhere_is_reported():
     singular = modular(system("x y", "x", "3*y"), eps=1)
     for look in (lambda: list(singular.pairs(1)), lambda: singular.orbit(3)):
-        with pytest.raises(NoPoint, match="no value at random points"):
+        with pytest.raises(NoPoint, match="not defined at random points"):
             look()
     assert singular.step((1, 1)) is None
