@@ -85,9 +85,10 @@ class _Facts:
 
 
 def conclude(result: AnalysisResult) -> Conclusion:
-    """Return the verdict of the first rule in `_RULES` that applies."""
+    """Return the verdict of the first rule in `_RULES` that applies, or that the growth is undecided."""
     facts = _Facts(result)
-    verdict = next(verdict for rule in _RULES if (verdict := rule(facts)))
+    undecided = f"The growth is undecided: {facts.phrase}; {facts.integrals}."
+    verdict = next(filter(None, (rule(facts) for rule in _RULES)), _Verdict("undecided", undecided, ground=None))
     sentence = verdict.sentence
     if result.eps is not None:
         sentence += f" All this holds at eps = {result.eps}; other eps may differ."
@@ -210,14 +211,10 @@ def _by_growth(facts: _Facts) -> _Verdict | None:
     return None
 
 
-def _undecided(facts: _Facts) -> _Verdict:
-    return _Verdict("undecided", f"The growth is undecided: {facts.phrase}; {facts.integrals}.", ground=None)
-
-
 # Stronger rules first: proved results before measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
     *(_nowhere_defined, _linear, _contradictory, _not_birational, _linearisable, _of_positive_entropy),
-    *(_on_curves, _by_growth, _undecided),
+    *(_on_curves, _by_growth),
 )
 
 
