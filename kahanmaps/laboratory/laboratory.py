@@ -1,11 +1,11 @@
-"""The maps modulo primes on which one map is examined, and the reconstruction of formulas from their results.
+"""The reductions of a map modulo primes that searches work with, and the reconstruction of formulas from them.
 
-Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is known modulo a prime where g splits from its values at all
-roots of g there, by interpolation; the c_j are functions over Q, and are found as those are.
+Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is determined modulo a prime where g splits by its values at
+all roots of g, through interpolation. The c_j are functions over Q and are reconstructed as such.
 
-Formulas are certified as identities in x, eps and the symbols, stated without quotients, for I = P/Q that
-P(x~) Q(x) = P(x) Q(x~): that is the smaller form to expand. In coordinates in which the planes of a normal form
-separate, identities that are too long to expand are short.
+Formulas are certified as identities in x, eps and the symbols, without quotients: for I = P/Q as
+P(x~) Q(x) = P(x) Q(x~), which is shorter to expand. Some identities are too long to expand in the given coordinates,
+but short in coordinates in which the planes of a normal form separate.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIMED = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
-MAX_DEGREE = 6  # of a field: its polynomial splits modulo one prime in 720 or more of them
-_BUDGET = DEFAULT_BUDGET  # as `check-integrals` has it: what is proved there is proved here
-_STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where invariant hyperplanes over Q are looked for
+MAX_DEGREE = 6  # of a number field; its polynomial splits modulo at least one prime in 720
+_BUDGET = DEFAULT_BUDGET  # the limit of `check-integrals`, so that both prove the same identities
+_STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number in the search for invariant hyperplanes over Q
 Spaces = Sequence[DarbouxSpace]
 
 
@@ -82,14 +82,14 @@ class ClosedForms:
 
 
 class Laboratory:
-    """The maps on which a file's map is examined: two primes, each with its own eps and its own values of the symbols.
+    """The reductions of a file's map modulo two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (exact; the time step is 2 eps) all maps are at that eps. With `flow` they are flows, of an adjusted
-    Kahan map that of the field at eps = 0, and of a polarised map `map` is then x + eps f. `system` is there if the map
-    is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then. `field` is
-    the system or, with `flow`, the field of any degree. Where a parameter is an algebraic number, the `root`, and this
-    is `algebraic`, it is the only one of the `symbols`, with no values but the roots modulo primes; `free_symbols` are
-    those that have any value.
+    With `eps` (half the time step, exact) all of them are at that eps. With `flow` they are flows instead of maps: for
+    an adjusted Kahan map the flow of the field at eps = 0; for a polarised map `map` is then x + eps f. If `algebraic`
+    and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
+
+    `system` is set if the map is the Kahan map of a system without eps in its coefficients, for which theorems apply.
+    `field` is the system or, with `flow`, the field of any degree. `free_symbols` are the symbols with random values.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load

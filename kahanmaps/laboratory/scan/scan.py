@@ -4,7 +4,7 @@ All members with parameters in GF(p) are tried for several small primes p (`swee
 generic member are special. They fall into classes by their degrees, and these into components modulo each prime
 (`modular_components`); components that appear modulo all primes are lifted to conditions over Q (`lift`). A condition
 is *found modulo* these primes. It is *confirmed* where members on it, random modulo large primes, have the same degrees
-by the computation that `degrees` does. Nothing of this is a proof. The kind of growth is that of one rational member.
+by the computation that `degrees` does. None of this is a proof. The kind of growth is that of one rational member.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def scan(
         raise InputError(f"found {jobs} jobs, expected at least 1")
     composite = [p for p in primes or () if not fmpz(p).is_prime()]
     if composite:
-        raise InputError(f"found {composite[0]} among the primes to scan modulo, which is not one")
+        raise InputError(f"found {composite[0]} among the primes to scan modulo, expected a prime number")
     if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
         given = ", ".join(map(str, primes))
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
@@ -216,7 +216,7 @@ def scan(
         known, missed = run.apply(known, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
     sweeps = tuple(run.sweeps)
-    unassigned = tuple(_count_unassigned(one, known) for one in sweeps)
+    unassigned = tuple(_count_unassigned(result, known) for result in sweeps)
     symmetric: tuple[tuple[str, ...], ...] = ()
     try:
         symmetric = tuple(symmetries(sweeps, known, names))
