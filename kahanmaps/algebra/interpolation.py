@@ -73,7 +73,7 @@ class Samples:
         if self.spent + needed > self.max_samples:
             raise Stop(f"{self.spent} values were taken and {needed} more are needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
-            raise Stop(f"the budget was spent after {self.spent} values (--effort)")
+            raise Stop(f"work limit reached after {self.spent} values; raise --effort")
 
 
 class SampledValues:

@@ -19,7 +19,7 @@ from typing import Any
 from kahanmaps.errors import InputError
 
 LEAST_EFFORT, MOST_EFFORT = -20, 40
-SPENT = "the budget was spent (--effort)"  # why a search ended early
+SPENT = "work limit reached; raise --effort"  # why a search ended early
 
 
 class _Counter(threading.local):

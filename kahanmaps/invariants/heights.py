@@ -260,7 +260,7 @@ def height_growth(
         assert orbit.end is not None
         end = orbit.end
     if end.status == "interrupted":
-        end = replace(end, message=f"the budget was spent after step {end.steps} (--effort)")
+        end = replace(end, message=f"work limit reached after step {end.steps}; raise --effort")
     return HeightGrowth(tuple(heights), end, every, method)
 
 

@@ -26,15 +26,15 @@ _CURVES = {None: "curves", 0: "rational curves", 1: "elliptic curves, of genus 1
 
 @dataclass(frozen=True)
 class Conclusion:
-    """The verdict in words; `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere
+    """The verdict on a map; `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere
     defined) or "undecided".
 
-    `sense` says more exactly what is meant: "superintegrable" (one integral less than the dimension, proved),
+    `sense` is the precise sense of the verdict: "superintegrable" (one integral less than the dimension, proved),
     "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable",
-    "confining and not integrable", else the kind. `ground` is how the verdict is known: "proved", "derived" (from the
+    "confining and not integrable", else the kind. `ground` is the kind of evidence: "proved", "derived" (from the
     measured singularity patterns), "measured" or "estimated"; empty where there is no verdict.
-    `integrals` is the number of independent integrals that are known or shown by orbits, `growth` the kind of growth of
-    the degrees.
+    `integrals` is the number of independent integrals that are known or measured along orbits, `growth` the kind of
+    growth of the degrees.
     """
 
     kind: str
@@ -53,7 +53,7 @@ class _Verdict(NamedTuple):
 
 
 class _Facts:
-    """The results, and phrases that several verdicts share."""
+    """The results, and phrases that several rules use."""
 
     def __init__(self, result: AnalysisResult) -> None:
         degrees = result.degrees
@@ -85,9 +85,10 @@ class _Facts:
 
 
 def conclude(result: AnalysisResult) -> Conclusion:
-    """The verdict on the results: that of the first rule in `_RULES` that applies."""
+    """Return the verdict of the first rule in `_RULES` that applies, or that the growth is undecided."""
     facts = _Facts(result)
-    verdict = next(verdict for rule in _RULES if (verdict := rule(facts)))
+    undecided = f"The growth is undecided: {facts.phrase}; {facts.integrals}."
+    verdict = next(filter(None, (rule(facts) for rule in _RULES)), _Verdict("undecided", undecided, ground=None))
     sentence = verdict.sentence
     if result.eps is not None:
         sentence += f" All this holds at eps = {result.eps}; other eps may differ."
@@ -135,7 +136,7 @@ def _contradictory(facts: _Facts) -> _Verdict | None:
 
 
 def _not_birational(facts: _Facts) -> _Verdict | None:
-    """Degrees and closed orbits have a meaning for birational maps only; a constant map needs no theorem."""
+    """Give no verdict on maps that are not birational: degrees and closed orbits mean nothing for these."""
     if not facts.result.defect or facts.growth is Growth.ZERO:
         return None
     return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.phrase}.", ground=None)
@@ -210,14 +211,10 @@ def _by_growth(facts: _Facts) -> _Verdict | None:
     return None
 
 
-def _undecided(facts: _Facts) -> _Verdict:
-    return _Verdict("undecided", f"The growth is undecided: {facts.phrase}; {facts.integrals}.", ground=None)
-
-
 # Stronger rules first: proved results before measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
     *(_nowhere_defined, _linear, _contradictory, _not_birational, _linearisable, _of_positive_entropy),
-    *(_on_curves, _by_growth, _undecided),
+    *(_on_curves, _by_growth),
 )
 
 
@@ -228,7 +225,7 @@ def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tup
 
 
 def _confining(result: AnalysisResult) -> str:
-    """The sense in which a map is not integrable: confinement does not prove integrability."""
+    """Return the sense in which a map is not integrable; a map may be confining and not integrable."""
     confined = {run.verdict for run in result.singularities} == {CONFINED}
     return "confining and not integrable" if confined else "not integrable"
 
@@ -238,15 +235,15 @@ def _capital(sentence: str) -> str:
 
 
 def orbits_lie_on_curves(result: AnalysisResult) -> bool:
-    """Whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically.
+    """Return whether dim - 1 independent integrals are proved or supported; then degrees grow at most quadratically.
 
-    The reason: the map acts on each of the curves, and these have genus 0 or 1 where it has infinite order.
+    The reason: the map acts on each of the curves, and if it has infinite order on a curve, the genus is 0 or 1.
     """
     return result.integrals is not None and len(result.integrals.integrals) >= result.dim - 1 >= 1
 
 
 def contradictions(result: AnalysisResult) -> list[str]:
-    """Sentences on integrals, closed orbits and degrees that contradict each other; none if all agree."""
+    """Return a sentence on each contradiction between integrals, closed orbits and degrees."""
     growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
     period = result.integrals.profile.period if result.integrals is not None else None
     sentences = []
@@ -268,7 +265,7 @@ def contradictions(result: AnalysisResult) -> list[str]:
 
 
 def doubt_of_heights(result: AnalysisResult) -> str:
-    """The reason not to trust the growth of heights, given that of the degrees; empty if the two agree."""
+    """Return the reason not to trust the growth of heights, given that of the degrees; empty if the two agree."""
     if result.heights is None or result.degrees is None:
         return ""
     kind, growth = result.heights.kind, result.degrees.growth

@@ -1,11 +1,11 @@
-"""The maps modulo primes on which one map is examined, and the reconstruction of formulas from their results.
+"""The reductions of a map modulo primes that searches work with, and the reconstruction of formulas from them.
 
-Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is known modulo a prime where g splits from its values at all
-roots of g there, by interpolation; the c_j are functions over Q, and are found as those are.
+Over a number field Q[t]/g a coefficient c_0 + c_1 t + ... is determined modulo a prime where g splits by its values at
+all roots of g, through interpolation. The c_j are functions over Q and are reconstructed as such.
 
-Formulas are certified as identities in x, eps and the symbols, stated without quotients, for I = P/Q that
-P(x~) Q(x) = P(x) Q(x~): that is the smaller form to expand. In coordinates in which the planes of a normal form
-separate, identities that are too long to expand are short.
+Formulas are certified as identities in x, eps and the symbols, without quotients: for I = P/Q as
+P(x~) Q(x) = P(x) Q(x~), which is shorter to expand. Some identities are too long to expand in the given coordinates,
+but short in coordinates in which the planes of a normal form separate.
 """
 
 from __future__ import annotations
@@ -67,29 +67,29 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIMED = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
-MAX_DEGREE = 6  # of a field: its polynomial splits modulo one prime in 720 or more of them
-_BUDGET = DEFAULT_BUDGET  # as `check-integrals` has it: what is proved there is proved here
-_STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where invariant hyperplanes over Q are looked for
+MAX_DEGREE = 6  # of a number field; its polynomial splits modulo at least one prime in 720
+_BUDGET = DEFAULT_BUDGET  # the limit of `check-integrals`, so that both prove the same identities
+_STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number in the search for invariant hyperplanes over Q
 Spaces = Sequence[DarbouxSpace]
 
 
 @dataclass(frozen=True)
 class ClosedForms:
-    """The bases of spaces as polynomials in the variables, the symbols and eps; None and a reason if not found."""
+    """Bases of spaces as polynomials in the variables, the symbols and eps; None with a reason if none were found."""
 
     bases: list[list[fmpq_mpoly]] | None
     reason: str = ""
 
 
 class Laboratory:
-    """The maps on which a file's map is examined: two primes, each with its own eps and its own values of the symbols.
+    """The reductions of a file's map modulo two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (exact; the time step is 2 eps) all maps are at that eps. With `flow` they are flows, of an adjusted
-    Kahan map that of the field at eps = 0, and of a polarised map `map` is then x + eps f. `system` is there if the map
-    is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then. `field` is
-    the system or, with `flow`, the field of any degree. Where a parameter is an algebraic number, the `root`, and this
-    is `algebraic`, it is the only one of the `symbols`, with no values but the roots modulo primes; `free_symbols` are
-    those that have any value.
+    With `eps` (half the time step, exact) all of them are at that eps. With `flow` they are flows instead of maps: for
+    an adjusted Kahan map the flow of the field at eps = 0; for a polarised map `map` is then x + eps f. If `algebraic`
+    and a parameter is an algebraic number, this `root` is the only symbol, and its values are the roots modulo primes.
+
+    `system` is set if the map is the Kahan map of a system without eps in its coefficients, for which theorems apply.
+    `field` is the system or, with `flow`, the field of any degree. `free_symbols` are the symbols with random values.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -117,12 +117,12 @@ class Laboratory:
         if self.eps is not None and "eps" in symbols:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
         if flow and file.map.root is not None:
-            raise InputError(f"found a {file.map.root}, expected rational parameters: it is the flow that is asked for")
+            raise InputError(f"found a {file.map.root}, expected rational parameters for an analysis of the flow")
         if algebraic and isinstance(file.map, AlgebraicMap):
             self.root, self.map = file.map.root, file.map.given
             if symbols or self.root.degree > MAX_DEGREE:
-                found = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
-                raise InputError(f"found {found}, expected no other symbols and a degree of at most {MAX_DEGREE}")
+                given = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
+                raise InputError(f"found {given}, expected no other symbols and a degree of at most {MAX_DEGREE}")
             self.symbols = self.map.symbols
         else:
             self.map = map_with_symbols(file, self.symbols)
@@ -138,20 +138,23 @@ class Laboratory:
             self.field = self.map.of_field
             self.map = euler_map(self.field)
         self.flow = flow
-        # What one search knows already; searches have laboratories of their own, so that no answer depends on others.
-        self._too_long: dict[bool, int] = {}  # of integrals and of densities: how many terms the shortest one had
+        # Caches of one search. Each search has a laboratory of its own, so that no answer depends on another search.
+        # The smallest number of terms that was too long to expand; the key says whether the function was a density.
+        self._too_long: dict[bool, int] = {}
         self._flow_polynomials: FlowPolynomials | None = None
         if flow and (self.field is None or self.eps is not None):
             what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
-            raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
+            raise InputError(
+                f"found {what}, expected a polynomial vector field without eps for an analysis of the flow"
+            )
         subject = self.map.subject if self.root is None else file.map.subject
-        self.seed = derive_seed(seed, self.symbols, subject, self.eps)  # of all that is drawn for this map
-        self.maps = list(self._drawn("laboratory", 2))
+        self.seed = derive_seed(seed, self.symbols, subject, self.eps)  # of all random choices for this map
+        self.maps = list(self._draw_maps("laboratory", 2))
         self.primes = tuple(map_.prime for map_ in self.maps)
-        self.asked = file, self.free_symbols, self.eps, seed, self.primes  # with which all results of searches begin
+        self.request = file, self.free_symbols, self.eps, seed, self.primes  # the first fields of every search result
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
-        """The map modulo a prime; the residue `eps` counts only where eps is no given number. Raises BadPrime."""
+        """Return the map modulo a prime; the residue `eps` is ignored if eps is a given number. Raises BadPrime."""
         if self.eps is not None:
             eps = int(GF(prime).convert(self.eps))
             if eps == 0:
@@ -161,15 +164,15 @@ class Laboratory:
         return ModularMap(self.map, prime, eps, values, self.seed)
 
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
-        """The map for values of what formulas contain: of the symbols and, where it enters as one, of eps last."""
+        """Return the map at values of the names in formulas: the symbols, and last eps if it enters as a symbol."""
         count = len(self.symbols)
         return self.map_at(prime, values[:count], (*values, 1)[count])
 
     def other_maps(self, count: int) -> Iterator[ModularMap]:
-        """So many maps modulo further primes, each at other random residues of the symbols and eps."""
-        return self._drawn("other maps", count)
+        """Yield `count` maps modulo further primes, each at other random residues of the symbols and eps."""
+        return self._draw_maps("other maps", count)
 
-    def _drawn(self, name: str, count: int) -> Iterator[ModularMap]:
+    def _draw_maps(self, name: str, count: int) -> Iterator[ModularMap]:
         rng = random.Random(f"{name} {self.seed}")
         while count > 0:
             prime = random_prime(rng)
@@ -184,7 +187,7 @@ class Laboratory:
 
     @property
     def eps_enters(self) -> str:
-        """How eps enters formulas: "not", where it is a number, "by weight" for homogeneous f, else as a "symbol"."""
+        """How eps enters formulas: "not" if it is a number, "by weight" if f is homogeneous, else as a "symbol"."""
         if self.eps is not None or self.flow or not self.map.has_eps:
             return "not"
         if self.system is None:
@@ -218,41 +221,45 @@ class Laboratory:
         return [*self.affine_cofactors(), *determinant_factors(self.map)]
 
     def affine_cofactors(self) -> list[Cofactor]:
-        """Those of affine Darboux functions of the system, which is there."""
+        """The cofactors of affine Darboux functions of the system; requires `self.system`."""
         assert self.system is not None
         context, full_ring, n = self.system.rhs[0].context(), ring(self.map.names), self.system.dim
         return [
-            Cofactor(format_polynomial(one.function), 1, one.function.compose(*full_ring.gens()[:n], ctx=full_ring))
-            for one in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
-            # l is to divide l' with the symbols free, not only at the values that the file gives them, or at that one
-            if darboux_cofactor(self.system, one.function.compose(*context.gens()[:n], ctx=context)) is not None
+            Cofactor(
+                format_polynomial(affine.function), 1, affine.function.compose(*full_ring.gens()[:n], ctx=full_ring)
+            )
+            for affine in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
+            # l must divide l' with the symbols free, not only at their values in the file or at the stand-in
+            if darboux_cofactor(self.system, affine.function.compose(*context.gens()[:n], ctx=context)) is not None
         ]
 
     def flow_polynomials(self, budget: Budget) -> FlowPolynomials:
-        """Darboux polynomials of the flow in (variables, symbols, eps); they are sought once, within that budget."""
+        """Return Darboux polynomials of the flow in (variables, symbols, eps); the first call searches for them."""
         if self._flow_polynomials is not None:
             return self._flow_polynomials
         assert self.field is not None
-        found, context = flow_polynomials(self.field, budget=budget, seed=self.seed), ring(self.map.names)
+        result, context = flow_polynomials(self.field, budget=budget, seed=self.seed), ring(self.map.names)
         gens = context.gens()[:-1]
-        functions = [P.compose(*gens, ctx=context) for P in found.functions]
+        functions = [P.compose(*gens, ctx=context) for P in result.functions]
         # With symbols that search ends at a low degree in all names.
         affine = self.affine_cofactors() if self.symbols and self.system is not None else []
-        more = [one.polynomial for one in affine if one.polynomial is not None and one.polynomial not in functions]
-        self._flow_polynomials = replace(found, functions=(*functions, *more))
+        polynomials = [cofactor.polynomial for cofactor in affine if cofactor.polynomial is not None]
+        functions += [P for P in polynomials if P not in functions]
+        self._flow_polynomials = replace(result, functions=tuple(functions))
         return self._flow_polynomials
 
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Whether the map, or the flow, keeps I or dx/phi, as the function `verdict_on` has it; of a flow by expansion.
+        """Certify that the map, or the flow, preserves I or dx/phi, as the function `verdict_on` does; for a flow by
+        expansion.
 
-        What is no shorter than what was too long to expand is not expanded.
+        A function that is no shorter than one that was too long is not expanded.
         """
         if self.field is not None and self.flow:
-            kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
+            is_kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
             evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIMED
-            return (Certainty.PROVED if kept else Certainty.REFUTED), evidence
+            return (Certainty.PROVED if is_kept else Certainty.REFUTED), evidence
         map_ = self.map if self.root is None else self.file.map
         options: dict[str, Any] = {"eps": self.eps, "seed": self.seed, "is_density": is_density}
         separated = self._separated
@@ -260,10 +267,13 @@ class Laboratory:
         expands = separated is None and terms < self._too_long.get(is_density, math.inf)
         verdict, evidence = verdict_on(map_, function, **options, factor=factor, expands=expands)
         if verdict is Certainty.SUPPORTED and separated is not None:
-            given = separated.function(function), None if factor is None else separated.function(factor)
-            there, proof = verdict_on(separated.system, given[0], **options, factor=given[1])
-            if there is not Certainty.SUPPORTED:
-                return there, replace(proof, summary=f"{proof.summary}, in coordinates in which the planes separate")
+            moved_factor = None if factor is None else separated.function(factor)
+            certainty, proof = verdict_on(
+                separated.system, separated.function(function), **options, factor=moved_factor
+            )
+            if certainty is not Certainty.SUPPORTED:
+                summary = f"{proof.summary}, in coordinates in which the planes separate"
+                return certainty, replace(proof, summary=summary)
         elif verdict is Certainty.SUPPORTED and expands:
             self._too_long[is_density] = terms
         return verdict, evidence
@@ -280,14 +290,19 @@ class Laboratory:
         variables: Sequence[str] = (),
         eps_enters: str = "",
     ) -> ClosedForms:
-        """The polynomials that span spaces whose reduced echelon bases are known modulo primes.
+        """Reconstruct the polynomials that span spaces whose reduced echelon bases are known modulo primes.
 
-        `model` are the spaces on the first map, `spaces_on(map)` those on others in the same order; None where the map
-        is special. Without other `variables` they are those of the map. eps enters as in formulas in these unless
-        something else is said: where it is a number or "not" in the formulas, the spaces are for that number; "by
-        weight", they are for eps = 1, and x becomes eps x in them: so it is for homogeneous f. The results are
-        polynomials in (variables, symbols, eps), primitive: integer coefficients without a common factor, that of a
-        polynomial in the symbols included.
+        Args:
+            model: the spaces on the first map.
+            spaces_on: returns the spaces on another map in the same order, or None if that map is special.
+            budget: the work limit.
+            variables: the variables of the polynomials, by default those of the map.
+            eps_enters: "not" if the spaces are for the given eps, "symbol", or "by weight" if they are for eps = 1 and
+                x becomes eps x in the polynomials, as for homogeneous f; by default `self.eps_enters`.
+
+        Returns:
+            Polynomials in (variables, symbols, eps), primitive: with integer coefficients, and without a common factor
+            that is an integer or a polynomial in the symbols.
         """
         variables, symbols, root = variables or self.map.variables, self.symbols, self.root
         eps_enters = eps_enters or self.eps_enters
@@ -301,15 +316,15 @@ class Laboratory:
 
         def box(prime: int, values: tuple[int, ...]) -> tuple[int, ...] | None:
             try:
-                found = spaces_on(self.map_for(prime, values))
+                spaces = spaces_on(self.map_for(prime, values))
             except (NoPoint, BadPrime):
                 return None
-            pairs = [] if found is None else list(zip(found, supports, pivots, strict=True))
-            if not pairs or any(
-                not set(one.places) <= mine or len(one.basis) != len(ends) for one, mine, ends in pairs
+            if not spaces or any(
+                not set(space.places) <= support or len(space.basis) != len(ends)
+                for space, support, ends in zip(spaces, supports, pivots, strict=True)
             ):
-                return None  # of another shape
-            return tuple(one.basis[i][k] for (one, _, _), cells in zip(pairs, places, strict=True) for i, k in cells)
+                return None  # the spaces have another shape
+            return tuple(space.basis[i][k] for space, cells in zip(spaces, places, strict=True) for i, k in cells)
 
         names = (*symbols, "eps") if eps_enters == "symbol" else tuple(symbols)
         functions: list[RationalFunction] = []
@@ -341,15 +356,16 @@ class Laboratory:
 
 
 def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str], **options: Any) -> Reconstruction:
-    """As `reconstruct` does, the first of the names standing for the root where there is one.
+    """Call `reconstruct`, where the first of the names stands for the root if there is one.
 
-    The box is asked at all roots modulo primes at which the polynomial splits; the functions are polynomials of a
-    degree below that of the field in the first name. `options` are those of `reconstruct`.
+    The black box is evaluated at all roots modulo primes at which the minimal polynomial of the root splits. The
+    functions are polynomials in the first name, of degree less than that of the field. `options` are those of
+    `reconstruct`.
     """
     if root is None:
         return reconstruct(black_box, names, **options)
     m = root.degree
-    assert m <= MAX_DEGREE  # or primes are too rare; who makes a laboratory is told so
+    assert m <= MAX_DEGREE  # or suitable primes are too rare; the constructor of Laboratory refuses larger degrees
 
     def split(rng: random.Random) -> int:
         while True:
@@ -380,10 +396,10 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
 
 
 def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
-    """A polynomial in n variables, the root and eps, not 0, without factors that contain no variable.
+    """Divide a nonzero polynomial in n variables, the root and eps by its factors that contain no variable.
 
-    It has integer coefficients without a common factor; of its multiples by numbers of the field with a rational
-    coefficient it is the shortest.
+    The result has integer coefficients without a common factor. It is the shortest of its multiples by numbers of the
+    field that have a rational coefficient.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
@@ -399,16 +415,13 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
         row[e] = row[e] + K.convert(fmpq_poly([0] * j + [coefficient]))
     content: list[EtaleElement] = []
     for row in parts.values():
-        content, rest = row, content
-        while rest:
-            content, rest = rest, _divided(content, rest)[1]
+        content, remainder = row, content
+        while remainder:
+            content, remainder = remainder, _divide(content, remainder)[1]
     entries = {
-        (*exponents, e): c
-        for exponents, row in parts.items()
-        for e, c in enumerate(_divided(row, content)[0])
-        if c != 0
+        (*exponents, e): c for exponents, row in parts.items() for e, c in enumerate(_divide(row, content)[0]) if c != 0
     }
-    found = []
+    multiples = []
     for unit in {str(c): c for c in entries.values()}.values():
         terms = {
             (*m[:-1], j, m[-1]): number
@@ -416,24 +429,27 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
             for j, number in enumerate((c / unit).coefficients)
             if number != 0
         }
-        found.append(primitive_part(polynomial.context().from_dict(terms))[1])
-    return min(found, key=lambda P: (len(P), len(str(P)), str(P)))
+        multiples.append(primitive_part(polynomial.context().from_dict(terms))[1])
+    return min(multiples, key=lambda P: (len(P), len(str(P)), str(P)))
 
 
-def _divided(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[EtaleElement], list[EtaleElement]]:
-    """Quotient and remainder of polynomials over a field, coefficients from that of degree 0 on; the last is not 0."""
-    quotient, rest = [Q[-1] * 0] * max(0, len(P) - len(Q) + 1), list(P)
-    while len(rest) >= len(Q):
-        shift, factor = len(rest) - len(Q), rest[-1] / Q[-1]
+def _divide(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[EtaleElement], list[EtaleElement]]:
+    """Return quotient and remainder of polynomials over a field, given by coefficients in ascending order.
+
+    The last coefficient of each is not 0.
+    """
+    quotient, remainder = [Q[-1] * 0] * max(0, len(P) - len(Q) + 1), list(P)
+    while len(remainder) >= len(Q):
+        shift, factor = len(remainder) - len(Q), remainder[-1] / Q[-1]
         quotient[shift] = factor
-        rest = [c - factor * Q[k - shift] if k >= shift else c for k, c in enumerate(rest[:-1])]
-        while rest and rest[-1] == 0:
-            rest.pop()
-    return quotient, rest
+        remainder = [c - factor * Q[k - shift] if k >= shift else c for k, c in enumerate(remainder[:-1])]
+        while remainder and remainder[-1] == 0:
+            remainder.pop()
+    return quotient, remainder
 
 
 def euler_map(field: PolynomialField) -> ImplicitMap:
-    """x -> x + eps f(x), the map that stands for a field where its variables and symbols are asked for."""
+    """Return x -> x + eps f(x), a map with the variables and symbols of the field, which represents its flow."""
     context = ring((*field.variables, *field.symbols, "eps"))
     *old, eps = context.gens()
     moved = (x + eps * f.compose(*old, ctx=context) for x, f in zip(old, field.rhs, strict=False))
@@ -447,10 +463,11 @@ def is_kept_by_flow(
     is_density: bool = False,
     factor: RationalFunction | None = None,
 ) -> bool:
-    """Whether f . grad I = 0; of a density phi whether f . grad phi = phi div f, which says that dx/phi is invariant.
+    """Return whether f . grad I = 0; for a density phi, whether f . grad phi = phi div f: then dx/phi is invariant.
 
-    With a factor c, a function of the symbols, whether f . grad I = c I: exp(-c t) I is an integral depending on time.
-    Multiplied out, for every value of the symbols; the function is in (variables, symbols, eps). Exact.
+    With a factor c, a function of the symbols, return whether f . grad I = c I: then exp(-c t) I is a time-dependent
+    integral. The identity is expanded, for every value of the symbols; the function is in (variables, symbols, eps).
+    Exact.
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -479,9 +496,9 @@ def verdict_on(
     factor: RationalFunction | None = None,
     expands: bool = True,
 ) -> tuple[Certainty, Evidence]:
-    """Whether I(x~) = I(x); of a density phi whether phi(x~) = det dPhi(x) phi(x), which says that dx/phi is invariant.
+    """Certify that I(x~) = I(x); for a density phi, that phi(x~) = det dPhi(x) phi(x): then dx/phi is invariant.
 
-    Both are for every value of the symbols of the map and, if `eps` is None, every eps.
+    The identity is for every value of the symbols of the map and, if `eps` is None, for every eps.
 
     Args:
         given: the map, some of its parameters symbols; a system stands for its Kahan map.
@@ -494,7 +511,7 @@ def verdict_on(
 
     Returns:
         The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
-        undecided where the two sides have no values, as for a map that is singular everywhere; of a density also where
+        undecided where the two sides are undefined, as for a map that is singular everywhere; for a density also if
         the map is not invertible.
 
     Source: celledoni-2019.
@@ -514,34 +531,34 @@ def verdict_on(
     map_ = as_map(given)
     n, root = map_.dim, map_.root
 
-    def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
-        """P(x~) Q(x) and P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
-        point, symbols = place[:n], place[n:]
-        over = map_.at(step, field, symbols)
-        image = over.step(point)
-        values = symbols if root is None else (root.over(field),)
-        here, there = (*point, *values, step), (*image, *values, step)
-        P, Q = (evaluate(part, field, here) for part in (function.numerator, function.denominator))
-        P_there, Q_there = (evaluate(part, field, there) for part in (function.numerator, function.denominator))
-        # Q may vanish at the eps in force, and where a map is not invertible on its image: then P/Q has no value there.
-        if field.is_zero(Q) or field.is_zero(Q_there):
+    def sides(field: Field, values: tuple[Any, ...], step: Any) -> Sides | None:
+        """P(x~) Q(x) and P(x) Q(x~) for I = P/Q, for a density times the determinants, in x, the symbols and eps."""
+        x, symbols = values[:n], values[n:]
+        map_at_eps = map_.at(step, field, symbols)
+        image = map_at_eps.step(x)
+        parameters = (*(symbols if root is None else (root.over(field),)), step)
+        at_x, at_image = (*x, *parameters), (*image, *parameters)
+        P, Q = (evaluate(part, field, at_x) for part in (function.numerator, function.denominator))
+        P_image, Q_image = (evaluate(part, field, at_image) for part in (function.numerator, function.denominator))
+        # Q may vanish identically at this eps, or on the image of a map that is not invertible: then I is undefined.
+        if field.is_zero(Q) or field.is_zero(Q_image):
             return None
-        left, right = P_there * Q, P * Q_there
+        left, right = P_image * Q, P * Q_image
         if factor is not None:
-            left = left * evaluate(factor.denominator, field, here)
-            right = right * evaluate(factor.numerator, field, here)
+            left = left * evaluate(factor.denominator, field, at_x)
+            right = right * evaluate(factor.numerator, field, at_x)
         if is_density:
-            numerator, denominator = jacobian_determinant_sides(over, point, image)
+            numerator, denominator = jacobian_determinant_sides(map_at_eps, x, image)
             if field.is_zero(numerator):
-                return None  # the map is not invertible here, and 0 = 0 says nothing
+                return None  # the map is not invertible at x, and 0 = 0 says nothing
             left, right = left * denominator, right * numerator
         return [left], [right]
 
     condition = (density_condition if is_density else integral_condition)(function, n, eps, root)
     step = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
     values = " and ".join([*step, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
-    told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
-    scope = f"for {values}{told}" if values else told.removeprefix(", ").strip()
+    restriction = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
+    scope = f"for {values}{restriction}" if values else restriction.removeprefix(", ").strip()
     subject = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
     identity = Identity(
         n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=subject
@@ -550,32 +567,35 @@ def verdict_on(
 
 
 def certified(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Certainty, Evidence]:
-    """The verdict on an identity, by random points and, if `expands`, by expansion."""
+    """Return the verdict on an identity, by random points and, if `expands`, by expansion."""
     decision = decide(identity, seed)
-    found = try_expand(identity, decision, seed, _BUDGET) if expands else decision
-    return found.verdict, found.evidence
+    if expands:
+        decision = try_expand(identity, decision, seed, _BUDGET)
+    return decision.verdict, decision.evidence
 
 
 @dataclass(frozen=True)
 class Separated:
-    """The `system` that another one is in z, where x = T z. A Kahan map is the same in all linear coordinates."""
+    """A system written in z, where x = T z; Kahan's method is equivariant under linear changes of variables."""
 
     system: QuadraticSystem
     T: fmpq_mat
 
     def function(self, given: RationalFunction) -> RationalFunction:
-        """A function of (x, ...) as one of (z, ...)."""
+        """Write a function of (x, ...) as a function of (z, ...)."""
 
-        def there(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+        def change_variables(polynomial: fmpq_mpoly) -> fmpq_mpoly:
             context, n = polynomial.context(), self.system.dim
             x = linear_combinations(self.T, context.gens()[:n])
             return polynomial.compose(*x, *context.gens()[n:], ctx=context)
 
-        return RationalFunction(there(given.numerator), there(given.denominator))
+        return RationalFunction(change_variables(given.numerator), change_variables(given.denominator))
 
 
 def separated(system: QuadraticSystem) -> Separated | None:
-    """The system where its planes over Q separate; None for one without such planes, and where it is not shorter.
+    """Write a system in coordinates in which its planes over Q separate.
+
+    Returns None for a system without such planes, and if the result is no shorter.
 
     >>> from kahanmaps.documents.catalog import load
     >>> system = load("paper_m2").system
@@ -588,5 +608,5 @@ def separated(system: QuadraticSystem) -> Separated | None:
     splitting = Splitting(known.form, QQ, 1, known.T)
     matrices = [splitting.matrix(plane) for plane in range(len(splitting.planes))]
     T = fmpq_mat([list(chain(*rows)) for rows in zip(*matrices, strict=True)])
-    there = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
-    return Separated(there, T) if sum(map(len, there.rhs)) < sum(map(len, system.rhs)) else None
+    separate = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
+    return Separated(separate, T) if sum(map(len, separate.rhs)) < sum(map(len, system.rhs)) else None

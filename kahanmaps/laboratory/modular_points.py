@@ -1,4 +1,4 @@
-"""Points, steps and values of monomials modulo a prime: what the searches for integrals and densities feed on."""
+"""Points, steps and values of monomials modulo a prime: the data for the searches for integrals and densities."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
-Values = Sequence[Any]  # as nmod, whose products take half the time of those of Python's integers; or as integers
+Values = Sequence[Any]  # nmod, whose products take half the time of those of Python's integers, or integers
 Exponent = tuple[int, ...]
 _TRIES = 60
 _NO_VALUE = "the map is not defined at random points modulo a prime"
@@ -36,7 +36,7 @@ class NoPoint(KahanmapsError):
 class ModularMap:
     """A map modulo `prime`, at the residues `values` of its symbols and `eps`; a system stands for its Kahan map.
 
-    Everything drawn at random comes from `rng`. Raises BadPrime where the prime divides denominators, or is eps.
+    All random choices come from `rng`. Raises BadPrime if the prime divides a denominator, or eps.
     """
 
     def __init__(
@@ -59,12 +59,12 @@ class ModularMap:
         count(20 if isinstance(self.map, KahanMap) else 200)
 
     def random_point(self) -> Point:
-        """A random point modulo the prime."""
+        """Return a random point modulo the prime."""
         return tuple(self.rng.randrange(self.prime) for _ in range(self.dim))
 
     def step(self, x: Point) -> Point | None:
-        """The image of a point, None where the map is not defined."""
-        # Values of polynomials count themselves.
+        """Return the image of a point, None if the map is not defined there."""
+        # The evaluation of polynomials counts its own work.
         count(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMap) else 10)
         try:
             return tuple(int(entry) for entry in self.map.step(x))
@@ -72,13 +72,13 @@ class ModularMap:
             return None
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
-        """Numerator and denominator of det dPhi(x), as they come: for Kahan maps det(I +- eps f') at x~ and x."""
+        """Return the sides of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x))."""
         count(25 + 8 * self.dim + self.dim**3 / 10)
-        above, below = jacobian_determinant_sides(self.map, x, self.map.point(image))
-        return int(above), int(below)
+        numerator, denominator = jacobian_determinant_sides(self.map, x, self.map.point(image))
+        return int(numerator), int(denominator)
 
     def pairs(self, count: int) -> Iterator[tuple[Point, Point]]:
-        """So many random points with their images. Raises NoPoint where the map has hardly any."""
+        """Yield `count` random points with their images. Raises NoPoint if the map is undefined at too many points."""
         missed = 0
         while count > 0:
             x = self.random_point()
@@ -92,29 +92,30 @@ class ModularMap:
                     raise NoPoint(_NO_VALUE)
 
     def orbit(self, count: int) -> list[Point]:
-        """Up to `count` points of an orbit; fewer where it is periodic: then all of its points.
+        """Return the first `count` points of an orbit, or all of its points if the orbit has a smaller period.
 
-        An orbit that meets the singular set is given up for another. Raises NoPoint where all do.
+        If the orbit meets an indeterminacy point, another one is tried. Raises NoPoint if all do.
         """
         longest = 0
         for _ in range(_TRIES):
-            found = [self.random_point()]
-            while len(found) < count and (image := self.step(found[-1])) != found[0]:
+            points = [self.random_point()]
+            while len(points) < count and (image := self.step(points[-1])) != points[0]:
                 if image is None:
                     break
-                found.append(image)
+                points.append(image)
             else:
-                return found
-            longest = max(longest, len(found))
+                return points
+            longest = max(longest, len(points))
         raise NoPoint(_NO_VALUE if longest == 1 else "orbits modulo a prime meet the singular set")
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """The values of all monomials up to a degree along an orbit: a row a point; the first point; the period.
+        """Evaluate all monomials up to a degree along an orbit of `count` points.
 
-        A polynomial vanishes along the orbit if the `count` rows annihilate its coefficients. With a `support`, the
-        numbers of monomials and of all their divisors, only these have columns. Raises NoPoint.
+        Returns the values, a row for each point, the first point, and the period if it is less than `count`. A
+        polynomial vanishes along the orbit if the rows annihilate its coefficients. With a `support`, the indices of
+        monomials and of all their divisors, there are columns for these only. Raises NoPoint.
         """
         points = self.orbit(count)
         period = len(points) if len(points) < count else None
@@ -122,31 +123,30 @@ class ModularMap:
         return [_products(x, layers, self.prime) for x in points], points[0], period
 
     def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
-        """The values of all monomials up to a degree at a point, and a step later; each times its number of `by`."""
+        """Return the values of all monomials up to a degree at a point and at its image, times the two factors `by`."""
         layers, p = _layers(self.dim, degree), self.prime
         return _products(x, layers, p, by[0]), _products(image, layers, p, by[1])
 
 
 class ModularFlow(ModularMap):
-    """The flow of a field modulo `prime`, at the residues `values` of its symbols; a step is x -> x + f(x).
+    """The flow of a vector field modulo `prime`, at the residues `values` of its symbols; a step is x -> x + f(x).
 
-    It stands in the place of a map: its integrals are found by the same searches. A solution x(t) is a power series,
-    and the coefficients of P(x(t)) are what the values P(x_n) are along the orbit of a map: P vanishes along the
-    solution if so many of them are 0. And where a search for maps compares P at a point and at its image, here P + P'
-    stands for the second, P' = f . grad P: what is linear in both, as P(x~) - P(x) and P(x~) Q(x) - P(x) Q(x~) are,
-    becomes the same of P' and Q'.
+    It has the interface of a map, so that the same searches find its integrals. A solution x(t) is a power series, and
+    the coefficients of P(x(t)) replace the values P(x_n) along an orbit: P vanishes along the solution if enough of
+    them are 0. Where a search for maps compares P(x) with P(x~), the flow has P + P' for P(x~), with P' = f . grad P.
+    Bilinear expressions such as P(x~) - P(x) and P(x~) Q(x) - P(x) Q(x~) become P' and P' Q - P Q'.
 
-    Raises BadPrime where the prime divides denominators.
+    Raises BadPrime if the prime divides a denominator.
     """
 
     def __init__(self, field: PolynomialField, prime: int, values: Sequence[int] = (), seed: int = 0) -> None:
-        # There is no map, and nothing of one is set up.
+        # There is no map, so the constructor of ModularMap is not called.
         self.prime, self.eps, self.dim, self.values = prime, 1, field.dim, tuple(values)
         self.rng = random.Random(f"flow {seed} {prime} {self.values}")
         self.degree = field.degree
         self._f = [self._terms(f) for f in field.rhs]
         self._divergence = self._terms(field.divergence)
-        # The products that a value of f takes: a monomial is a variable times one that comes before it.
+        # The products needed for values of f: each monomial is a variable times an earlier monomial.
         tables = monomial_tables(self.dim, self.degree)
         waiting = {place for terms in self._f for _, place in terms}
         products: dict[int, tuple[int, int]] = {}
@@ -159,56 +159,56 @@ class ModularFlow(ModularMap):
         self._products = sorted(products.items())
 
     def _terms(self, polynomial: fmpq_mpoly) -> list[tuple[int, int]]:
-        """The coefficients modulo the prime, at the values of the symbols, with the numbers of their monomials."""
+        """Return the coefficients modulo the prime at the values of the symbols, with indices of monomials."""
         field, n = GF(self.prime), self.dim
-        found = []
+        terms = []
         for monomial, coefficient in polynomial.terms():
             total = field.convert(coefficient)
             for value, exponent in zip(self.values, monomial[n:], strict=True):
                 total = total * field.convert(value) ** int(exponent)
-            found.append((int(total), places_of(n, self.degree)[tuple(map(int, monomial[:n]))]))
-        return found
+            terms.append((int(total), places_of(n, self.degree)[tuple(map(int, monomial[:n]))]))
+        return terms
 
     def step(self, x: Point) -> Point:
-        """x + f(x)."""
-        here = monomial_values(x, self.degree, self.prime)
+        """Return x + f(x)."""
+        values = monomial_values(x, self.degree, self.prime)
         count(5 + sum(map(len, self._f)) / 6)
-        return tuple((a + sum(c * here[k] for c, k in f)) % self.prime for a, f in zip(x, self._f, strict=True))
+        return tuple((a + sum(c * values[k] for c, k in f)) % self.prime for a, f in zip(x, self._f, strict=True))
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
-        """1 + div f(x) and 1: as P + P' is to P for a density P."""
-        here = monomial_values(x, self.degree, self.prime)
-        return 1 + sum(c * here[k] for c, k in self._divergence), 1
+        """Return 1 + div f(x) and 1, the ratio of P + P' to P for a density P."""
+        values = monomial_values(x, self.degree, self.prime)
+        return 1 + sum(c * values[k] for c, k in self._divergence), 1
 
     def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
-        """The values of all monomials P up to a degree, and of P + f . grad P; each times its number of `by`."""
+        """Return the values of all monomials P up to a degree and of P + f . grad P, times the two factors `by`."""
         p = self.prime
-        here = monomial_values(x, degree, p)
-        count(len(here) * self.dim / 4)
+        values = monomial_values(x, degree, p)
+        count(len(values) * self.dim / 4)
         f = [after - before for before, after in zip(x, image, strict=True)]
-        there = [
-            (value + sum(e * here[place] * f[k] for k, e, place in slopes)) * by[1] % p
-            for value, slopes in zip(here, monomial_tables(self.dim, degree), strict=True)
+        image_values = [
+            (value + sum(e * values[place] * f[k] for k, e, place in slopes)) * by[1] % p
+            for value, slopes in zip(values, monomial_tables(self.dim, degree), strict=True)
         ]
-        return [by[0] * value % p for value in here], there
+        return [by[0] * value % p for value in values], image_values
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """The Taylor coefficients of all monomials along a solution: a row an order; and where it starts."""
+        """Return Taylor coefficients of monomials along a solution, a row for each order; its start; None."""
         start = self.random_point()
         return self.series(start, degree, count, support), start, None
 
     def series(self, start: Point, degree: int, orders: int, support: Sequence[int] | None = None) -> list[Values]:
-        """The first `orders` Taylor coefficients of all monomials, or some, along the solution from a point.
+        """Return the first `orders` Taylor coefficients of all monomials, or those in `support`, along a solution.
 
-        A row has the coefficients of one order.
+        Each row has the coefficients of one order.
         """
         p, factors = self.prime, monomial_tables(self.dim, degree)
         columns = len(factors) if support is None else len(support)
         in_rows = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
         count(orders * (in_rows + columns / 2) + 3 * columns)
-        # By the numbers of their monomials: 0 is that of 1, k + 1 that of the k-th variable.
+        # The keys are indices of monomials: 0 is that of 1, k + 1 that of the k-th variable.
         known = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
         known |= {place: list[int]() for place, _ in self._products}
         for order in range(1, orders):
@@ -229,26 +229,26 @@ class ModularFlow(ModularMap):
             return table[place]
 
         series = [monomial(place).coeffs() for place in (range(len(factors)) if support is None else support)]
-        # Coefficients end with the last one that is not 0: where all solutions are short, so are their lists.
+        # Lists of coefficients end with the last nonzero one, so all of them may be shorter than `orders`.
         rows: list[Values] = list(islice(zip_longest(*series, fillvalue=nmod(0, p)), orders))
         return rows + [[nmod(0, p)] * columns] * (orders - len(rows))
 
 
 @cache
 def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
-    """The exponents of all monomials of degree at most `degree`, by increasing degree."""
+    """Return the exponents of all monomials of degree at most `degree`, by increasing degree."""
     return tuple(m for k in range(degree + 1) for m in monomials(dim, k))
 
 
 @cache
 def places_of(dim: int, degree: int) -> dict[Exponent, int]:
-    """The number of each monomial among `exponents_up_to` the degree."""
+    """Return the index of each monomial in `exponents_up_to` this degree."""
     return {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
 
 
 @cache
 def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
-    """For each monomial (variable, exponent, place of the monomial with one factor less), of all its variables."""
+    """Return for each monomial and each of its variables (variable, exponent, index of the monomial divided by it)."""
     places = places_of(dim, degree)
     return [
         [(k, e, places[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
@@ -257,7 +257,7 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
 
 
 def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
-    """(variable, place of the monomial without it) for monomials with these numbers, those of each degree together."""
+    """Return for each degree (variable, place in the support of the quotient by it) of the monomials in the support."""
     exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
     places = {number: place for place, number in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]
@@ -274,7 +274,7 @@ def _layers(dim: int, degree: int) -> list[list[tuple[int, int]]]:
 
 
 def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
-    """The values of all monomials of degree at most `degree` at a point modulo a prime."""
+    """Return the values of all monomials of degree at most `degree` at a point modulo a prime."""
     values = _products(point, _layers(len(point), degree), prime)
     count(len(values) / 8)
     return list(map(int, values))
@@ -289,7 +289,7 @@ def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: 
 
 
 def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int) -> tuple[int, list[int]]:
-    """The value and the gradient at a point of the polynomial of degree at most `degree` with these coefficients."""
+    """Return the value and the gradient at a point of the polynomial with these coefficients."""
     value, gradient = 0, [0] * len(point)
     powers = monomial_values(point, degree, prime)
     count(len(vector) / 20 + 0.75 * sum(map(bool, vector)))
@@ -302,7 +302,7 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
 
 
 def slope_values(point: Point, degree: int, prime: int) -> list[list[int]]:
-    """The partial derivatives of all monomials of degree at most `degree` at a point: a row a variable."""
+    """Return the partial derivatives of all monomials of degree at most `degree`, a row for each variable."""
     powers = monomial_values(point, degree, prime)
     rows = [[0] * len(powers) for _ in point]
     count(len(point) * len(powers) / 5)
@@ -313,9 +313,9 @@ def slope_values(point: Point, degree: int, prime: int) -> list[list[int]]:
 
 
 def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime: int) -> list[int] | None:
-    """The coefficients of a product of polynomials, up to the degree; None where its degree is higher.
+    """Return the coefficients of a product of polynomials up to `degree`; None if its degree is higher.
 
-    The first ones suffice for a factor of a lower degree: the others are 0.
+    Coefficient lists may be shorter than that of all monomials; missing coefficients are 0.
     """
     exponents, places = exponents_up_to(dim, degree), places_of(dim, degree)
     row = [0] * len(exponents)
@@ -332,7 +332,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
 
 
 def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmod_poly:
-    """The polynomial modulo a prime that has these values at different nodes, of a degree below their number."""
+    """Return the polynomial modulo a prime with these values at distinct nodes, of degree less than their number."""
     table = list(values)
     count(len(nodes) ** 2 / 2)
     inverse = cache(lambda difference: pow(difference, -1, prime))
@@ -346,16 +346,16 @@ def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmo
 
 
 def slopes(function: RationalFunction, field: Any, place: Sequence[Any], n: int) -> list[Any]:
-    """The gradient of N/D in the first n variables, times D^2."""
+    """Return the gradient of N/D in the first n variables, times D^2."""
     N, D = (evaluate(part, field, place) for part in (function.numerator, function.denominator))
     upper, lower = (gradient(part)[:n] for part in (function.numerator, function.denominator))
     return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(upper, lower, strict=True)]
 
 
 class Independent:
-    """The gradients of independent functions at one random point modulo a prime: what depends on them does not count.
+    """The gradients of independent functions at one random point modulo a prime, to test other functions against.
 
-    `rows` are multiples of the gradients of those that were added.
+    `rows` are multiples of the gradients of the functions added so far.
     """
 
     def __init__(self, map_: ModularMap, functions: Sequence[RationalFunction] = ()) -> None:
@@ -363,17 +363,17 @@ class Independent:
         self.rows = [self.gradient(function) for function in functions]
 
     def gradient(self, function: RationalFunction) -> list[int]:
-        """A multiple of the gradient of a function of (variables, symbols, eps) with respect to the variables."""
+        """Return a multiple of the gradient of a function of (variables, symbols, eps) in the variables."""
         field = GF(self.map.prime)
         place = [field.convert(c) for c in (*self.point, *self.map.values, self.map.eps)]
         return [int(entry) for entry in slopes(function, field, place, self.map.dim)]
 
     def adds(self, row: list[int]) -> bool:
-        """Whether a gradient is no combination of the others; nothing is added."""
+        """Return whether a gradient is linearly independent of the others; nothing is added."""
         return rank([*self.rows, row], self.map.prime) > len(self.rows)
 
     def add(self, row: list[int]) -> bool:
-        """Add a gradient that is no combination of the others, and say whether it is none."""
+        """Add a gradient if it is linearly independent of the others, and return whether it is."""
         if not self.adds(row):
             return False
         self.rows.append(row)

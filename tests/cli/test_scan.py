@@ -39,7 +39,7 @@ def test_blocks_say_degrees_growth_and_where(plane):
         "at g =\t2",
         "degrees\t2, 4, 8, 13\tquadratic growth, dynamical degree 1, derived",
         "at g =\t1",
-        "growth\tthat of one member; singularities were followed for 40 steps",
+        "growth\tthat of one member; singularities were traced for 40 steps",
         "searched\tall members with parameters modulo 31, 37, 41; found are single points, where one of the first 4 "
         "degrees is smaller, over Q with numerators and denominators up to 23; points over number fields of degree d "
         "up to 6, with coefficients up to H where 2^12 (2 H + 1)^(d + 1) is below the product of the primes modulo "
@@ -101,8 +101,8 @@ def test_ctrl_c_ends_it_with_what_was_seen(kahanmaps, monkeypatch):
     outcome = kahanmaps(f"scan {QUICK}")
     assert outcome.status == 130
     assert outcome.out.splitlines()[1:3] == ["special\t2, 3\t1 members modulo 11", "special\t2, 3\t1 members modulo 13"]
-    assert re.match("not done\t.* members modulo 17", outcome.out.splitlines()[-1])
-    assert outcome.err.startswith("stopped early: interrupted before members modulo 17")
+    assert re.match("not done\tmembers modulo 17", outcome.out.splitlines()[-1])
+    assert outcome.err.startswith("stopped early: interrupted; not done: members modulo 17")
 
 
 def test_ctrl_c_before_anything_is_found_ends_the_process_at_once(kahanmaps, monkeypatch):
@@ -117,7 +117,7 @@ def test_ctrl_c_before_anything_is_found_ends_the_process_at_once(kahanmaps, mon
         ends.append(status)
         raise SystemExit(status)
 
-    monkeypatch.setattr("kahanmaps.laboratory.scan.scan._terms", interrupted)
+    monkeypatch.setattr("kahanmaps.laboratory.scan.scan._choose_terms", interrupted)
     monkeypatch.setattr("os._exit", ended)
     assert kahanmaps("scan zhukovski_volterra_2 --over a1").out == ""
     assert ends == [130]

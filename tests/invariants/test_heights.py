@@ -241,10 +241,10 @@ def test_a_budget_that_is_spent_ends_an_orbit_and_a_survey_and_says_so():
     assert (found.is_whole, len(found.orbits)) == (False, 2)
     assert found.orbits[0] == whole.orbits[0]
     cut = found.orbits[1].growth
-    assert cut.end.message == f"the budget was spent after step {cut.end.steps} (--effort)"
+    assert cut.end.message == f"work limit reached after step {cut.end.steps}; raise --effort"
     assert cut.heights == whole.orbits[1].growth.heights[: len(cut.heights)]
     assert 9 < len(cut.heights) < 21
-    assert found.text.endswith("; the survey ended early (--effort)")
+    assert found.text.endswith("; the survey ended early; raise --effort")
 
 
 def test_a_time_limit_leaves_the_orbits_that_were_finished():

@@ -80,7 +80,7 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
 def test_where_the_budget_is_spent_steps_are_skipped_and_reported():
     found = analyze(load("lagrange_top"), effort=-20)
     skipped = [text.partition(": ")[0] for text in found.skipped]
-    assert found.skipped == [f"{part}: the budget was spent (--effort)" for part in skipped]
+    assert found.skipped == [f"{part}: work limit reached; raise --effort" for part in skipped]
     assert {"integrals", "densities", "heights", "commuting systems"} <= set(skipped) <= set(PARTS)
     assert found.work == "effort -20, 0.0 million units"
     assert [line.text for line in dict(found.sections)["not done"]] == found.skipped

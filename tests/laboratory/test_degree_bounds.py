@@ -13,10 +13,10 @@ from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.curves import reduced
 from kahanmaps.laboratory.growth.degree_bounds import (
     bound_dynamical_degree,
-    decimal,
     degree_above,
     is_birational,
     lower_bound,
+    round_up,
 )
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.maps.kahan import as_map
@@ -94,11 +94,11 @@ def test_the_bound_holds_for_compositions_of_quadratic_transformations(permutati
 
 def test_printed_bounds_are_rounded_outward():
     assert lower_bound(10, 3, 1).contains(2)  # x + 1/x = 9/2 - 2
-    assert decimal(arb(2), -1) == "1.999999"
-    assert decimal(arb(2).sqrt().lower(), -1) == "1.414213"
-    assert decimal(arb(2, 1e-3).lower(), -1) == "1.998999"
-    assert decimal(arb(2).sqrt().upper()) == "1.414214"
-    assert decimal(arb(2)) == "2"
+    assert round_up(arb(2), -1) == "1.999999"
+    assert round_up(arb(2).sqrt().lower(), -1) == "1.414213"
+    assert round_up(arb(2, 1e-3).lower(), -1) == "1.998999"
+    assert round_up(arb(2).sqrt().upper()) == "1.414214"
+    assert round_up(arb(2)) == "2"
 
 
 def test_a_map_that_is_not_birational_is_refused(monkeypatch):

@@ -49,9 +49,9 @@ def test_minors_and_power_series_walk_the_same_curves(name, monkeypatch):
     file = load(name)
     terms = 4 if file.system.dim > 3 else 6
     for eps in (None, "2/7"):
-        monkeypatch.setattr(curves, "_MINORS", 5)
+        monkeypatch.setattr(curves, "_MAX_MINORS_DIMENSION", 5)
         by_minors = degree_growth(file.system, eps, max_terms=terms)
-        monkeypatch.setattr(curves, "_MINORS", 0)
+        monkeypatch.setattr(curves, "_MAX_MINORS_DIMENSION", 0)
         assert degree_growth(file.system, eps, max_terms=terms).degrees == by_minors.degrees
         assert len(by_minors.degrees) == terms + 1
 
@@ -59,7 +59,7 @@ def test_minors_and_power_series_walk_the_same_curves(name, monkeypatch):
 def test_minors_above_a_common_factor_that_a_mixture_has_by_chance(monkeypatch):
     """Its quotients are no polynomials: then every entry is taken."""
     expected = degree_growth(load("weierstrass").system, max_terms=5).degrees
-    monkeypatch.setattr(curves.Line, "_mixture", lambda self, entries: 0 * entries[0])
+    monkeypatch.setattr(curves.Line, "_random_combination", lambda self, entries: 0 * entries[0])
     assert degree_growth(load("weierstrass").system, max_terms=5).degrees == expected
 
 
@@ -83,7 +83,7 @@ def test_exponential_growth_does(rate, n):
 @pytest.mark.parametrize("largest", [0, 5])
 def test_the_largest_degree_is_reached_exactly_by_series_and_by_minors(largest, monkeypatch):
     """Degrees 1, 3, 7, 17: a bound of 17 admits the last one and a bound of 16 does not."""
-    monkeypatch.setattr(curves, "_MINORS", largest)
+    monkeypatch.setattr(curves, "_MAX_MINORS_DIMENSION", largest)
     system = load("henon_heiles").system
     assert degree_growth(system, max_terms=3, max_degree=17, patterns=OPEN).degrees == (1, 3, 7, 17)
     found = degree_growth(system, max_terms=3, max_degree=16, patterns=OPEN)
@@ -119,12 +119,12 @@ def test_the_budget_and_the_degree_are_limits():
     henon_heiles = load("henon_heiles").system
     found = degree_growth(henon_heiles, effort=Budget(100_000))
     assert (found.ended, found.degrees, found.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
-    assert found.message == "the budget was spent at iterate 8 (--effort)"
+    assert found.message == "work limit reached at iterate 8; raise --effort"
     assert found.to_json() == degree_growth(henon_heiles, effort=Budget(100_000)).to_json()
     known = degree_growth(load("lotka_volterra").system).patterns
     found = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
     assert (found.ended, found.enclosure) == ("derived", None)
-    assert found.notes == ("the budget was spent before bounds of the dynamical degree were proved (--effort)",)
+    assert found.notes == ("work limit reached before bounds of the dynamical degree were proved; raise --effort",)
     found = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
     assert (found.ended, found.growth) == ("budget", Growth.BOUNDED)
     found = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)

@@ -168,7 +168,7 @@ def test_steps_by_elimination_are_those_by_minors(name, monkeypatch):
         for moved in (tangents, ()):
             told = []
             for dimension in (1, 100):
-                monkeypatch.setattr("kahanmaps.laboratory.singular.jets._ELIMINATED", dimension)
+                monkeypatch.setattr("kahanmaps.laboratory.singular.jets._MIN_ELIMINATION_DIMENSION", dimension)
                 steps = islice(images_of_curve(here.equations, critical.point, direction, 30, moved), 6)
                 told.append([(step.common, step.pole, step.denominator, step.rank) for step in steps])
             assert told[0] == told[1]

@@ -156,4 +156,4 @@ def test_the_conjugate_fixed_points_of_a_generic_system_in_dimension_6_are_count
     found = fixed_points(read_system(path))
     assert (found.undecided, [(one.dimension, one.count) for one in found.found]) == ("", [(0, 64)])
     short = fixed_points(read_system(path), effort=-5)
-    assert (short.found, short.undecided) == ((), "the budget was spent (--effort)")
+    assert (short.found, short.undecided) == ((), "work limit reached; raise --effort")

@@ -34,7 +34,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     one-parameter groups of linear maps. -I reverses every homogeneous quadratic system; it is reported as trivial. A
     finite group is given by generators; --json lists its elements.
 
-    Exit status: 0 all searches completed, 2 usage error, 3 a search was too large or the budget was spent.
+    Exit status: 0 all searches completed, 2 usage error, 3 a search was too large or the work limit was reached.
     """
     file = load_system(system, {**options, "quiet": quiet})
     with SearchProgress({**options, "quiet": quiet}) as search:

@@ -74,7 +74,7 @@ def command(system: str | None, **options: Any) -> int:
     combination of values; with --json one record per line. Values without a map are listed at the end.
 
     Exit status: 0 if all decided orbits agree, 2 for a usage error, 3 if no orbit is decided, the orbits disagree, or
-    the budget was spent.
+    the work limit was reached.
     """
     eps = opt.the_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
@@ -83,7 +83,7 @@ def command(system: str | None, **options: Any) -> int:
         survey = surveyed(file, eps, options, search)
         undecided = f"undecided: {survey.text}" if survey.kind is lib.Growth.UNDECIDED else ""
         if not survey.is_whole:
-            undecided = "stopped early: the budget was spent before all orbits were finished (--effort)"
+            undecided = "stopped early: work limit reached before all orbits were finished; raise --effort"
         return Cell(
             survey.text, lambda: _record(file, options, survey, search), lambda: _print(file, survey), undecided
         )

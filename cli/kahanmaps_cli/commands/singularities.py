@@ -49,7 +49,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Where polynomials are too large, ? stands for all hypersurfaces with the same multiplicity and the same outcome,
     which are represented by random points.
 
-    Exit status: 0 done, 2 usage error, 3 undecided (the budget was spent, or two points or two eps differ).
+    Exit status: 0 done, 2 usage error, 3 undecided (the work limit was reached, or two points or two eps differ).
     """
     from kahanmaps.laboratory.singular.singularities import default_eps
 

@@ -128,7 +128,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     read by --from contain the heights at the steps 0, 1, 2, 4, 8, ... only.
 
     Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
-    budget was spent before all orbits were finished (the picture is written).
+    work limit was reached before all orbits were finished (the picture is written).
     """
     require_heights(options)
     file: lib.SystemFile | None = None
@@ -151,7 +151,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     if early := sum(curve.status in _EARLY for curve in curves):
         messages.append(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
     if not whole and not progress.is_over:
-        messages.append("stopped early: the budget was spent before all orbits were finished (--effort)")
+        messages.append("stopped early: work limit reached before all orbits were finished; raise --effort")
     return Drawing(figure, file, messages, 3 if early or not whole or progress.is_over else 0)
 
 

@@ -32,7 +32,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     exponential growth are written beside them, as far as space permits. With
     --modulo P the plane over GF(P) with all special parameters is shown.
 
-    Exit status: 0 done, 2 usage error, 3 the budget was spent, 130 interrupted
+    Exit status: 0 done, 2 usage error, 3 the work limit was reached, 130 interrupted
     (the picture is written if it is not empty).
     """
     window = window_from(options, 2)

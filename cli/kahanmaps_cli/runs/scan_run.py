@@ -97,8 +97,8 @@ def ending(found: lib.Scan, search: SearchProgress) -> int:
         return 0
     is_interrupted = found.ended == "interrupted"
     if not search.quiet:
-        why = "interrupted" if is_interrupted else "the budget was spent (--effort)"
-        print_stderr(f"stopped early: {why} before {', '.join(found.omitted)}")
+        why = "interrupted" if is_interrupted else "work limit reached; raise --effort"
+        print_stderr(f"stopped early: {why}; not done: {', '.join(found.omitted)}")
     return INTERRUPTED if is_interrupted else 3
 
 

@@ -1,17 +1,17 @@
-"""The curve t -> Phi^n(a + b t) that a birational map makes of a random line over GF(p), exactly.
+"""The images t -> Phi^n(a + b t) of a random line under a birational map over GF(p), exactly.
 
-The curve is kept as dim + 1 polynomials without a common factor. A map has one or several factors, and what each makes
-of the curve is the kernel of the n x (n + 1) matrix of forms in its polynomials that is the equation of the factor
-(maps/equation.py). There are two ways to it:
+The curve is stored as dim + 1 polynomials without a common factor. A map has one or several factors. The image of the
+curve under a factor is the kernel of an n x (n + 1) matrix of forms in its polynomials, the equation of the factor
+(maps/equation.py). The kernel is computed in one of two ways:
 
-    minors  up to dimension 5: the maximal minors, and the gcd of two random combinations of them divided out;
-    series  above it, where minors are many: M(x) x~ = r(x) in power series in t, to as
-            many terms as the next curve needs. Its polynomials follow from the shortest recurrence (massey-1969) of the
-            series of a random quotient of two affine functions, whose generating function has the common denominator
-            of the coordinates. All terms to spare of all coordinates are tried.
+    minors  up to dimension 5: the maximal minors, divided by the gcd of two random combinations of them;
+    series  in higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as
+            many terms as the next curve needs. The shortest recurrence (massey-1969) of the series of a random quotient
+            of two affine functions gives the common denominator of the coordinates. All further terms of all
+            coordinates must agree with it.
 
-The forms of an explicit map take the place of minors in any dimension. In the plane minors are five to ten times as
-fast as series; in dimension 6 the two are even.
+For an explicit map its forms take the place of the minors, in any dimension. In the plane minors are five to ten times
+as fast as series; in dimension 6 both take the same time.
 """
 
 from __future__ import annotations
@@ -31,43 +31,43 @@ from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel, row_unit
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map, MapFamily
 
-_MINORS = 5  # the largest dimension in which minors are taken
-_MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^60
+_MAX_MINORS_DIMENSION = 5  # the largest dimension in which minors are used
+_MARGIN = 8  # extra terms of a series beyond those that determine the curve; a wrong one agrees once in 2^60
 
 
 class Ended(StrEnum):
-    """What ends the walk along curves, or the search for degrees."""
+    """The reason why a computation of degrees ended."""
 
-    RECURRENCE = "recurrence"  # one was found, with terms to spare
-    DERIVED = "derived"  # from the singularity patterns, and enough measured terms agree
+    RECURRENCE = "recurrence"  # a recurrence was found and confirmed by further terms
+    DERIVED = "derived"  # the recurrence follows from the singularity patterns, and enough measured terms agree
     PROVED = "proved"  # the degrees are those of powers of a matrix
-    UNCONFIRMED = "unconfirmed"  # a recurrence fits, and the patterns of the singularities are not known to the end
-    TERMS = "terms"  # as many as asked for
-    BUDGET = "budget"  # is spent
-    STOPPED = "stopped"  # by a TimeLimit
-    DEGREE = "degree"  # the next is over the limit
+    UNCONFIRMED = "unconfirmed"  # a recurrence fits, but not all singularity patterns have settled
+    TERMS = "terms"  # the requested number of terms was computed
+    BUDGET = "budget"  # the budget was spent
+    STOPPED = "stopped"  # a TimeLimit stopped it
+    DEGREE = "degree"  # the next degree exceeds the limit
     CONSTANT = "constant"  # the iterate is a constant map
-    SINGULAR = "singular"  # the next iterate exists nowhere
-    LINES = "lines"  # the lines do not agree
+    SINGULAR = "singular"  # the next iterate is nowhere defined
+    LINES = "lines"  # the degrees along different lines differ
 
 
 class Stopped(Exception):
-    """Why no further curve is to be had, or no further degree is asked for."""
+    """No further curve or degree is computed; `ended` is the kind of reason, `message` a sentence."""
 
     def __init__(self, ended: Ended, message: str) -> None:
         self.ended, self.message = ended, message
 
 
 def reduced(map_: MapFamily, eps: fmpq | None, rng: random.Random) -> Map:
-    """The map modulo a random prime of 61 bits, at a random eps where none is given. Raises BadPrime."""
+    """Return the map modulo a random prime of 61 bits, at a random eps if none is given. Raises BadPrime."""
     field = GF(random_prime(rng))
     return map_.at(field.random(rng) if eps is None else field.convert(eps), field)
 
 
 class Line:
-    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X : Z), Z below, without common factor.
+    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X : Z) without common factor, Z the denominator.
 
-    For a map over GF(p), along a random line or that which `start` gives.
+    The map is over GF(p); the line a + b t is random or given as `start`.
     """
 
     def __init__(
@@ -90,87 +90,93 @@ class Line:
 
     @property
     def is_explicit(self) -> bool:
-        """Whether images are values of short forms."""
+        """Whether every factor of the map is given by explicit formulas."""
         return all(equation.explicit is not None for equation in self._equations)
 
     def step(self, guess: int) -> None:
-        """One step on. Raises ZeroDivisionError where points of the line have no image, Stopped at a limit."""
+        """Replace the curve by its image; `guess` is the expected degree of the image.
+
+        Raises ZeroDivisionError if the map is undefined at the points of the curve, Stopped at a limit.
+        """
         for equation in self._equations:
             too_large = Stopped(Ended.DEGREE, f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
             curve: list[nmod_poly] | None = None
-            if equation.dim <= _MINORS or equation.explicit is not None:
-                curve = self._by_minors(equation)
-            most = 2 * self._max_degree + _MARGIN + 1
-            length = min(2 * guess + _MARGIN + 1, most)
+            if equation.dim <= _MAX_MINORS_DIMENSION or equation.explicit is not None:
+                curve = self._image_by_minors(equation)
+            max_length = 2 * self._max_degree + _MARGIN + 1
+            length = min(2 * guess + _MARGIN + 1, max_length)
             while curve is None:
                 self._require_budget()
-                curve = self._curve(self._image(equation, length), length)
-                if curve is None and length == most:
+                curve = self._reconstruct_curve(self._image_series(equation, length), length)
+                if curve is None and length == max_length:
                     raise too_large
-                length = min(2 * length, most)
+                length = min(2 * length, max_length)
             degree = max(0, *(int(entry.degree()) for entry in curve))
             if degree > self._max_degree:
                 raise too_large
             self._X, self.degree = curve, degree
         self.steps += 1
 
-    def _by_minors(self, equation: Equation) -> list[nmod_poly]:
+    def _image_by_minors(self, equation: Equation) -> list[nmod_poly]:
         def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
             self._require_budget()
             product: nmod_poly = counted_product(left, right)
             return product
 
-        *above, below = equation.image(self._X, nmod_poly([0], self.prime), times)
-        if below.is_zero():
+        *numerators, denominator = equation.image(self._X, nmod_poly([0], self.prime), times)
+        if denominator.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
-        common = below.gcd(self._mixture(above))
-        count(gcd_units(len(below), len(common)))
+        common = denominator.gcd(self._random_combination(numerators))
+        count(gcd_units(len(denominator), len(common)))
         self._require_budget()
         curve, t = [], nmod(self._rng.randrange(self.prime), self.prime)
-        for entry in (*above, below):
+        for entry in (*numerators, denominator):
             count(product_units(len(common), len(entry) - len(common) + 1) + len(entry) / 20)
             quotient = entry // common
-            if quotient(t) * common(t) != entry(t):  # a mixture with a factor that is not in all: once in about p
-                common = reduce(nmod_poly.gcd, above, below)
-                return [entry // common for entry in (*above, below)]
+            # Once in about p the random combination has a factor that not all numerators have.
+            if quotient(t) * common(t) != entry(t):
+                common = reduce(nmod_poly.gcd, numerators, denominator)
+                return [entry // common for entry in (*numerators, denominator)]
             curve.append(quotient)
         return curve
 
-    def _mixture(self, entries: list[nmod_poly]) -> nmod_poly:
+    def _random_combination(self, entries: list[nmod_poly]) -> nmod_poly:
         zero = nmod_poly([0], self.prime)
         return sum((entry * nmod(self._rng.randrange(self.prime), self.prime) for entry in entries), zero)
 
     def _require_budget(self) -> None:
         if self._budget.is_spent:
-            raise Stopped(Ended.BUDGET, f"the budget was spent at iterate {self.steps + 1} (--effort)")
+            raise Stopped(Ended.BUDGET, f"work limit reached at iterate {self.steps + 1}; raise --effort")
 
-    def _image(self, equation: Equation, length: int) -> list[nmod_poly]:
-        """The coordinates of the next curve as power series, to `length` terms."""
+    def _image_series(self, equation: Equation, length: int) -> list[nmod_poly]:
+        """Return the coordinates of the next curve as power series, to `length` terms."""
         X = [entry.truncate(length) for entry in self._X]
         values = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
         count(row_units(equation, length))
         try:
-            *x, below = kernel(equation.rows(values, nmod_poly([0], self.prime)), 1, length, [], self._require_budget)
+            rows = equation.rows(values, nmod_poly([0], self.prime))
+            *x, denominator = kernel(rows, 1, length, [], self._require_budget)
         except PrecisionTooLow:
             raise ZeroDivisionError("the point t = 0 of the line has no image") from None
-        if not int(below[0]):
+        if not int(denominator[0]):
             raise ZeroDivisionError("the point t = 0 of the line has no image")
         count(series_units(length) + len(x) * product_units(length, length))
-        inverse = below.inverse_series_trunc(length)
+        inverse = denominator.inverse_series_trunc(length)
         return [entry.mul_low(inverse, length) for entry in x]
 
-    def _curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
-        """The polynomials with these quotients, or None where there are not enough terms to be certain."""
+    def _reconstruct_curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
+        """Return polynomials with these quotients as series, or None if there are not enough terms to be certain."""
         for _ in range(2):
-            above, below = (
-                nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._mixture(x) for _ in range(2)
+            upper, lower = (
+                nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._random_combination(x) for _ in range(2)
             )
-            if int(below[0]) == 0:
+            if int(lower[0]) == 0:
                 continue
             count(series_units(length) + minpoly_units(length) + (2 + len(x)) * product_units(length, length))
-            inverse = below.inverse_series_trunc(length)
-            values = [int(c) for c in above.mul_low(inverse, length).coeffs()]
-            # The quotient may be as high above as below: without its first term it is a proper fraction over t.
+            inverse = lower.inverse_series_trunc(length)
+            values = [int(c) for c in upper.mul_low(inverse, length).coeffs()]
+            # Numerator and denominator may have the same degree; without its first term the series is t times a
+            # proper fraction.
             values = (values + [0] * (length - len(values)))[1:]
             minimal = self._context.minpoly(values)
             degree = int(minimal.degree())
@@ -179,7 +185,7 @@ class Line:
             denominator = nmod_poly([int(c) for c in reversed(minimal.coeffs())], self.prime)
             first = denominator.mul_low(inverse, length)
             curve = [*(first.mul_low(entry, length) for entry in x), first]
-            # Only for functionals in special position is the denominator not that of all coordinates.
+            # The denominator is that of all coordinates unless the random functions are in special position.
             if all(entry.degree() <= degree for entry in curve):
                 return curve
         return None

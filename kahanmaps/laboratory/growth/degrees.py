@@ -401,7 +401,7 @@ class _Search:
         self.measured = found
         enclosure = bound_dynamical_degree(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
         if enclosure is None and self.map.dim == 2 and self.budget.is_spent:
-            unproved = "the budget was spent before bounds of the dynamical degree were proved (--effort)"
+            unproved = "work limit reached before bounds of the dynamical degree were proved; raise --effort"
             return replace(found, notes=(*found.notes, unproved))
         return replace(found, enclosure=enclosure)
 

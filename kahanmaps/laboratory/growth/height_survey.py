@@ -1,8 +1,8 @@
-"""How heights grow along exact orbits from several starts and for several eps, and whether these agree.
+"""The growth of heights along exact orbits from several initial points and for several eps, compared.
 
-One orbit says little: it may lie on a special curve, and one eps may be special (for q'' = -w^2 q + Q(q) with
-eps^2 w^2 = 1 the fourth iterate of the Kahan map is the identity). The kind of growth of one orbit is decided by the
-rules of `kahanmaps.invariants.heights`; here orbits are drawn and compared.
+A single orbit is weak evidence: it may lie on a special curve, and its eps may be special (for q'' = -w^2 q + Q(q)
+with eps^2 w^2 = 1 the fourth iterate of the Kahan map is the identity). `kahanmaps.invariants.heights` decides the
+kind of growth of one orbit; this module chooses the orbits and compares them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ DEFAULT_STEPS = 60
 DEFAULT_MAX_DIGITS = 20_000
 _NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
 _DENOMINATORS = (7, 8, 9, 16, 25, 27)
-_MOST_STARTS = 1000
+_MAX_STARTS = 1000
 _GROWN = {
     Growth.PERIODIC: "points come back",
     Growth.BOUNDED: "bit lengths stay bounded",
@@ -43,12 +43,12 @@ _GROWN = {
     Growth.QUADRATIC: "bit lengths grow quadratically",
     Growth.EXPONENTIAL: "bit lengths grow exponentially",
 }
-_DRAWS = 20  # starts tried in place of one whose orbit meets a singular point
+_MAX_DRAWS = 20  # random initial points tried until the orbit of one does not meet a singular point
 
 
 @dataclass(frozen=True)
 class SurveyedOrbit:
-    """One orbit of the survey: its eps, its start and the growth of its heights."""
+    """One orbit of the survey: its eps, its initial point and the growth of its heights."""
 
     eps: fmpq
     start: tuple[fmpq, ...]
@@ -61,37 +61,37 @@ class SurveyedOrbit:
 
 @dataclass(frozen=True)
 class HeightSurvey(PrintableResult):
-    """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where the budget
-    or a TimeLimit ended it.
+    """The orbits of the survey, in the order of eps and then of initial points.
 
-    For a map that has no eps that of the orbits means nothing. `heights.height` says what heights over a field are.
+    `is_whole` is False if the budget or a TimeLimit ended the survey. If the map has no eps, that of the orbits has no
+    meaning. `heights.height` defines heights over number fields.
     """
 
     orbits: tuple[SurveyedOrbit, ...]
     is_whole: bool
     has_eps: bool = True
-    over: str = ""  # the number field, where it is not Q
+    over: str = ""  # the number field, if it is not Q
 
     @property
     def kinds(self) -> tuple[Growth, ...]:
         """The different kinds of growth that were decided, in the order of their first orbits."""
-        found = [orbit.growth.kind for orbit in self.orbits]
-        return tuple(dict.fromkeys(kind for kind in found if kind is not Growth.UNDECIDED))
+        kinds = [orbit.growth.kind for orbit in self.orbits]
+        return tuple(dict.fromkeys(kind for kind in kinds if kind is not Growth.UNDECIDED))
 
     @property
     def kind(self) -> Growth:
-        """The kind that all decided orbits have, one or more for each eps; otherwise undecided."""
-        every = {orbit.eps for orbit in self.orbits}
+        """The kind of all decided orbits, if each eps has a decided orbit and they agree; otherwise undecided."""
+        all_eps = {orbit.eps for orbit in self.orbits}
         decided = {orbit.eps for orbit in self.orbits if orbit.growth.kind is not Growth.UNDECIDED}
-        return self.kinds[0] if len(self.kinds) == 1 and decided == every else Growth.UNDECIDED
+        return self.kinds[0] if len(self.kinds) == 1 and decided == all_eps else Growth.UNDECIDED
 
     @property
     def text(self) -> str:
-        """One sentence: the kind, and how many orbits say so; or where they disagree; and that it was cut, if so."""
-        total, cut = len(self.orbits), "" if self.is_whole else "; the survey ended early (--effort)"
+        """One sentence: the kind of growth and the number of orbits that have it, or how they disagree."""
+        total, cut = len(self.orbits), "" if self.is_whole else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
-            # Each eps may have a kind of its own, the same for all its starts.
+            # If all initial points of one eps agree, the kinds differ between the eps.
             known = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
             which = "the eps" if len(known) == len({value for value, _ in known}) else "the starts"
             return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)}){cut}"
@@ -105,10 +105,10 @@ class HeightSurvey(PrintableResult):
         return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}{cut}"
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each orbit, for `pandas.DataFrame(found.rows())` and the like."""
+        """Return a row for each orbit, for example for `pandas.DataFrame(survey.rows())`."""
         return [
-            {"eps": str(one.eps), "start": format_point(one.start), "growth": str(one.growth.kind)}
-            for one in self.orbits
+            {"eps": str(orbit.eps), "start": format_point(orbit.start), "growth": str(orbit.growth.kind)}
+            for orbit in self.orbits
         ]
 
     def to_json(self) -> dict[str, Any]:
@@ -129,13 +129,27 @@ def height_survey(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> HeightSurvey:
-    """The growth of heights along exact orbits over Q from given starts, or so many random ones, for one or two eps.
+    """Measure the growth of heights along exact orbits over Q, for one or two eps.
 
-    A system stands for its Kahan map. `eps` is one exact number (or `time_step` = 2 eps) or None for 1/10 and 3/11.
-    Orbits end at `max_digits` digits a number; when the budget is spent, which doubles with each more of `effort`, no
-    orbit is begun, and the one in flight ends. A TimeLimit leaves the orbits before that one, unless `effort` is a
-    Budget: then this is a stage of something else, which the TimeLimit ends. A random start whose orbit meets a
-    singular point is replaced by another. Raises InputError for wrong values.
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        eps: half the time step (exact), or None for 1/10 and 3/11.
+        time_step: 2 eps, instead of eps.
+        starts: the initial points, or how many random ones; a random one whose orbit meets a singular point is
+            replaced by another.
+        steps: the length of the orbits.
+        max_digits: orbits end at a number with more digits; None for no limit.
+        effort: each increase by 1 doubles the work limit, at which the current orbit ends and no other is started.
+        normal_form: the normal form of the system, if it is known.
+        seed: the random seed.
+        progress: called with a message before each orbit.
+
+    Returns:
+        The survey. After a TimeLimit it has the orbits completed before, unless `effort` is a Budget: then the survey
+        is a stage of another computation, and the TimeLimit is raised.
+
+    Raises:
+        InputError: for wrong values.
 
     >>> from kahanmaps.documents.catalog import load
     >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
@@ -143,42 +157,42 @@ def height_survey(
     (<Growth.QUADRATIC: 'quadratic'>, 'bit lengths grow quadratically on all 4 exact orbits tried, at 2 values of eps')
     """
     eps = resolve_eps(eps, time_step)
-    if isinstance(starts, int) and not 1 <= starts <= _MOST_STARTS:
-        raise InputError(f"found {starts} starts, expected 1 to {_MOST_STARTS}")
+    if isinstance(starts, int) and not 1 <= starts <= _MAX_STARTS:
+        raise InputError(f"found {starts} starts, expected 1 to {_MAX_STARTS}")
     if not isinstance(starts, int) and len(starts) == 0:
         raise InputError("found no starts, expected at least one")
     if not isinstance(starts, int) and not all(hasattr(start, "__len__") for start in starts):
-        starts = [starts]  # one of them
+        starts = [starts]  # a single initial point
     is_stage, budget = isinstance(effort, Budget), budget_for("heights", effort)
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
     field = "" if map_.root is None else map_.root.number_field.name
     for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
-        over = map_.at(value)
+        map_at_eps = map_.at(value)
         rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")
-        wanted = [None] * starts if isinstance(starts, int) else [tuple(map(rational, start)) for start in starts]
-        for k, start in enumerate(wanted):
+        points = [None] * starts if isinstance(starts, int) else [tuple(map(rational, start)) for start in starts]
+        for k, start in enumerate(points):
             if orbits and budget.is_spent:
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
             try:
-                progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
-                for _ in range(_DRAWS if start is None else 1):
-                    # Off the invariant curves of small equation that many maps have, such as eps^2 x^2 = 1: numerators
-                    # are primes, so that a coordinate is no simple multiple of 1/eps.
+                progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(points)}")
+                for _ in range(_MAX_DRAWS if start is None else 1):
+                    # Many maps have invariant curves with short equations, such as eps^2 x^2 = 1. To avoid these,
+                    # numerators are primes: a coordinate is no simple multiple of 1/eps.
                     candidate = start or tuple(
                         fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS))
                         for _ in range(map_.dim)
                     )
-                    found = height_growth(
-                        over, candidate, steps, normal_form=normal_form, max_digits=max_digits, budget=budget
+                    growth = height_growth(
+                        map_at_eps, candidate, steps, normal_form=normal_form, max_digits=max_digits, budget=budget
                     )
-                    if found.end.status != "singular" or budget.is_spent:
+                    if growth.end.status != "singular" or budget.is_spent:
                         break
             except TimeLimit:
                 if is_stage or not orbits:
                     raise
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
-            orbits.append(SurveyedOrbit(value, tuple(candidate), found))
-            if found.end.status == "interrupted":
+            orbits.append(SurveyedOrbit(value, tuple(candidate), growth))
+            if growth.end.status == "interrupted":
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
     return HeightSurvey(tuple(orbits), True, map_.has_eps, field)

@@ -1,9 +1,9 @@
-"""Linear recurrences of integer sequences: the shortest one, how the sequence grows, and its growth rate exactly.
+"""Shortest linear recurrences of integer sequences, their kind of growth, and the exact growth rate.
 
 A sequence of integers that satisfies a linear recurrence over Q satisfies one of the same length with integer
-coefficients and leading coefficient 1 (fatou-1906). So the shortest recurrence is looked for modulo one large prime
-(massey-1969), lifted to integers, and then tried exactly on every term. Held-out terms speak for it; nothing here
-proves that it goes on.
+coefficients and leading coefficient 1 (fatou-1906). So the shortest recurrence is computed modulo one large prime
+(massey-1969), lifted to integers, and then checked exactly on every term. Terms that were not needed to find it are
+evidence for it; they do not prove that it holds for all further terms.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from kahanmaps.invariants.growth import Growth
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
 _MODULO = fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
-_BITS = 256  # of the balls for roots
-_MOST_CLASSES = 12  # residue classes in a closed form
+_BITS = 256  # working precision of the roots
+_MAX_CLASSES = 12  # residue classes in a closed form
 
 
 @dataclass(frozen=True)
 class GrowthRate:
-    """The largest modulus of a characteristic root, where it is one itself: lim a_n^(1/n) for positive sequences.
+    """The largest modulus of the characteristic roots if it is itself a root: lim a_n^(1/n) for positive sequences.
 
-    `minimal_polynomial` is irreducible over Q; `enclosure` is text of a ball that contains the number for certain;
-    `multiplicity` is that of the root (more than 1: the growth has a polynomial factor).
+    `minimal_polynomial` is irreducible over Q, `enclosure` is the text of a ball that provably contains the number, and
+    `multiplicity` is that of the root; if it is more than 1, the growth has a polynomial factor.
     """
 
     minimal_polynomial: fmpz_poly
@@ -43,7 +43,7 @@ class GrowthRate:
 
     @property
     def text(self) -> str:
-        """The number, exactly where it is an integer, else rounded with its minimal polynomial."""
+        """The number: exact if it is an integer, else rounded and with its minimal polynomial."""
         if self.minimal_polynomial.degree() == 1:
             return str(-self.minimal_polynomial[0])
         return f"{self.digits}, root of {format_univariate(fmpq_poly(self.minimal_polynomial))}"
@@ -56,26 +56,27 @@ class GrowthRate:
 
 
 def growth_rate(minimal_polynomial: fmpz_poly, ball: arb, multiplicity: int) -> GrowthRate:
-    """The root of an irreducible polynomial that is in the ball."""
-    whole = str(-minimal_polynomial[0])
-    digits = (whole, whole) if minimal_polynomial.degree() == 1 else (ball.str(40), ball.str(21, radius=False))
-    return GrowthRate(minimal_polynomial, *digits, multiplicity)
+    """Return the root of an irreducible polynomial that lies in the ball."""
+    if minimal_polynomial.degree() == 1:
+        integer_text = str(-minimal_polynomial[0])
+        return GrowthRate(minimal_polynomial, integer_text, integer_text, multiplicity)
+    return GrowthRate(minimal_polynomial, ball.str(40), ball.str(21, radius=False), multiplicity)
 
 
 def polynomial_growth(power: int) -> Growth:
-    """The kind of growth as n^power."""
+    """Return the kind of growth of n^power."""
     classes = (Growth.BOUNDED, Growth.LINEAR, Growth.QUADRATIC)
     return classes[power] if power < 3 else Growth.POLYNOMIAL
 
 
 @dataclass(frozen=True)
 class Recurrence:
-    """A linear recurrence of a_0, a_1, ..., shortest possible, that holds for all `terms` terms at hand.
+    """The shortest linear recurrence of a_0, a_1, ..., which holds for all `terms` given terms.
 
-    `characteristic` is monic with integer coefficients, [c_0, c_1, ..., 1] standing for
+    `characteristic` is monic with integer coefficients; [c_0, c_1, ..., 1] stands for
     a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. A factor x^k means that the first k terms (`preperiod`) are exempt
-    from the recurrence of the others. `checked` of the terms were not needed to find it. Where it follows from
-    something else, so many of the first values were `measured`, and the others continue them.
+    from the recurrence of the others. `checked` of the terms were not needed to find it. If the recurrence was derived
+    from other results, only the first `measured` values were measured, and the recurrence gives the others.
 
     >>> found = find_recurrence([2 * n * n + 1 for n in range(12)])
     >>> found.characteristic, found.order, found.checked, str(found.growth)
@@ -90,24 +91,24 @@ class Recurrence:
 
     @property
     def terms(self) -> int:
-        """The number of terms it was found from, or tried on."""
+        """The number of terms that it was found from or checked on."""
         return len(self.values) if self.measured is None else self.measured
 
     @property
     def order(self) -> int:
-        """Its length, the preperiod counted."""
+        """The length of the recurrence, including the preperiod."""
         return int(self.characteristic.degree())
 
     @property
     def checked(self) -> int:
-        """The number of terms that were not needed to find it, and satisfy it."""
+        """The number of terms that satisfy the recurrence and were not needed to find it."""
         return self.terms - 2 * self.order if self.measured is None else self.terms
 
     @cached_property
     def factors(self) -> tuple[tuple[fmpz_poly, int], ...]:
         """The irreducible factors of the characteristic polynomial over Q with their multiplicities, x left out."""
-        found = self.characteristic.factor()[1]
-        return tuple((factor, int(k)) for factor, k in found if factor[0] != 0)
+        factors = self.characteristic.factor()[1]
+        return tuple((factor, int(k)) for factor, k in factors if factor[0] != 0)
 
     @cached_property
     def preperiod(self) -> int:
@@ -116,7 +117,7 @@ class Recurrence:
 
     @cached_property
     def is_polynomial(self) -> bool:
-        """Whether all roots other than 0 are roots of unity: decided exactly."""
+        """Whether all roots other than 0 are roots of unity (decided exactly)."""
         return all(int(factor.is_cyclotomic()) for factor, _ in self.factors)
 
     @property
@@ -147,8 +148,8 @@ class Recurrence:
         with flint.ctx.workprec(_BITS):
             moduli = []
             for factor, multiplicity in self.factors:
-                found: Any = factor.complex_roots()  # pairs, whatever the stubs say
-                for root, _ in found:
+                roots: Any = factor.complex_roots()  # pairs; the stubs of python-flint are wrong here
+                for root, _ in roots:
                     moduli.append(abs(root))
                     # FLINT isolates real roots as such: their imaginary part is the exact 0.
                     if root.imag == 0 and root.real > 0 and (best is None or root.real > best[0]):
@@ -168,7 +169,7 @@ class Recurrence:
             return "0" if not self.factors else None
         period = math.lcm(*(int(factor.is_cyclotomic()) for factor, _ in self.factors))
         size = max(k for _, k in self.factors)
-        if period > _MOST_CLASSES:
+        if period > _MAX_CLASSES:
             return None
         forms = []
         for residue in range(period):
@@ -183,7 +184,7 @@ class Recurrence:
 
     @property
     def closed_form_text(self) -> str | None:
-        """The closed form, with the first n that it holds for where this is not 0."""
+        """The closed form, with the first n for which it holds unless that is 0."""
         after = f" for n >= {self.preperiod}"
         if not self.closed_form or not self.preperiod:
             return self.closed_form
@@ -191,7 +192,7 @@ class Recurrence:
 
     @property
     def characteristic_text(self) -> str:
-        """The characteristic polynomial by its irreducible factors over Q.
+        """The characteristic polynomial as a product of irreducible factors over Q.
 
         >>> find_recurrence([2 * n * n + 1 for n in range(12)]).characteristic_text
         '(t - 1)^3'
@@ -205,7 +206,7 @@ class Recurrence:
 
     @property
     def text(self) -> str:
-        """The recurrence as an equation, with what speaks for it."""
+        """The recurrence as an equation, with the evidence for it."""
         if self.measured is not None:
             return f"{self.equation}, derived from the singularity patterns; {self.terms} measured terms agree"
         return f"{self.equation}, found from {self.terms - self.checked} terms, confirmed by {self.checked} more"
@@ -221,15 +222,15 @@ class Recurrence:
         return f"a(n) = {right}{after}"
 
     def predict(self, n: int) -> int:
-        """a_n as the recurrence continues the sequence.
+        """Return a_n; beyond the given terms the recurrence continues the sequence.
 
         >>> find_recurrence([1, 2, 4, 8, 16]).predict(10)
         1024
         """
-        values, below = list(self.values), [int(c) for c in self.characteristic.coeffs()[:-1]]
+        values, coefficients = list(self.values), [int(c) for c in self.characteristic.coeffs()[:-1]]
         while len(values) <= n:
             last = values[len(values) - self.order :]
-            values.append(-sum(c * value for c, value in zip(below, last, strict=True)))
+            values.append(-sum(c * value for c, value in zip(coefficients, last, strict=True)))
         return values[n]
 
     def to_json(self) -> dict[str, Any]:
@@ -243,11 +244,11 @@ class Recurrence:
 
 
 def find_recurrence(values: Sequence[int]) -> Recurrence | None:
-    """The shortest linear recurrence over Q of an integer sequence a_0, a_1, ..., or None.
+    """Return the shortest linear recurrence over Q of an integer sequence a_0, a_1, ..., or None.
 
-    It is accepted where it holds for all terms, and for at least 2 terms and at least a third of its order more than
-    the 2 order terms that determine it. The first terms may be exempt (`preperiod`); they count in the order.
-    Raises InputError where a value is not an integer.
+    A recurrence of order k is accepted if it holds for all terms, and these are more than the 2k terms that determine
+    it by at least 2 and at least k/3. The first terms may be exempt (`preperiod`); they count in the order.
+    Raises InputError if a value is not an integer.
 
     >>> find_recurrence([1, 6, 36, 216, 1296]).rate.text
     '6'
@@ -272,5 +273,5 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
 
 
 def needed_checks(order: int) -> int:
-    """The number of held-out terms without which a recurrence of this order is not accepted."""
+    """Return how many terms beyond those that determine it a recurrence of this order needs to be accepted."""
     return max(2, -(-order // 3))

@@ -212,7 +212,7 @@ def densities_of(
     """Run `find_densities` on the maps of a laboratory."""
     flow = laboratory.flow
     if laboratory.defect:
-        return DensitySearch(*laboratory.asked, (), -1, laboratory.defect, flow=flow)
+        return DensitySearch(*laboratory.request, (), -1, laboratory.defect, flow=flow)
     period = None if flow else closing_period(laboratory.maps)
     product = anti_invariant = None
     theorem, dim, cut = _theorem(laboratory), laboratory.map.dim, ""
@@ -232,10 +232,10 @@ def densities_of(
             phi = RationalFunction(prod(x[:dim], start=x[0] ** 0), x[0] ** 0)
             proof = product_density_invariant(laboratory.system, phi)
             densities = densities if proof is None else [FoundDensity(phi, Certainty.PROVED, proof), *densities]
-    result = DensitySearch(*laboratory.asked, tuple(densities), tried, cut, period, anti_invariant, flow=flow)
+    result = DensitySearch(*laboratory.request, tuple(densities), tried, cut, period, anti_invariant, flow=flow)
     if result.may_use_integrals:
         if integrals is None:
-            file, symbols, eps, seed, _ = laboratory.asked
+            file, symbols, eps, seed, _ = laboratory.request
             searched = find_integrals(file, symbols=symbols, eps=eps, effort=budget, seed=seed, progress=progress)
             integrals = searched.integrals
         progress("densities that are products of factors of integrals")

@@ -281,7 +281,7 @@ def integrals_of(
     laboratory: Laboratory, max_degree: int | None, budget: Budget, progress: Callable[[str], None]
 ) -> IntegralSearch:
     """Run `find_integrals` on the maps of a laboratory."""
-    flow, seed = laboratory.flow, laboratory.asked[3]
+    flow, seed = laboratory.flow, laboratory.request[3]
     # The stages: orbits; fast searches and their formulas; products; larger relations and their formulas; iterates.
     # Work that a stage does not use goes to later stages, and no stage can use up the share of a later one.
     stages = budget.share([3, 4, 1, 3, 3])
@@ -311,7 +311,7 @@ def integrals_of(
 
     def result(profile: Profile, reason: str) -> IntegralSearch:
         return IntegralSearch(
-            *laboratory.asked,
+            *laboratory.request,
             tuple(collected.integrals),
             profile,
             reason,
@@ -437,7 +437,7 @@ def _formulas(
 class _Collected:
     """Functionally independent integrals with verdicts, none of them refuted.
 
-    `cut` names the searches that were skipped because the budget was spent.
+    `cut` names the searches that were skipped because the work limit was reached.
     """
 
     def __init__(self, laboratory: Laboratory, progress: Callable[[str], None]) -> None:

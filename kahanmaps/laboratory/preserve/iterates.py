@@ -200,7 +200,7 @@ def integrals_in_iterates(
 
     Returns:
         Formulas that are still to be verified, those in x with an empty text for their factored form; and a sentence
-        on what was skipped because the budget was spent. Raises NoPoint.
+        on what was skipped because the work limit was reached. Raises NoPoint.
 
     Source: petrera-suris-2018.
     """

@@ -149,7 +149,7 @@ def add_relation_spaces(
     """Add spaces contained in the span of the relations of a degree until the integrals of the profile are reached.
 
     Only degrees in which the relations of all orbits span at most `largest` dimensions are tried. Returns a sentence
-    on the degrees that were skipped because the budget was spent; empty otherwise.
+    on the degrees that were skipped because the work limit was reached; empty otherwise.
     """
     small_nullities = takewhile(lambda size: size < largest, profile.nullities)
     for degree in [degree for degree, size in enumerate(small_nullities, 1) if size]:

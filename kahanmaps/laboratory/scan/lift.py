@@ -1,12 +1,12 @@
-"""Pieces modulo several small primes that belong to one variety over Q: by Chinese remainders and reconstruction.
+"""Lift components modulo several small primes to varieties over Q, by Chinese remainders and rational reconstruction.
 
-What is reconstructed from some primes has to be there modulo the others. Nothing here proves that it is a piece of the
-family over Q: that is tried on members of it.
+A variety reconstructed from some of the primes must also appear modulo the others. This does not prove that it is a
+component over Q; `scan` confirms it at members on it.
 
 A point with coordinates in a number field has residues modulo the primes that have a factor of degree 1 there: for most
-fields more than half of the primes. Chinese remainders put one for each of several primes together, which one of the
-conjugates does not matter. Small integer relations between products of the coordinates, short vectors of a lattice, are
-equations: of the first coordinate over Q, and of each further one over the field of those before it.
+fields more than half of the primes. The Chinese remainder theorem combines one residue for each of several primes; any
+of the conjugates will do. Small integer relations between products of the coordinates, found as short vectors of a
+lattice, are the equations: for the first coordinate over Q, and for each further one over the field of those before it.
 """
 
 from __future__ import annotations
@@ -30,55 +30,57 @@ from kahanmaps.laboratory.scan.modular_components import Rows
 
 RationalRows = tuple[tuple[fmpq, ...], ...]
 
-_MOST_PAIRS = 100_000  # of affine subspaces modulo two primes that are tried
-_MOST_CONJUGATES = 24  # hypersurfaces modulo a prime of which pairs are taken
-_LOW = 12  # heights up to which one prime may be bad
-_AT_LEAST = 3  # primes
+_MAX_PAIRS = 100_000  # of affine subspaces modulo two primes that are tried
+_MAX_CONJUGATES = 24  # pairs are only formed of at most so many hypersurfaces modulo a prime
+_LOW_HEIGHT = 12  # up to this height one prime may be bad
+_MIN_PRIMES = 3
 MAX_FIELD_DEGREE = 6
-SPARE_BITS = 12  # by which the relations of a point must beat what chance would give
-_TRIES = 200
-_MOST_SINGLE = 24  # modulo a prime
-_MOST_PRIMES = 14  # that are put together
+SPARE_BITS = 12  # the relations of a point must be smaller by so many bits than random residues would give
+_MAX_FAILURES = 200
+_MAX_POINTS = 24  # modulo a prime
+_MAX_PRIMES = 14  # that are combined
 
 
 def height_bound(primes: Sequence[int]) -> int:
-    """The numerators and denominators that two of the primes suffice for."""
-    low = sorted(primes)[:2]
-    return isqrt((prod(low) - 1) // 2)
+    """Return the bound on numerators and denominators that are reconstructed from the two smallest primes."""
+    return isqrt((prod(sorted(primes)[:2]) - 1) // 2)
 
 
-def lift_linear(found: Mapping[int, Sequence[Rows]], everywhere: bool = True) -> dict[RationalRows, tuple[int, ...]]:
-    """Affine subspaces over Q whose residues are among those found modulo the primes: reduced rows, and these primes.
+def lift_linear(
+    subspaces: Mapping[int, Sequence[Rows]], everywhere: bool = True
+) -> dict[RationalRows, tuple[int, ...]]:
+    """Return the affine subspaces over Q, as reduced rows, whose residues occur modulo the primes, with these primes.
 
-    They have to be found modulo all primes, if not `everywhere` modulo three.
+    A subspace must occur modulo all primes, or if not `everywhere` modulo three of them.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
     >>> lift_linear(modulo)
     {((1, 0, -1/2), (0, 1, -3)): (31, 37, 41)}
     """
-    sets = {p: set(subspaces) for p, subspaces in found.items()}
-    done: dict[RationalRows, tuple[int, ...]] = {}
-    spent = 0
-    for p, q in sorted(combinations(sorted(found), 2), key=lambda pair: len(found[pair[0]]) * len(found[pair[1]])):
-        spent += len(found[p]) * len(found[q])
-        if spent > _MOST_PAIRS:
+    sets = {p: set(rows) for p, rows in subspaces.items()}
+    lifted: dict[RationalRows, tuple[int, ...]] = {}
+    sizes = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
+    pairs = 0
+    for p, q in sorted(sizes, key=sizes.__getitem__):
+        pairs += sizes[p, q]
+        if pairs > _MAX_PAIRS:
             break
-        count(15 * len(found[p]) * len(found[q]))
-        for one, other in product(found[p], found[q]):
-            lifted = _lifted_rows(one, p, other, q)
-            if lifted is None or lifted in done:
+        count(15 * sizes[p, q])
+        for at_p, at_q in product(subspaces[p], subspaces[q]):
+            rows = _lift_rows(at_p, p, at_q, q)
+            if rows is None or rows in lifted:
                 continue
             count(15 * len(sets))
-            at = tuple(r for r in sorted(sets) if residues(lifted, r) in sets[r])
-            height = max((max(abs(int(x.p)), int(x.q)) for row in lifted for x in row), default=0)
-            missing = sum(r not in at and residues(lifted, r) is not None for r in sets)
-            if len(at) >= _AT_LEAST and (not everywhere or missing <= (height <= _LOW)):
-                done[lifted] = at
-    return done
+            primes = tuple(r for r in sorted(sets) if residues(rows, r) in sets[r])
+            height = max((max(abs(int(x.p)), int(x.q)) for row in rows for x in row), default=0)
+            missing = sum(r not in primes and residues(rows, r) is not None for r in sets)
+            if len(primes) >= _MIN_PRIMES and (not everywhere or missing <= (height <= _LOW_HEIGHT)):
+                lifted[rows] = primes
+    return lifted
 
 
 def linear_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
-    """The equations of an affine subspace, primitive polynomials.
+    """Return the equations of an affine subspace as primitive polynomials.
 
     >>> linear_equations(((fmpq(1), fmpq(0), fmpq(-1, 2)),), ["a", "b"])
     (2*a - 1,)
@@ -86,12 +88,12 @@ def linear_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpo
     context = ring(names)
     variables = [*context.gens(), context.constant(1)]
     sums = (sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0)) for row in rows)
-    return tuple(primitive_part(one)[1] for one in sums)
+    return tuple(primitive_part(equation)[1] for equation in sums)
 
 
-def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> RationalRows | None:
+def _lift_rows(at_p: Rows, p: int, at_q: Rows, q: int) -> RationalRows | None:
     rows = []
-    for a, b in zip(one, other, strict=True):
+    for a, b in zip(at_p, at_q, strict=True):
         row = [value for entry in chinese(a, p, b, q) if (value := rational_reconstruction(entry, p * q)) is not None]
         if len(row) < len(a):
             return None
@@ -100,19 +102,19 @@ def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> RationalRows | None:
 
 
 def residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
-    """The rows modulo a prime, None where it divides a denominator."""
+    """Return the rows modulo a prime, None if it divides a denominator."""
     if any(int(x.q) % p == 0 for row in rows for x in row):
         return None
     return tuple(tuple(int(x.p) * pow(int(x.q), -1, p) % p for x in row) for row in rows)
 
 
 def lift_hypersurfaces(
-    found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
+    hypersurfaces: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
 ) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
-    """The irreducible hypersurfaces over Q behind those modulo the primes, and these primes.
+    """Lift hypersurfaces modulo primes to irreducible hypersurfaces over Q; return them with their primes.
 
-    Tried are each of them, then the products of two, which may be conjugate over a quadratic field, and the product of
-    all that are left, which is lifted from all primes but one, where it has to agree.
+    Three kinds are tried: single hypersurfaces; products of two, which may be conjugate over a quadratic field; and
+    the product of all remaining ones, which is lifted from all primes but one and compared with it there.
 
     >>> circle = {p: [[1, 0, 0, p - 1, 0, p - 1]] for p in (31, 37, 41)}
     >>> lift_hypersurfaces(circle, ["a", "b"])
@@ -121,56 +123,58 @@ def lift_hypersurfaces(
     >>> lift_hypersurfaces(lines, ["a", "b"])
     [(a^2 - 2*b^2, (7, 17, 23))]
     """
-    known: list[tuple[fmpq_mpoly, tuple[int, ...]]] = []
-    rest = {p: [tuple(form) for form in forms] for p, forms in found.items()}
-    for together in (1, 2):
-        parts: dict[int, dict[int, dict[Rows, tuple[tuple[int, ...], ...]]]] = {}
-        for p, forms in rest.items():
-            some = list(combinations(forms, together)) if len(forms) <= _MOST_CONJUGATES or together == 1 else []
-            for group in some:
-                row = tuple(_product(group, p, len(names)))
-                parts.setdefault(len(row), {}).setdefault(p, {})[(row,)] = group
-        used: dict[int, set[tuple[int, ...]]] = {p: set() for p in rest}
-        for by_prime in parts.values():
-            for rows, at in lift_linear({p: list(some) for p, some in by_prime.items()}, False).items():
-                known += [(factor, at) for factor in _factors(rows[0], names)]
-                for p in at:
+    lifted: list[tuple[fmpq_mpoly, tuple[int, ...]]] = []
+    remaining = {p: [tuple(form) for form in forms] for p, forms in hypersurfaces.items()}
+    for group_size in (1, 2):
+        products_by_length: dict[int, dict[int, dict[Rows, tuple[tuple[int, ...], ...]]]] = {}
+        for p, forms in remaining.items():
+            if group_size > 1 and len(forms) > _MAX_CONJUGATES:
+                continue
+            for group in combinations(forms, group_size):
+                row = tuple(_multiply(group, p, len(names)))
+                products_by_length.setdefault(len(row), {}).setdefault(p, {})[(row,)] = group
+        used: dict[int, set[tuple[int, ...]]] = {p: set() for p in remaining}
+        for by_prime in products_by_length.values():
+            for rows, primes in lift_linear({p: list(groups) for p, groups in by_prime.items()}, False).items():
+                lifted += [(factor, primes) for factor in _factor(rows[0], names)]
+                for p in primes:
                     used[p].update(by_prime[p][residues(rows, p) or ()])
-        rest = {p: [form for form in forms if form not in used[p]] for p, forms in rest.items()}
-    factors, at = _lifted_product(rest, names)
-    return known + [(factor, at) for factor in factors]
+        remaining = {p: [form for form in forms if form not in used[p]] for p, forms in remaining.items()}
+    factors, primes = _lift_product(remaining, names)
+    return lifted + [(factor, primes) for factor in factors]
 
 
-def _lifted_product(
-    found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
+def _lift_product(
+    hypersurfaces: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
 ) -> tuple[list[fmpq_mpoly], tuple[int, ...]]:
-    """The factors of what the products of all polynomials are lifted to, and the primes."""
-    products = {p: _product(forms, p, len(names)) for p, forms in found.items() if forms}
+    """Lift the product of all hypersurfaces modulo each prime; return its factors over Q and the primes."""
+    products = {p: _multiply(forms, p, len(names)) for p, forms in hypersurfaces.items() if forms}
     if not products:
         return [], ()
     size = Counter(map(len, products.values())).most_common(1)[0][0]
-    scaled = {p: form for p, form in products.items() if len(form) == size}
-    if len(scaled) < _AT_LEAST or len({next(k for k, c in enumerate(form) if c) for form in scaled.values()}) > 1:
+    products = {p: form for p, form in products.items() if len(form) == size}
+    pivots = {next(k for k, c in enumerate(form) if c) for form in products.values()}
+    if len(products) < _MIN_PRIMES or len(pivots) > 1:
         return [], ()
-    *first, last = sorted(scaled)
-    together, modulus = scaled[first[0]], first[0]
-    for p in first[1:]:
-        together, modulus = chinese(together, modulus, scaled[p], p), modulus * p
-    values = rational_vector(together, modulus)
-    if values is None or residues([values], last) != (tuple(scaled[last]),):
+    *primes, last = sorted(products)
+    combined, modulus = products[primes[0]], primes[0]
+    for p in primes[1:]:
+        combined, modulus = chinese(combined, modulus, products[p], p), modulus * p
+    values = rational_vector(combined, modulus)
+    if values is None or residues([values], last) != (tuple(products[last]),):
         return [], ()
-    return _factors(values, names), tuple(sorted(scaled))
+    return _factor(values, names), (*primes, last)
 
 
-def _factors(values: Sequence[fmpq], names: Sequence[str]) -> list[fmpq_mpoly]:
-    """The irreducible factors over Q, primitive, of a polynomial by its coefficients."""
+def _factor(values: Sequence[fmpq], names: Sequence[str]) -> list[fmpq_mpoly]:
+    """Return the primitive irreducible factors over Q of the polynomial with these coefficients."""
     degree = next(d for d in range(100) if len(exponents_up_to(len(names), d)) == len(values))
     terms = {e: c for e, c in zip(exponents_up_to(len(names), degree), values, strict=True) if c != 0}
     return [primitive_part(factor)[1] for factor, _ in ring(names).from_dict(terms).factor()[1]]
 
 
-def _product(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[int]:
-    """The coefficients of the product of polynomials, up to its degree, the first that is not 0 being 1."""
+def _multiply(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[int]:
+    """Return the coefficients of the product of polynomials, scaled so that the first nonzero one is 1."""
 
     def degree_of(form: Sequence[int]) -> int:
         return next(d for d in range(100) if len(exponents_up_to(variables, d)) == len(form))
@@ -183,67 +187,71 @@ def _product(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[int
 
 
 def lift_conjugate_points(
-    found: Mapping[int, Sequence[Sequence[int]]],
+    points: Mapping[int, Sequence[Sequence[int]]],
     names: Sequence[str],
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> list[tuple[tuple[fmpq_mpoly, ...], tuple[int, ...]]]:
-    """Equations of points and their conjugates, one for each parameter, and the primes modulo which all are there.
+    """Return equations of points with their conjugates, one for each parameter, and the primes where all of them occur.
 
-    They have to be there modulo all primes but one modulo which the equations have solutions.
+    Among the primes modulo which the equations have solutions, all but one must contain these solutions.
 
     >>> roots = {p: [(x, x * x % p) for x in range(p) if (x**3 - 2) % p == 0] for p in (53, 59, 67, 71, 83, 89, 97)}
     >>> [(equations, _)] = lift_conjugate_points(roots, ["a", "b"], random.Random(0))
     >>> equations
     (a^3 - 2, a^2 - b)
     """
-    every = {p: {tuple(x) for x in points} for p, points in found.items()}
-    rest = {p: set(points) for p, points in every.items() if len(points) <= _MOST_SINGLE}
-    known = []
-    tries = _TRIES
-    while tries and sum(map(bool, rest.values())) >= _AT_LEAST:
+    point_sets = {p: {tuple(x) for x in at_p} for p, at_p in points.items()}
+    remaining = {p: set(at_p) for p, at_p in point_sets.items() if len(at_p) <= _MAX_POINTS}
+    lifted = []
+    failures = 0
+    while failures < _MAX_FAILURES and sum(map(bool, remaining.values())) >= _MIN_PRIMES:
         check()
-        tries -= 1
-        primes = [p for p in rest if rest[p]]
-        # one of the points modulo each of the first few primes, until their equations stand out
+        failures += 1
+        candidates = [p for p in remaining if remaining[p]]
+        # Combine one random point modulo each of a few primes until small relations appear.
         values: Sequence[int] = [0] * len(names)
         modulus, equations = 1, None
-        for p in rng.sample(primes, min(len(primes), _MOST_PRIMES)):
-            values, modulus = chinese(values, modulus, rng.choice(sorted(rest[p])), p), modulus * p
-            if (equations := _equations(values, modulus, names)) is not None:
+        for p in rng.sample(candidates, min(len(candidates), _MAX_PRIMES)):
+            values, modulus = chinese(values, modulus, rng.choice(sorted(remaining[p])), p), modulus * p
+            if (equations := _search_equations(values, modulus, names)) is not None:
                 break
-        # of two points that are not conjugate the first coordinates have a product of polynomials
+        # If the points are not conjugate, the relation of the first coordinate is a product of polynomials.
         if equations is None or len(equations[0].factor()[1]) > 1:
             continue
-        there = {p: _residues(equations, p) for p in every}
-        at = tuple(p for p in sorted(there) if there[p] and there[p] <= every[p])
-        if len(at) >= _AT_LEAST and sum(map(bool, there.values())) <= len(at) + 1:
-            known.append((equations, at))
-            rest = {p: points - there[p] for p, points in rest.items()}
-            tries = _TRIES
-    return known
+        solution_sets = {p: _solve_modulo(equations, p) for p in point_sets}
+        primes = tuple(p for p in sorted(solution_sets) if solution_sets[p] and solution_sets[p] <= point_sets[p])
+        if len(primes) >= _MIN_PRIMES and sum(map(bool, solution_sets.values())) <= len(primes) + 1:
+            lifted.append((equations, primes))
+            remaining = {p: at_p - solution_sets[p] for p, at_p in remaining.items()}
+            failures = 0
+    return lifted
 
 
-def _equations(values: Sequence[int], modulus: int, names: Sequence[str]) -> tuple[fmpq_mpoly, ...] | None:
-    """A relation for each coordinate, of the smallest degree in it; None where there are no small ones."""
+def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str]) -> tuple[fmpq_mpoly, ...] | None:
+    """Return a relation for each coordinate, of the smallest degree in it; None if there are no small ones."""
     context = ring(names)
     basis = [(context.constant(1), 1)]  # of the field of the coordinates so far: products and their residues
-    found = []
+    equations = []
     for x, value in zip(context.gens(), values, strict=True):
         lower, (power, residue) = list(basis), (x, value)
-        while (relation := _relation([r for _, r in lower] + [residue], modulus, SPARE_BITS // len(names))) is None:
+        spare = SPARE_BITS // len(names)
+        while (relation := _search_relation([r for _, r in lower] + [residue], modulus, spare)) is None:
             lower += [(a * power, r * residue % modulus) for a, r in basis]
             power, residue = power * x, residue * value % modulus
             if len(lower) > MAX_FIELD_DEGREE:
                 return None
         products = [*(a for a, _ in lower), power]
-        found.append(primitive_part(sum((c * a for c, a in zip(relation, products, strict=True)), 0 * x))[1])
+        equations.append(primitive_part(sum((c * a for c, a in zip(relation, products, strict=True)), 0 * x))[1])
         basis = lower
-    return tuple(found)
+    return tuple(equations)
 
 
-def _relation(residues: Sequence[int], modulus: int, spare: int) -> list[int] | None:
-    """Small integers with sum c_i r_i = 0 modulo `modulus`, the last one not 0; the first residue is 1."""
+def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[int] | None:
+    """Return small integers c_i with sum c_i r_i = 0 modulo `modulus`, the last one not 0; None if there are none.
+
+    The first residue must be 1. Small means `spare` bits below the size expected of random residues.
+    """
     size = len(residues)
     rows = [[modulus, *[0] * (size - 1)]]
     rows += [[-r, *(int(i == k) for i in range(1, size))] for k, r in enumerate(residues[1:], 1)]
@@ -254,11 +262,11 @@ def _relation(residues: Sequence[int], modulus: int, spare: int) -> list[int] | 
     return [int(c) for c in shortest] if small and shortest[-1] else None
 
 
-def _residues(equations: Sequence[fmpq_mpoly], p: int) -> set[tuple[int, ...]]:
-    """The solutions modulo a prime; none where it divides a leading coefficient."""
+def _solve_modulo(equations: Sequence[fmpq_mpoly], p: int) -> set[tuple[int, ...]]:
+    """Return the solutions modulo a prime; none if it divides a leading coefficient."""
     size = len(equations)
-    for k, one in enumerate(equations):
-        highest = tuple(int(one.degrees()[k]) * (i == k) for i in range(size))
-        if int(one[highest].p) % p == 0:
+    for k, equation in enumerate(equations):
+        leading = tuple(int(equation.degrees()[k]) * (i == k) for i in range(size))
+        if int(equation[leading].p) % p == 0:
             return set()
     return {tuple(map(int, x)) for x in solutions(equations, range(size), [0] * size, GF(p))}

@@ -1,7 +1,7 @@
-"""Changes of parameters that permute the special members of a family: projective ones of a few kinds.
+"""Search for projective changes of parameters that permute the special members of a family.
 
-Exchanges, cycles and signs, these with a shift or a factor for each parameter, and permutations of the homogeneous
-coordinates (a : b : ... : 1), which families have whose parameters are ratios.
+A few kinds are tried: signed permutations of the parameters, the same with a shift or a factor for each parameter, and
+signed permutations of the homogeneous coordinates (a : b : ... : 1), for families whose parameters are ratios.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 Row = tuple[fmpq, ...]
 Change = tuple[Row, ...]  # a matrix that acts on (a, b, ..., 1), up to a factor: the first entry in its last row is 1
 
-_MOST_POINTS = 24
+_MAX_POINTS = 24
 
 
 def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Generators of the changes of parameters that were found, as images of the parameters.
+    """Return generators of the group of changes of parameters that was found, as images of the parameters.
 
     Each preserves the degrees of the special members modulo each prime for which all members were tried, and the
     hypersurfaces over Q, except for what is mapped to infinity. Only changes that move a component, or
@@ -41,37 +41,38 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     complete = [(one.prime, one.special) for one in sweeps if one.complete]
     if not complete or not components:
         return []
-    found: list[Change] = []
-    known = _generated(found, len(names))
-    for change in _changes(len(names), components):
-        if change in known or not all(_permutes(change, p, special) for p, special in complete):
+    generators: list[Change] = []
+    group = _generate_group(generators, len(names))
+    for change in _candidate_changes(len(names), components):
+        if change in group or not all(_permutes_members(change, p, special) for p, special in complete):
             continue
-        if _matters(change, components, names):
-            found.append(change)
-            known = _generated(found, len(names))
+        if _is_reportable(change, components, names):
+            generators.append(change)
+            group = _generate_group(generators, len(names))
     texts = []
-    for change in found:  # denominators are constants or one parameter
-        *images, below = map(format_polynomial, _images(change, names))
-        texts.append(
-            tuple(images if below == "1" else [f"{image}/{below}" if image != below else "1" for image in images])
-        )
+    for change in generators:  # denominators are constants or one parameter
+        *numerators, denominator = map(format_polynomial, _images(change, names))
+        if denominator == "1":
+            texts.append(tuple(numerators))
+        else:
+            texts.append(tuple(f"{P}/{denominator}" if P != denominator else "1" for P in numerators))
     return texts
 
 
-def _permutes(change: Change, p: int, special: Mapping[Point, Degrees]) -> bool:
-    """Whether all special members modulo a prime go to such with the same degrees, or to infinity."""
+def _permutes_members(change: Change, p: int, special: Mapping[Point, Degrees]) -> bool:
+    """Return whether every special member modulo p is mapped to one with the same degrees, or to infinity."""
     rows = residues(change, p)
     count(20)
     for point, degrees in special.items() if rows is not None else ():
-        *image, below = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows or ())
+        *image, denominator = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows or ())
         count(5)
-        if below and special.get(tuple(x * pow(below, -1, p) % p for x in image)) != degrees:
+        if denominator and special.get(tuple(x * pow(denominator, -1, p) % p for x in image)) != degrees:
             return False
     return True
 
 
-def _changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
-    """Those that are tried, plain ones first; shifts and factors take one rational point to another."""
+def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
+    """Yield the changes to be tried; their shifts and factors take one rational point to another."""
     signed = [
         tuple(
             tuple(fmpq(sign * (k == place)) for k in range(count + 1))
@@ -82,7 +83,8 @@ def _changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
     ]
     plain = [change for change in signed if change[-1][-1] != 0]
     yield from plain
-    points = [(*(one.values or {}).values(), fmpq(1)) for one in components if one.is_rational_point][:_MOST_POINTS]
+    rational = [component for component in components if component.is_rational_point][:_MAX_POINTS]
+    points = [(*(component.values or {}).values(), fmpq(1)) for component in rational]
     for change, point in product(plain, points):
         start = _times(change, points[0])
         yield tuple((*row[:-1], row[-1] + y - x) for row, x, y in zip(change, start, point, strict=True))
@@ -97,50 +99,49 @@ def _times(change: Change, vector: Sequence[fmpq]) -> Row:
 
 
 def _images(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
-    """The images of the parameters times the last one, which is a denominator."""
+    """Return the numerators of the images of the parameters, and last their denominator."""
     context = ring(names)
     vector = [*context.gens(), context.constant(1)]
     return [sum((c * x for c, x in zip(row, vector, strict=True)), context.constant(0)) for row in change]
 
 
-def _matters(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
-    """Whether hypersurfaces go to such with the same degrees, and something is moved or not affine."""
-    *images, below = _images(change, names)
+def _is_reportable(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
+    """Return whether hypersurfaces are mapped to ones with the same degrees, and some component moves or is curved."""
+    *images, denominator = _images(change, names)
 
-    def moved_by(equation: fmpq_mpoly) -> fmpq_mpoly:
-        """What holds where the image of a point satisfies an equation; a constant where only points at infinity do."""
+    def pull_back(equation: fmpq_mpoly) -> fmpq_mpoly:
+        """Return the equation of the preimage; a constant if only points at infinity are mapped to the component."""
         terms = {(*m, equation.total_degree() - sum(m)): c for m, c in equation.terms()}
         form = ring([f"x{k}" for k in range(len(images) + 1)]).from_dict(terms)
-        return primitive_part(form.compose(*images, below, ctx=below.context()))[1]
+        return primitive_part(form.compose(*images, denominator, ctx=denominator.context()))[1]
 
-    known = {(str(one.equations[0]), one.degrees) for one in components if len(one.equations) == 1}
-    matters = False
-    for one in components:
-        moved = [moved_by(equation) for equation in one.equations]
-        if any(equation.total_degree() == 0 for equation in moved):
+    hypersurfaces = {(str(c.equations[0]), c.degrees) for c in components if len(c.equations) == 1}
+    is_reportable = False
+    for component in components:
+        preimage = [pull_back(equation) for equation in component.equations]
+        if any(equation.total_degree() == 0 for equation in preimage):
             continue
-        if len(moved) == 1 and (str(moved[0]), one.degrees) not in known:
+        if len(preimage) == 1 and (str(preimage[0]), component.degrees) not in hypersurfaces:
             return False
-        is_affine = all(equation.total_degree() == 1 for equation in one.equations)
-        if one.values is None:
-            stays = set(map(str, moved)) == set(map(str, one.equations))
-        else:  # a random member, or the point itself
-            stays = replace(one, equations=tuple(moved)).contains([*one.values.values()])
-        matters = matters or not (is_affine and stays)
-    return matters
+        is_affine = all(equation.total_degree() == 1 for equation in component.equations)
+        if component.values is None:
+            is_fixed = set(map(str, preimage)) == set(map(str, component.equations))
+        else:  # tested at a random member, or at the point itself
+            is_fixed = replace(component, equations=tuple(preimage)).contains([*component.values.values()])
+        is_reportable = is_reportable or not (is_affine and is_fixed)
+    return is_reportable
 
 
-def _generated(found: Sequence[Change], count: int) -> set[Change]:
-    """The group that changes generate; it is finite, for it permutes points."""
+def _generate_group(generators: Sequence[Change], count: int) -> set[Change]:
+    """Return the group that changes generate; it is finite, because it permutes points."""
 
-    def composed(one: Change, other: Change) -> Change:
-        """First `one`, then `other`."""
-        rows = tuple(zip(*(_times(other, column) for column in zip(*one, strict=True)), strict=True))
+    def compose(first: Change, second: Change) -> Change:
+        rows = tuple(zip(*(_times(second, column) for column in zip(*first, strict=True)), strict=True))
         scale = next(c for c in rows[-1] if c != 0)
         return tuple(tuple(c / scale for c in row) for row in rows)
 
     known = new = {tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))}
     while new and len(known) < 2000:
-        new = {composed(one, other) for one in new for other in found} - known
+        new = {compose(change, generator) for change in new for generator in generators} - known
         known = known | new
     return known

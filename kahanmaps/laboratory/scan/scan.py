@@ -4,7 +4,7 @@ All members with parameters in GF(p) are tried for several small primes p (`swee
 generic member are special. They fall into classes by their degrees, and these into components modulo each prime
 (`modular_components`); components that appear modulo all primes are lifted to conditions over Q (`lift`). A condition
 is *found modulo* these primes. It is *confirmed* where members on it, random modulo large primes, have the same degrees
-by the computation that `degrees` does. Nothing of this is a proof. The kind of growth is that of one rational member.
+by the computation that `degrees` does. None of this is a proof. The kind of growth is that of one rational member.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, islice, product
+from itertools import accumulate, chain, islice, product
 from typing import Any
 
 from flint import fmpq, fmpz
@@ -42,8 +42,8 @@ Progress = Callable[[str], None]
 
 UNITS = 240e6  # of counted work at effort 1, most of it that of the kernel, which sweeps on all processors
 MAX_PARAMETERS = 8
-# By the number of parameters the primes modulo which all members are tried: the ones that are wished, then those for
-# families that take their time. A polynomial of degree 3 in one parameter has all its zeros modulo one prime in 6.
+# By the number of parameters, the primes modulo which all members are tried: the preferred ones, then those for
+# families whose members are expensive. A cubic in one parameter has all its zeros modulo one prime in 6.
 _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     1: (
         tuple(p for p in range(307, 500) if fmpz(p).is_prime()),
@@ -53,26 +53,40 @@ _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     2: ((53, 59, 61, 67), (29, 31, 37, 41)),
     3: ((19, 23, 29, 31), (11, 13, 17, 19)),
 }
-# More of these, as many as the budget allows, where members are left that may be points over number fields.
-_FURTHER = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
-# Those for members on random lines of parameter space. Each of the fields of the roots of d, d up to 10 and down to
-# -10, splits modulo three of them: else hypersurfaces that split over such a field have no points to be found.
-_SPLIT = (107, 131, 139, 193, 241, 281)
-_LINES = {2: (24, 12), 3: (32, 16)}  # how many are wished, and fewer, by the number of parameters
-_MORE = 4  # times as many, where hypersurfaces were missed
+# Further primes, as many as the budget allows, if the remaining members may be points over number fields.
+_FURTHER_PRIMES = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
+# The primes for members on random lines of parameter space. Every field Q(sqrt(d)) with |d| <= 10 splits modulo three
+# of them: otherwise hypersurfaces that split over such a field would have no points to be found.
+_LINE_PRIMES = (107, 131, 139, 193, 241, 281)
+_LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
+_LINE_FACTOR = 4  # so many times as many lines if hypersurfaces were missed
 _MANY_LINES = (150, 60)
-_PLANES, _OF_PLANES = 24, (19, 23, 29, 31)  # random ones, for what lines do not meet, and the primes
-_PART = 0.3  # of the budget, for all members on their first line
-_UNTIL = (0.6, 0.75, 0.85, 0.9)  # of the budget: when members, conditions, their confirmation and growth end
-_ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed: up to 2 parameters, and more
-_MOST_ROOM = 4096
-_TRIAL_PRIME = 8179  # modulo which hardly a member is special
-_MOST_TERMS = 7
-_MEMBERS = 3  # that confirm a component
-_TRIES = 20  # for a rational member
-_OF_GROWTH, _ATTEMPTS = 30e6, 2  # for the growth at a member
-_TERMS, _LARGE = 26, 1000  # where no rational member is known: so many degrees, as far as they are not above this
-_SOME = 100  # the degree up to which they are compared, at least
+_PLANES, _PLANE_PRIMES = (
+    24,
+    (19, 23, 29, 31),
+)  # the number of random planes, for components that lines do not meet, and the primes
+_SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their first line
+_STAGE_ENDS = (
+    0.6,
+    0.75,
+    0.85,
+    0.9,
+)  # the shares of the budget at which sweeps, conditions, confirmation and growth end
+_DEFAULT_ROOM, _DEFAULT_ROOM_OF_MANY = (
+    260,
+    220,
+)  # bounds of degrees before cancellation: for up to 2 parameters, and for more
+_MAX_ROOM = 4096
+_TRIAL_PRIME = 8179  # so large that hardly any member is special
+_MAX_TERMS = 7
+_CONFIRMING_MEMBERS = 3  # random members measured to confirm a component
+_TRIES = 20  # to find a rational member
+_GROWTH_UNITS, _GROWTH_ATTEMPTS = 30e6, 2  # units and attempts for the growth at a member
+_FITTED_TERMS, _MAX_FITTED_DEGREE = (
+    26,
+    1000,
+)  # without a rational member: how many degrees are measured, and their bound
+_COMPARED_DEGREE = 100  # degrees are compared at least up to this value
 _MEASURED_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
@@ -90,28 +104,28 @@ def scan(
     analysis: int | None = None,
     progress: Progress = lambda _: None,
 ) -> Scan:
-    """The conditions on parameters under which the degrees of the iterates are smaller than in general.
+    """Search for conditions on parameters under which the degrees of the iterates are smaller than generically.
 
     Args:
         system: the family; its claims are ignored.
-        over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
-        eps: an exact number, or None for generic eps: conditions that hold for every eps.
-        time_step: 2 eps, in its place.
+        over: names of the parameters that vary; the others keep the values of the file. eps may be one of them.
+        eps: half the time step (exact), or None for generic eps: conditions that hold for every eps.
+        time_step: 2 eps, instead of eps.
         terms: how many iterates are measured, by default as many as have small degrees, at most 7.
-        primes: at least three primes, by default such that the members are some ten thousand.
+        primes: at least three primes; by default there are some ten thousand members modulo them.
         effort: an integer; each increase by 1 doubles the work. What was not done is reported.
         seed: the random seed.
         jobs: threads, by default as many as processors; they need numba.
-        analysis: the effort of an analysis of a member on each component whose degrees do not grow exponentially; of
-            points with the same degrees one is enough. None for none.
-        progress: called with a message again and again; if it raises TimeOver, the scan ends with the result so far, as
-            it does at a TimeLimit.
+        analysis: the effort of an analysis of one member on each component whose degrees do not grow exponentially;
+            of several points with the same degrees, only one is analyzed. None: no analyses.
+        progress: called repeatedly with a message; if it raises TimeOver, the scan ends with the result so far, as it
+            does at a TimeLimit.
 
     Returns:
-        A `Scan`. Conditions are found modulo primes and confirmed at members, which is evidence and no proof.
+        A `Scan`. Conditions are found modulo primes and confirmed at members; this is evidence, not proof.
 
     Raises:
-        InputError: for unknown parameters, wrong primes, a map that exists nowhere.
+        InputError: for unknown parameters, wrong primes, a map that is nowhere defined.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lines = parse_system('''variables = ["x", "y"]
@@ -143,60 +157,66 @@ def scan(
         raise InputError(f"found {jobs} jobs, expected at least 1")
     composite = [p for p in primes or () if not fmpz(p).is_prime()]
     if composite:
-        raise InputError(f"found {composite[0]} among the primes to scan modulo, which is not one")
+        raise InputError(f"found {composite[0]} among the primes to scan modulo, expected a prime number")
     if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
         given = ", ".join(map(str, primes))
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(start := f"scan {derive_seed(seed, names, map_.subject, exact)}")
-    terms, room, cost = _terms(map_, len(names), exact, terms, rng)
+    terms, room, cost = _choose_terms(map_, len(names), exact, terms, rng)
     jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
-    most = _PART * budget.units / cost
-    run = _Sweeping(family, start, {"terms": terms, "room": room, "jobs": jobs}, budget, cost, progress)
-    run.take(_plan(len(names), primes, most))
+    most = _SWEEP_SHARE * budget.units / cost
+    run = _ScanRun(family, start, {"terms": terms, "room": room, "jobs": jobs}, budget, cost, progress)
+    run.sweep(_choose_plan(len(names), primes, most))
     known, missed = run.components(rng)
-    for more in (run.more_lines, run.more_primes):
-        if not (missed or run.omitted) and (further := more(known, primes, most)):
-            run.take(further)
+    for plan_more in (run.more_lines, run.more_primes):
+        if not (missed or run.omitted) and (plan := plan_more(known, primes, most)):
+            run.sweep(plan)
             known, missed = run.components(rng)
     run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
-    before = known
-    known, missed = run.each(
-        before, "confirms component", _UNTIL[2], lambda one, check: _confirmed(one, family, before, rng, check)
+    candidates = known
+    known, missed = run.apply(
+        candidates,
+        "confirms component",
+        _STAGE_ENDS[2],
+        lambda component, check: _confirm(component, family, candidates, rng, check),
     )
     run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
-    known.sort(key=lambda one: one.degrees[::-1])
-    enough: dict[Degrees, DegreeGrowth] = {}  # of these one member is enough, if further degrees of others are its own
+    known.sort(key=lambda component: component.degrees[::-1])
+    # Growth that is measured on one component only; others with the same degrees share it if more degrees agree.
+    shared: dict[Degrees, DegreeGrowth] = {}
 
-    def with_growth(one: Component, _: Callable[[], None]) -> Component:
-        if one.degrees[-1] < 0 or _goes_on(one, enough.get(one.degrees), family):
-            return one
-        growth = _growth(one, family, budget)
+    def with_growth(component: Component, _: Callable[[], None]) -> Component:
+        if component.degrees[-1] < 0 or _continues_as(component, shared.get(component.degrees), family):
+            return component
+        growth = _measure_growth(component, family, budget)
         if growth is not None and growth.growth not in _MEASURED_EACH:
-            enough[one.degrees] = growth
-        return replace(one, growth=growth)
+            shared[component.degrees] = growth
+        return replace(component, growth=growth)
 
-    known, missed = run.each(known, "growth on component", 1 if analysis is None else _UNTIL[3], with_growth)
+    known, missed = run.apply(known, "growth on component", 1 if analysis is None else _STAGE_ENDS[3], with_growth)
     run.omit(missed, f"the growth on {missed} components")
-    kinds = {one.degrees: one.growth.growth for one in reversed(known) if one.growth is not None}
-    kinds |= {one.degrees: Growth.UNKNOWN for one in known if one.degrees not in kinds}
-    known.sort(key=lambda one: (OF_DEGREES.index(kinds[one.degrees]), one.degrees[::-1], one.text))
+    kinds = {component.degrees: Growth.UNKNOWN for component in known}
+    kinds |= {
+        component.degrees: component.growth.growth for component in reversed(known) if component.growth is not None
+    }
+    known.sort(key=lambda c: (OF_DEGREES.index(kinds[c.degrees]), c.degrees[::-1], c.text))
     if analysis is not None:
-        points: set[Degrees] = set()
+        analyzed: set[Degrees] = set()  # the degrees of points that were analyzed
 
-        def with_verdict(one: Component, _: Callable[[], None]) -> Component:
-            is_exponential = one.growth is None or one.growth.growth is Growth.EXPONENTIAL
-            if one.values is None or is_exponential or one.degrees in points:
-                return one
-            if one.dimension == 0:
-                points.add(one.degrees)
-            member, step = family.member(one.values)
-            told = analyze(member, eps=step, effort=analysis, seed=family.seed)
-            return replace(one, verdict=told.conclusion)
+        def with_verdict(component: Component, _: Callable[[], None]) -> Component:
+            is_exponential = component.growth is None or component.growth.growth is Growth.EXPONENTIAL
+            if component.values is None or is_exponential or component.degrees in analyzed:
+                return component
+            if component.dimension == 0:
+                analyzed.add(component.degrees)
+            member, step = family.member(component.values)
+            result = analyze(member, eps=step, effort=analysis, seed=family.seed)
+            return replace(component, verdict=result.conclusion)
 
-        known, missed = run.each(known, "analysis of a member on component", 1, with_verdict)
+        known, missed = run.apply(known, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
     sweeps = tuple(run.sweeps)
-    unassigned = tuple(_unassigned(one, known) for one in sweeps)
+    unassigned = tuple(_count_unassigned(result, known) for result in sweeps)
     symmetric: tuple[tuple[str, ...], ...] = ()
     try:
         symmetric = tuple(symmetries(sweeps, known, names))
@@ -204,19 +224,20 @@ def scan(
         run.is_interrupted = True
         run.omit(1, "changes of parameters that permute the special members")
     ended = "interrupted" if run.is_interrupted else "budget" if run.omitted else "complete"
-    found = file, names, exact, seed, sweeps[0].generic if sweeps else (), tuple(known)
-    return Scan(*found, sweeps, unassigned, symmetric, ended, tuple(run.omitted))
+    generic = sweeps[0].generic if sweeps else ()
+    omitted = tuple(run.omitted)
+    return Scan(file, names, exact, seed, generic, tuple(known), sweeps, unassigned, symmetric, ended, omitted)
 
 
 @dataclass
-class _Sweeping:
-    """The sweeps of one scan as they are made, the budget for it, and what was left out."""
+class _ScanRun:
+    """The state of one scan: its sweeps so far, its budget, and what was omitted."""
 
     family: Scanned
-    start: str  # of the seeds
+    start: str  # prefix of all seeds
     measured: dict[str, Any]
     budget: Budget
-    cost: float  # of a member
+    cost: float  # units of work for one member
     progress: Progress
     sweeps: list[Sweep] = field(default_factory=list)
     omitted: list[str] = field(default_factory=list)
@@ -224,8 +245,8 @@ class _Sweeping:
     is_interrupted: bool = False
     total: int = 0
 
-    def tell(self, sentence: str) -> None:
-        """Say what is done now."""
+    def report(self, sentence: str) -> None:
+        """Report the current stage."""
         self.doing = sentence
         if self.is_interrupted:
             raise TimeOver
@@ -235,30 +256,31 @@ class _Sweeping:
             self.is_interrupted = True
             raise
 
-    def until(self, part: float) -> Callable[[], None]:
-        """What raises TimeOver when a part of the budget is spent."""
+    def check_until(self, part: float) -> Callable[[], None]:
+        """Return a function that raises TimeOver when this share of the budget is spent."""
 
         def check() -> None:
-            self.tell(self.doing)
+            self.report(self.doing)
             if self.budget.spent > part * self.budget.units:
                 raise TimeOver
 
         return check
 
     def omit(self, missed: int, what: str) -> None:
-        """Say what was left out, if anything was missed."""
-        self.omitted += [what] if missed else []
+        """Record what was omitted, if `missed` is not 0."""
+        if missed:
+            self.omitted.append(what)
 
-    def take(self, plan: list[Choice]) -> None:
-        """Sweep modulo these primes; what differs in the generic degrees from the largest ones is dropped."""
-        self.total += _size(len(self.family.names), plan)
+    def sweep(self, plan: list[Choice]) -> None:
+        """Sweep modulo the primes of a plan, and drop sweeps whose generic degrees are not the largest ones."""
+        self.total += _count_members(len(self.family.names), plan)
 
-        def told(done: int, _: int) -> None:
-            self.tell(f"scan: {done + sum(one.seen for one in self.sweeps)} of {self.total} members")
+        def on_progress(done: int, _: int) -> None:
+            self.report(f"scan: {done + sum(sweep.seen for sweep in self.sweeps)} of {self.total} members")
 
         for k, (p, lines, width) in enumerate(plan):
             try:
-                one = sweep(
+                result = sweep(
                     self.family.map,
                     len(self.family.names),
                     p,
@@ -266,200 +288,207 @@ class _Sweeping:
                     on=None if lines is None else (lines, width),
                     units=self.cost,
                     seed=f"{self.start} {p} {lines} {width}",
-                    check=self.until(_UNTIL[0]),
-                    progress=told,
+                    check=self.check_until(_STAGE_ENDS[0]),
+                    progress=on_progress,
                     **self.measured,
                 )
-                self.sweeps.append(one)
+                self.sweeps.append(result)
             except BadPrime:
                 continue
             except (TimeOver, TimeLimit) as end:
                 self.is_interrupted |= isinstance(end, TimeLimit)
                 self.omit(1, f"members modulo {', '.join(str(p) for p, *_ in plan[k:])}")
                 break
-        generic = max((one.generic for one in self.sweeps), default=())
-        self.sweeps[:] = [one for one in self.sweeps if one.generic == generic]
+        generic = max((sweep.generic for sweep in self.sweeps), default=())
+        self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
     def more_lines(self, known: Sequence[Component], _: Sequence[int] | None, most: float) -> list[Choice]:
-        """More random lines in place of those there were, of which as many members are left as a hypersurface has.
+        """Plan more random lines in place of the present ones, if a hypersurface was probably missed on these.
 
-        None where they are more than `most` members.
+        A hypersurface is missed if the unassigned members are as many as it has. The plan is empty if none was, or if
+        it needs more than `most` members.
         """
-        lines = [one for one in self.sweeps if one.on_lines]
-        again: list[Choice] = [(one.prime, _MORE * round(one.seen / one.prime), 1) for one in lines]
-        is_lacking = any(_unassigned(one, known) >= 0.5 * one.seen / one.prime for one in lines)
-        if not is_lacking or _size(len(self.family.names), again) > most:
+        lines = [sweep for sweep in self.sweeps if sweep.on_lines]
+        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.seen / sweep.prime), 1) for sweep in lines]
+        is_lacking = any(_count_unassigned(sweep, known) >= 0.5 * sweep.seen / sweep.prime for sweep in lines)
+        if not is_lacking or _count_members(len(self.family.names), plan) > most:
             return []
-        self.sweeps[:] = [one for one in self.sweeps if not one.on_lines]
-        return again
+        self.sweeps[:] = [sweep for sweep in self.sweeps if not sweep.on_lines]
+        return plan
 
     def more_primes(self, known: Sequence[Component], primes: Sequence[int] | None, most: float) -> list[Choice]:
-        """Further primes, unless some are given, while there are not more than `most` members in all.
+        """Plan further primes, as far as all members together are at most `most`, if points were probably missed.
 
-        Where members are left, fewer than a curve has, or than a hypersurface on random lines.
+        Points are missed if there are unassigned members, but fewer than a curve has, or a hypersurface on random
+        lines. The plan is empty if none were, or if the user gave the primes.
         """
-        sizes = ((one, one.prime if one.complete else one.seen / one.prime) for one in self.sweeps)
-        if primes is not None or not any(0 < _unassigned(one, known) < 0.5 * size for one, size in sizes):
+        sizes = ((sweep, sweep.prime if sweep.complete else sweep.seen / sweep.prime) for sweep in self.sweeps)
+        if primes is not None or not any(0 < _count_unassigned(sweep, known) < 0.5 * size for sweep, size in sizes):
             return []
-        further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(len(self.family.names), ())]
-        totals = accumulate((_size(len(self.family.names), [one]) for one in further), initial=self.total)
-        return [one for one, total in zip(further, islice(totals, 1, None), strict=True) if total <= most]
+        plan: list[Choice] = [(p, None, 1) for p in _FURTHER_PRIMES.get(len(self.family.names), ())]
+        totals = accumulate((_count_members(len(self.family.names), [choice]) for choice in plan), initial=self.total)
+        return [choice for choice, total in zip(plan, islice(totals, 1, None), strict=True) if total <= most]
 
-    def each(
+    def apply(
         self,
         items: Sequence[Any],
         what: str,
         part: float,
         work: Callable[..., Any],
-        left: Callable[[Any], Any] = lambda one: one,
+        fallback: Callable[[Any], Any] = lambda item: item,
     ) -> tuple[list[Any], int]:
-        """What `work` makes of each within a part of the budget, `left` of those for which it is spent; how many."""
-        done, missed, check = [], 0, self.until(part)
-        for k, one in enumerate(items):
+        """Apply `work` to each item until this share of the budget is spent, and then `fallback`.
+
+        Returns the results and the number of items for which `fallback` was used.
+        """
+        results, missed, check = [], 0, self.check_until(part)
+        for k, item in enumerate(items):
             try:
                 self.doing = f"scan: {what} {k + 1} of {len(items)}"
                 check()
-                done.append(work(one, check))
+                results.append(work(item, check))
             except (TimeOver, TimeLimit) as end:
                 self.is_interrupted |= isinstance(end, TimeLimit)
                 missed += 1
-                done.append(left(one))
-        return done, missed
+                results.append(fallback(item))
+        return results, missed
 
     def components(self, rng: random.Random) -> tuple[list[Component], int]:
-        """The components, those with smaller degrees first, and how many sequences of degrees they are missing for."""
-        names, classes = self.family.names, sorted({degrees for one in self.sweeps for degrees in one.classes})
-        found, missed = self.each(
+        """Return the components, smaller degrees first, and the number of degree sequences not searched for them."""
+        names, classes = self.family.names, sorted({degrees for sweep in self.sweeps for degrees in sweep.classes})
+        components, missed = self.apply(
             classes,
             "conditions for sequence of degrees",
-            _UNTIL[1],
+            _STAGE_ENDS[1],
             lambda degrees, check: conditions(degrees, self.sweeps, names, rng, check),
-            left=lambda _: [],
+            fallback=lambda _: [],
         )
-        return [one for some in found for one in some], missed
+        return list(chain.from_iterable(components)), missed
 
 
-def _growth(one: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:
-    """The growth at a rational member, or that which more degrees fit where there is none, or it is special."""
+def _measure_growth(component: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:
+    """Return the growth at a rational member; if there is none or it is special, the growth fitted to more degrees."""
     known = None
-    if one.values is not None:
-        member, step = family.member(one.values)
-        for attempt in range(_ATTEMPTS):  # singularities are followed at a random eps, which may be special
+    if component.values is not None:
+        member, step = family.member(component.values)
+        for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps, which may be special
             known = degree_growth(
                 member.map,
                 step,
                 seed=family.seed + attempt,
-                effort=Budget(min(_OF_GROWTH, budget.left)),
+                effort=Budget(min(_GROWTH_UNITS, budget.left)),
                 steps=STEPS,
                 enclosed=False,
             )
             if known.growth is not Growth.UNKNOWN:
                 break
-    return known if known is not None and _agree(known.degrees, (1, *one.degrees)) else _beyond(one, family)
+    is_typical = known is not None and _agree(known.degrees, (1, *component.degrees))
+    return known if is_typical else _fit_growth(component, family)
 
 
-def _beyond(one: Component, family: Scanned, most: int = _LARGE) -> DegreeGrowth | None:
-    """The growth that more degrees fit, measured modulo a prime; None where there is no member."""
-    found = family.degrees_on(one.equations, [one.degrees[-1]] * _TERMS, random.Random(family.seed), most)
-    if found is None:
+def _fit_growth(component: Component, family: Scanned, most: int = _MAX_FITTED_DEGREE) -> DegreeGrowth | None:
+    """Return the growth fitted to more degrees, measured modulo a prime; None if no member was found."""
+    start = [component.degrees[-1]] * _FITTED_TERMS
+    degrees = family.degrees_on(component.equations, start, random.Random(family.seed), most)
+    if degrees is None:
         return None
-    return DegreeGrowth((1, *found), family.eps, Ended.TERMS, f"{len(found)} iterates measured", family.seed, (), ())
+    message = f"{len(degrees)} iterates measured"
+    return DegreeGrowth((1, *degrees), family.eps, Ended.TERMS, message, family.seed, (), ())
 
 
-def _goes_on(one: Component, known: DegreeGrowth | None, family: Scanned) -> bool:
-    """Whether degrees go on as they do at a member of another component with the same first ones."""
+def _continues_as(component: Component, known: DegreeGrowth | None, family: Scanned) -> bool:
+    """Return whether more degrees agree with those at a member of another component with the same first degrees."""
     if known is None:
         return False
-    found = _beyond(one, family, max(_SOME, 2 * one.degrees[-1]))
-    return found is not None and _agree(found.degrees, known.degrees)
+    growth = _fit_growth(component, family, max(_COMPARED_DEGREE, 2 * component.degrees[-1]))
+    return growth is not None and _agree(growth.degrees, known.degrees)
 
 
-def _agree(some: Degrees, others: Degrees) -> bool:
-    return all(a == b for a, b in zip(some, others, strict=False))
+def _agree(first: Degrees, second: Degrees) -> bool:
+    return all(a == b for a, b in zip(first, second, strict=False))
 
 
-def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:
-    """Primes, each with the number of random lines of parameter space, or planes, None for all members.
+def _choose_plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:
+    """Choose primes, each with the number of random lines or planes in parameter space, or None for all members.
 
-    As many as are wished where these are not more than `most` members, else fewer.
+    The first of the plans, largest first, with at most `most` members.
     """
     plans: list[list[Choice]]
-    lines: list[list[Choice]] = [[(p, n, 1) for p in _SPLIT] for n in _LINES.get(count, _MANY_LINES)]
+    lines: list[list[Choice]] = [[(p, n, 1) for p in _LINE_PRIMES] for n in _LINES.get(count, _MANY_LINES)]
     if count in _PRIMES:
         complete: list[list[Choice]] = [
-            [(p, None, 1) for p in some] for some in (_PRIMES[count] if primes is None else (primes,))
+            [(p, None, 1) for p in choices] for choices in (_PRIMES[count] if primes is None else (primes,))
         ]
-        plans = [[*some, *(more if count > 1 else ())] for some, more in product(complete, [*lines, []])]
+        plans = [[*first, *(second if count > 1 else ())] for first, second in product(complete, [*lines, []])]
     else:
-        planes: list[Choice] = [(p, _PLANES, 2) for p in _OF_PLANES]
-        plans = [[*some, *planes] for some in lines] + lines
+        planes: list[Choice] = [(p, _PLANES, 2) for p in _PLANE_PRIMES]
+        plans = [[*first, *planes] for first in lines] + lines
         plans = plans if primes is None else [[(p, n, 1) for p in primes] for n in _MANY_LINES[:1]]
-    return next((plan for plan in plans if _size(count, plan) <= most), plans[-1])
+    return next((plan for plan in plans if _count_members(count, plan) <= most), plans[-1])
 
 
-def _terms(
+def _choose_terms(
     map_: MapFamily, count: int, eps: fmpq | None, terms: int | None, rng: random.Random
 ) -> tuple[int, int, float]:
-    """How many iterates are measured, the room that they need, and the units for a member.
+    """Return how many iterates are measured, a bound of their degrees before cancellation, and the units per member.
 
-    Tried on members modulo a larger prime.
+    They are determined from a few members modulo a larger prime.
     """
     import numpy as np
 
     from kahanmaps.maps.residues.families import LONG, NOWHERE, Family
 
-    if terms is not None and not 1 <= terms <= 2 * _MOST_TERMS:
-        raise InputError(f"found {terms} terms, expected 1 to {2 * _MOST_TERMS}")
+    if terms is not None and not 1 <= terms <= 2 * _MAX_TERMS:
+        raise InputError(f"found {terms} terms, expected 1 to {2 * _MAX_TERMS}")
     family = Family(map_, _TRIAL_PRIME)
-    tried = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(8)])
-    usual = _ROOM if count <= 2 else _ROOM_OF_MANY
-    room = usual if terms is None else _MOST_ROOM
-    found = family.degrees(tried, eps, terms or _MOST_TERMS, room, rng).max(axis=0).tolist()
-    if found[0] == NOWHERE:
+    members = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(8)])
+    usual = _DEFAULT_ROOM if count <= 2 else _DEFAULT_ROOM_OF_MANY
+    room = usual if terms is None else _MAX_ROOM
+    degrees = family.degrees(members, eps, terms or _MAX_TERMS, room, rng).max(axis=0).tolist()
+    if degrees[0] == NOWHERE:
         raise InputError("the map is defined nowhere, whatever the parameters are")
-    measured = sum(degree >= 0 for degree in found)
+    measured = sum(degree >= 0 for degree in degrees)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
-    room = max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
-    # Compiles the kernel, where there is nothing yet that Ctrl-C could keep.
-    family.degrees(np.resize(tried, (LONG, count)), eps, 1, room, random.Random(0))
-    return measured, room, family.units([1, *found[:measured]])
+    room = max(family.dim * family.degree * d + 1 for d in [1, *degrees[: measured - 1]])
+    # Compile the kernel now: there are no results yet that Ctrl-C could interrupt.
+    family.degrees(np.resize(members, (LONG, count)), eps, 1, room, random.Random(0))
+    return measured, room, family.units([1, *degrees[:measured]])
 
 
-def _confirmed(
-    one: Component,
+def _confirm(
+    component: Component,
     family: Scanned,
     others: Sequence[Component],
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> Component:
-    """The component with what random members on it say, and a rational one that is on no smaller component."""
+    """Measure random members on a component, and search for a rational member that is on no smaller component."""
     measured, names = [], family.names
-    for _ in range(_MEMBERS):
+    for _ in range(_CONFIRMING_MEMBERS):
         check()
-        measured.append(family.degrees_on(one.equations, one.degrees, rng))
+        measured.append(family.degrees_on(component.equations, component.degrees, rng))
     known = [degrees for degrees in measured if degrees is not None]
     values = None
     for _ in range(_TRIES):
-        point = point_on(one.equations, len(names), QQ, rng)
+        point = point_on(component.equations, len(names), QQ, rng)
         if point is None:
             break
         if names[-1] == "eps" and point[-1] == 0:
             continue
-        if not any(other.dimension < one.dimension and other.contains(point) for other in others):
+        if not any(other.dimension < component.dimension and other.contains(point) for other in others):
             values = dict(zip(names, point, strict=True))
             break
-    return replace(one, tried=len(known), confirmed=known.count(one.degrees), values=values)
+    return replace(component, tried=len(known), confirmed=known.count(component.degrees), values=values)
 
 
-def _unassigned(one: Sweep, components: Sequence[Component]) -> int:
-    """The number of special members modulo a prime that are on no component with their degrees."""
+def _count_unassigned(sweep: Sweep, components: Sequence[Component]) -> int:
+    """Count the special members modulo a prime that are on no component with their degrees."""
     return sum(
-        len(points_outside(points, [other for other in components if other.degrees == degrees], one.prime))
-        for degrees, points in one.classes.items()
+        len(points_outside(points, [other for other in components if other.degrees == degrees], sweep.prime))
+        for degrees, points in sweep.classes.items()
     )
 
 
-def _size(count: int, plan: Sequence[Choice]) -> int:
-    """The number of members of a plan."""
+def _count_members(count: int, plan: Sequence[Choice]) -> int:
     return sum(int(p**count if lines is None else p**width * lines) for p, lines, width in plan)

@@ -21,22 +21,24 @@ from kahanmaps.maps.implicit import MapFamily
 
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
-Choice = tuple[int, int | None, int]  # of members: a prime, how many random subspaces of a dimension, None for all
+Choice = tuple[
+    int, int | None, int
+]  # a prime, the number of random affine subspaces (None: all members), their dimension
 
-_SLICE = 512
-_LINES = (3, 12)  # on which a special member is measured: at least, at most
+_BATCH_SIZE = 512
+_MIN_LINES, _MAX_LINES = 3, 12  # on which a special member is measured
 
 
 class TimeOver(Exception):
-    """The budget for what is being done is spent, or it was interrupted."""
+    """The budget of the current stage is spent, or the scan was interrupted."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The special members modulo one prime: `classes` has their points by degrees, `seen` members were tried.
+    """The special members modulo one prime: `classes` maps degrees to points, and `seen` members were measured.
 
-    `generic` are the degrees of the others. Where not `complete`, the members were on random affine subspaces of this
-    `width`: on lines of parameter space, or on planes.
+    `generic` are the degrees of the other members. If not `complete`, only members on random affine subspaces of
+    dimension `width` were measured. `accidents` counts generic members that looked special on their first line.
     """
 
     prime: int
@@ -49,7 +51,7 @@ class Sweep:
 
     @property
     def on_lines(self) -> bool:
-        """Whether the members were on random lines, which hardly meet anything but hypersurfaces."""
+        """Whether only members on random lines were measured; these rarely meet anything but hypersurfaces."""
         return not self.complete and self.width == 1
 
     @property
@@ -59,17 +61,17 @@ class Sweep:
 
 
 def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.Random) -> Iterator[Point]:
-    """All points of GF(p)^count, or those on so many random affine subspaces of a dimension."""
+    """Yield all points of GF(p)^count, or those on random affine subspaces; `on` is their number and dimension."""
     if on is None:
         yield from product(range(prime), repeat=count)
         return
     subspaces, width = on
     for _ in range(subspaces):
-        base, *ways = ([rng.randrange(prime) for _ in range(count)] for _ in range(1 + width))
+        base, *directions = ([rng.randrange(prime) for _ in range(count)] for _ in range(1 + width))
         for slopes in product(range(prime), repeat=width):
             yield tuple(
-                (b + sum(s * w for s, w in zip(slopes, way, strict=True))) % prime
-                for b, *way in zip(base, *ways, strict=True)
+                (b + sum(s * d for s, d in zip(slopes, direction, strict=True))) % prime
+                for b, *direction in zip(base, *directions, strict=True)
             )
 
 
@@ -88,13 +90,25 @@ def sweep(
     check: Callable[[], None] = lambda: None,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Sweep:
-    """The special members of a family modulo a prime below 2^13, by the degrees d_1, ..., d_terms.
+    """Search for the special members of a family modulo a prime below 2^13, by the degrees d_1, ..., d_terms.
 
-    The `count` parameters that vary are the symbols of the map, and perhaps eps as the last one, which is never 0;
-    otherwise `eps` is an exact number, or None for generic eps, in GF(p^2). `room` and `jobs` are as for
-    `Family.degrees`. Tried are all members, or those `on` so many random affine subspaces of parameter space, of a
-    dimension; one counts as `units` of work. `check` is called now and then, and may raise TimeOver; `progress` is told
-    how many members are done, of how many. Raises InputError where the map exists nowhere, or degrees need more room.
+    Args:
+        map_: the family; its symbols are the parameters that vary.
+        count: the number of parameters that vary; one more than the symbols if eps is one, as the last and never 0.
+        prime: the prime.
+        eps: half the time step (exact), or None for generic eps, taken from GF(p^2).
+        terms: the number of degrees.
+        room: as for `Family.degrees`.
+        on: the number and the dimension of random affine subspaces of parameter space whose members are measured, or
+            None for all members.
+        units: the work that one member counts as.
+        seed: the random seed.
+        jobs: as for `Family.degrees`.
+        check: called repeatedly; may raise TimeOver.
+        progress: called with the number of members done and their total.
+
+    Raises:
+        InputError: if the map is nowhere defined, or degrees need more room.
     """
     import numpy as np
 
@@ -102,38 +116,39 @@ def sweep(
 
     family, rng = Family(map_, prime), random.Random(seed)
 
-    def measure(points: Sequence[Point], told: Callable[[int, int], None] = lambda done, of: None) -> Any:
-        parts = []
-        for low in range(0, len(points), _SLICE):
+    def measure(points: Sequence[Point], on_progress: Callable[[int, int], None] = lambda done, of: None) -> Any:
+        batches = []
+        for start in range(0, len(points), _BATCH_SIZE):
             check()
-            some = np.array(points[low : low + _SLICE], dtype=np.int64)
-            parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
-            count_work(units * len(some))
-            told(low + len(some), len(points))
-        return np.concatenate(parts)
+            batch = np.array(points[start : start + _BATCH_SIZE], dtype=np.int64)
+            batches.append(family.degrees(batch, eps, terms, room, rng, jobs=jobs))
+            count_work(units * len(batch))
+            on_progress(start + len(batch), len(points))
+        return np.concatenate(batches)
 
     points = list(members_of(prime, count, on, rng))
     if count > len(map_.symbols):
         points = [point for point in points if point[-1]]
-    found = measure(points, progress)
-    if (found == TOO_LARGE).any():
+    degrees = measure(points, progress)
+    if (degrees == TOO_LARGE).any():
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
-    generic = found.max(axis=0)
+    generic = degrees.max(axis=0)
     if generic[0] < 0:
         raise InputError("the map is defined nowhere, whatever the parameters are")
-    special, accidents = np.flatnonzero((found != generic).any(axis=1)), 0
-    for line in range(1, _LINES[1]):
+    special, accidents = np.flatnonzero((degrees != generic).any(axis=1)), 0
+    for line in range(1, _MAX_LINES):
         if not len(special):
             break
-        before, found[special] = found[special], np.maximum(found[special], measure([points[i] for i in special]))
-        kept = special[(found[special] != generic).any(axis=1)]
-        accidents += len(special) - len(kept)
-        if line >= _LINES[0] and (before == found[special]).all():
+        before, again = degrees[special], measure([points[i] for i in special])
+        degrees[special] = np.maximum(before, again)
+        still_special = special[(degrees[special] != generic).any(axis=1)]
+        accidents += len(special) - len(still_special)
+        if line >= _MIN_LINES and (before == degrees[special]).all():
             break
-        special = kept
+        special = still_special
     classes: dict[Degrees, list[Point]] = {}
     for i in special:
-        classes.setdefault(tuple(int(d) for d in found[i]), []).append(points[i])
+        classes.setdefault(tuple(int(d) for d in degrees[i]), []).append(points[i])
     return Sweep(
         prime, tuple(int(d) for d in generic), classes, len(points), on is None, accidents, 1 if on is None else on[1]
     )

@@ -199,7 +199,7 @@ def singularities(
     if (digits := _digits(map_, exact_eps)) > most:
         raise InputError(
             f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
-            f"in dimension {map_.dim} formulas with longer ones are not written within the budget (--effort)"
+            f"in dimension {map_.dim} formulas with longer numbers exceed the work limit; raise --effort"
         )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")

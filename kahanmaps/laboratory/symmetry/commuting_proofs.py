@@ -1,10 +1,10 @@
-"""Do the Kahan maps of f and of one g, or of a linear family of g, commute: by a lemma, else at random points.
+"""Certify that the Kahan maps of f and of g, or of a linear family of g, commute: by a lemma, else at random points.
 
-Lemmas beside the splitting lemma of checks/theorems.py, each with hypotheses that are verified exactly:
+The lemmas, besides the splitting lemma of checks/theorems.py; their hypotheses are verified exactly:
 
 affine       One of the fields is affine. Its Kahan map is affine, x -> P x + q, and commutes with the other map for
-             every eps if P g(x) = g(P x + q). That is an identity of polynomials of degree at most 2n in eps once
-             det(I - eps B)^2 is multiplied in, so it holds if it does at 2n + 1 values of eps. It is linear in g.
+             every eps if P g(x) = g(P x + q). Multiplied by det(I - eps B)^2 this is an identity of polynomials of
+             degree at most 2n in eps, so it holds if it does at 2n + 1 values of eps. It is linear in g.
 dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M, M = [[b, 2c], [-2a, -b]], linear in the
              field; proportional fields have commuting maps.
 """
@@ -35,10 +35,10 @@ _FORMULA = "Phi_f o Phi_g = Phi_g o Phi_f"
 
 
 def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> Finding:
-    """The finding that the Kahan maps of f and g commute at equal eps, for every eps.
+    """Certify that the Kahan maps of f and g commute at equal eps, for every eps.
 
-    `settings.seed` and `settings.error_bits` are used. Proved, refuted with a witness, or supported with the bound on
-    the probability of error. Source: schwartz-1980.
+    Uses `settings.seed` and `settings.error_bits`. The finding is proved, refuted with a witness, or supported with a
+    bound on the probability of error. Source: schwartz-1980.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2 + x"])
     >>> str(certify_field(f, f.scaled(-1), Settings()).verdict), str(certify_field(f, f.scaled(2), Settings()).verdict)
@@ -55,7 +55,7 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
 
 
 def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
-    """The finding that the Kahan maps of f and of every member of a linear family commute, for every eps."""
+    """Certify that the Kahan maps of f and of every member of a linear family commute, for every eps."""
     count(2_000 + 350 * f.dim**2 * len(family.free))
     members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
     proof = affine(f, members) or _in_dimension_one(f, f)
@@ -64,7 +64,7 @@ def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionCo
 
 
 def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
-    """The evidence by an affine map: f is affine, or there is one g and it is; None where that proves nothing."""
+    """Return evidence by the lemma of affine maps if f or the only g is affine; None if neither is."""
     if f.degree <= 1:
         name, pairs = "f", [(f, g) for g in fields]
     elif len(fields) == 1 and fields[0].degree <= 1:
@@ -73,14 +73,14 @@ def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | 
         return None
     n, count = f.dim, 2 * f.dim + 1
     identity, holds = QQ.identity(n), True
-    for a, h in pairs:  # the affine Kahan map of a is a symmetry of h, at so many values of eps
+    for a, h in pairs:  # is the affine Kahan map of a a symmetry of h, at enough values of eps?
         checked, k = 0, 0
         while holds and checked < count:
             k += 1
-            below = identity - a.B * fmpq(1, k)
-            if below.det() != 0:
-                P = below.solve(identity + a.B * fmpq(1, k))
-                q = below.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
+            matrix = identity - a.B * fmpq(1, k)
+            if matrix.det() != 0:
+                P = matrix.solve(identity + a.B * fmpq(1, k))
+                q = matrix.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
                 holds = h.composed(P, q.entries()) == h.transformed(P)
                 checked += 1
     equation = f"P h(x) = h(P x + q) for its map x -> P x + q and the other field h, at {count} values of eps"
@@ -95,16 +95,16 @@ def _in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None
 
 
 def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent) -> Identity:
-    """Commutativity as an identity in x, eps and the free parameters, which follow the coordinates of the point."""
+    """State commutativity as an identity in x, the free parameters and eps."""
     n, free = f.dim, family.free
     zero = family.values[0].context().constant(0)
     table = combination(space.fields, family.values, zero)
     # The free parameters are the symbols of g.
     symbols = [f"{''.join(f.variables)}{k}" for k in range(len(free))]
     joint = ring((*f.variables, *symbols))
-    places = dict(zip(free, joint.gens()[n:], strict=True))
-    letters = [places.get(k, joint.constant(0)) for k in range(len(family.values))]
-    weights = [value.compose(*letters, ctx=joint) for value in family.values]
+    parameters = dict(zip(free, joint.gens()[n:], strict=True))
+    arguments = [parameters.get(k, joint.constant(0)) for k in range(len(family.values))]
+    weights = [value.compose(*arguments, ctx=joint) for value in family.values]
     rhs = [0 * joint.gen(0)] * n
     for weight, g in zip(weights, space.fields, strict=True):
         rhs = [total + weight * p.compose(*joint.gens()[:n], ctx=joint) for total, p in zip(rhs, g.rhs, strict=True)]

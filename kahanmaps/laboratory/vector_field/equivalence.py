@@ -1,9 +1,10 @@
-"""Which system of the catalogue a vector field is in other coordinates: g(P x + q) = c P f(x), verified exactly.
+"""Search for a system of the catalogue that a vector field is affinely equivalent to: g(P x + q) = c P f(x).
 
-With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's map goes along with affine changes of variables: that
-of f at eps is that of g at eps/c. Only some P are tried: permutations of the variables with a number each (up to
-dimension 5, else without), after a change to a frame that f itself has (invariant hyperplanes, lines of fixed points),
-and in the plane all P. Parameters of g are unknowns too. What is found holds; that nothing is found says nothing.
+With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's method is equivariant under affine changes of
+variables: the map of f at eps is that of g at eps/c. Only some P are tried: permutations of the variables, scaled up to
+dimension 5, after a change to a frame that f determines (invariant hyperplanes, lines of fixed points), and in the
+plane all P. Parameters of g are unknowns too. An equivalence that is found is verified exactly; if none is found, there
+may still be one.
 """
 
 from __future__ import annotations
@@ -31,17 +32,17 @@ from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 MAX_DIMENSION = 6  # 720 permutations
-MAX_SCALED = 5  # dimension up to which each variable gets a number; above it Groebner bases may take a minute
-MAX_ORDERS = 24  # permutations that are tried of those that the terms allow: all 720 where every term is there
+MAX_SCALED = 5  # the largest dimension with scaled permutations; in higher ones Groebner bases may take a minute
+MAX_ORDERS = 24  # tried of the permutations that the monomials allow: these may be all 720
 MAX_FRAMES = 6
-_DEPTH = 4  # unknowns that are set to a number one after the other, where there are infinitely many solutions
+_MAX_DEPTH = 4  # unknowns that are set to numbers one after the other if there are infinitely many solutions
 
 Monomials = frozenset[tuple[int, ...]]
 
 
 @dataclass(frozen=True)
 class Equivalence:
-    """y = P x + q and eps/c lead to the system of the catalogue with that name and these parameters."""
+    """The change of variables y = P x + q, with eps/c for eps, to a system of the catalogue with these parameters."""
 
     name: str
     parameters: dict[str, fmpq]
@@ -52,7 +53,7 @@ class Equivalence:
 
     @property
     def text(self) -> str:
-        """The system, and how one comes to it."""
+        """The system and the change of variables."""
         values = ", ".join(f"{name} = {format_number(value)}" for name, value in self.parameters.items())
         images = linear_combinations(self.P, ring(self.variables).gens())
         point = ", ".join(format_polynomial(image + q) for image, q in zip(images, self.q, strict=True))
@@ -74,12 +75,15 @@ class Equivalence:
 def equivalent_system(
     system: SystemLike, fixed: FixedPointSearch | None = None, effort: int | Budget = 1
 ) -> Equivalence | None:
-    """A system of the catalogue that an affine change of variables leads to, proved; None where none was found.
+    """Search for a system of the catalogue that is affinely equivalent to the given one; None if none was found.
 
     Args:
-        system: a quadratic system. None is looked for if it is one of the catalogue itself.
-        fixed: its fixed points, if they are known already: lines of them are a frame.
-        effort: 1, or more: each more doubles the work that the search may take, each less halves it.
+        system: a quadratic system; for a system of the catalogue itself, None is returned.
+        fixed: its fixed points, if they are known; lines of fixed points give frames.
+        effort: each increase by 1 doubles the work limit.
+
+    Returns:
+        The equivalence, verified exactly.
 
     >>> from kahanmaps.documents.inline import System
     >>> print(equivalent_system(System("x' = 3*y*z; y' = x*z; z' = -x*y")))
@@ -93,27 +97,28 @@ def equivalent_system(
         values = file.parameters if load(file.name).parameters.keys() == file.parameters.keys() else {}
         if load(file.name, values).system.rhs == file.system.rhs:
             return None
-    # Systems of the catalogue, frames, and the order of the variables, None where P may be any matrix.
-    known, tried = _catalogue(f.dim), list[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]()
+    # The candidates: systems of the catalogue, frames, and permutations of the variables, None if P is any matrix.
+    known, candidates = _load_catalogue(f.dim), list[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]()
     budget = budget_for("equivalent systems", effort)
     for frame in _frames(f, fixed_points(f, budget.part(0.5)) if fixed is None else fixed):
         monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
         for g in known:
-            tried += ((g, frame, order) for order in itertools.islice(_fitting(monomials, g.monomials), MAX_ORDERS))
+            orders = _matching_permutations(monomials, g.monomials)
+            candidates += ((g, frame, order) for order in itertools.islice(orders, MAX_ORDERS))
     if f.dim == 2:
-        tried += ((g, QQ.identity(2), None) for g in known)
-    for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # all that is quick comes first
-        for g, frame, order in tried:
+        candidates += ((g, QQ.identity(2), None) for g in known)
+    for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # the fast searches first
+        for g, frame, order in candidates:
             if budget.is_spent:
                 return None
-            if (found := _matched(f, g, frame, order, is_scaled, budget)) is not None:
-                return found
+            if (equivalence := _solve_for_equivalence(f, g, frame, order, is_scaled, budget)) is not None:
+                return equivalence
     return None
 
 
 @dataclass(frozen=True)
 class _Known:
-    """A system of the catalogue with its parameters as symbols; the monomials of degree 2 of each right-hand side."""
+    """A system of the catalogue with its parameters as symbols, and the quadratic monomials of each right-hand side."""
 
     name: str
     system: QuadraticSystem
@@ -122,18 +127,21 @@ class _Known:
 
 
 @lru_cache(maxsize=MAX_DIMENSION)
-def _catalogue(dim: int) -> tuple[_Known, ...]:
-    """The systems of one dimension, few parameters first; with too many of them everything would be one of theirs."""
-    found, every = [], titles()
+def _load_catalogue(dim: int) -> tuple[_Known, ...]:
+    """Return the systems of one dimension, few parameters first.
+
+    Systems with more than dim + 2 parameters are left out: nearly every system would be equivalent to one of these.
+    """
+    systems, dimensions = [], titles()
     for name in names():
-        if every[name][0] != dim:
+        if dimensions[name][0] != dim:
             continue
         file = load(name)
         if len(file.parameters) <= dim + 2:
             system = with_symbols(file, tuple(file.parameters))
             if system.degree >= 2:
-                found.append(_Known(name, system, dict(file.parameters), _quadratic_monomials(system)))
-    return tuple(sorted(found, key=lambda one: len(one.defaults)))
+                systems.append(_Known(name, system, dict(file.parameters), _quadratic_monomials(system)))
+    return tuple(sorted(systems, key=lambda known: len(known.defaults)))
 
 
 def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
@@ -142,54 +150,56 @@ def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
 
 
 def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
-    """Matrices F: in the coordinates F x the f may look like a system of the catalogue; the first one is I."""
+    """Yield matrices F such that f in the coordinates F x may look like a system of the catalogue; the first is I."""
     n = f.dim
 
     def slopes(p: fmpq_mpoly) -> list[fmpq]:
-        """The coefficients of the variables in a polynomial of degree 1."""
+        """Return the coefficients of the variables in a polynomial of degree 1."""
         return [p.derivative(j)[(0,) * p.context().nvars()] for j in range(p.context().nvars())]
 
     yield QQ.identity(n)
-    planes = [slopes(one.function) for one in affine_darboux(f).functions]
+    planes = [slopes(affine.function) for affine in affine_darboux(f).functions]
     yield from itertools.islice(_invertible(planes, n), MAX_FRAMES)
-    lines = [one for one in fixed.found if one.dimension == 1 and not one.equations]
+    lines = [component for component in fixed.found if component.dimension == 1 and not component.equations]
     directions = [[sum(slopes(value), fmpq(0)) for value in line.coordinates] for line in lines]
     yield from (columns.transpose().inv() for columns in itertools.islice(_invertible(directions, n), MAX_FRAMES))
 
 
 def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
-    """Matrices that have some of the vectors as rows."""
+    """Return the invertible matrices whose rows are n of the vectors."""
     matrices = (fmpq_mat([list(row) for row in rows]) for rows in itertools.combinations(vectors, n))
     return (matrix for matrix in matrices if matrix.det() != 0)
 
 
-def _fitting(wanted: Sequence[Monomials], given: Sequence[Monomials]) -> Iterator[tuple[int, ...]]:
-    """The permutations that take the monomials of each right-hand side to those of another system."""
-    if sorted(map(len, wanted)) != sorted(map(len, given)):
+def _matching_permutations(source: Sequence[Monomials], target: Sequence[Monomials]) -> Iterator[tuple[int, ...]]:
+    """Yield the permutations that take the monomials of each right-hand side to those of another system."""
+    if sorted(map(len, source)) != sorted(map(len, target)):
         return
-    for order in itertools.permutations(range(len(wanted))):
-        back = sorted(range(len(order)), key=order.__getitem__)
-        if all(given[i] == {tuple(m[j] for j in back) for m in some} for some, i in zip(wanted, order, strict=True)):
+    for order in itertools.permutations(range(len(source))):
+        inverse = sorted(range(len(order)), key=order.__getitem__)
+        images = ({tuple(m[j] for j in inverse) for m in monomials} for monomials in source)
+        if all(target[i] == image for image, i in zip(images, order, strict=True)):
             yield order
 
 
-def _matched(
+def _solve_for_equivalence(
     f: QuadraticSystem, g: _Known, frame: fmpq_mat, order: Sequence[int] | None, is_scaled: bool, budget: Budget
 ) -> Equivalence | None:
-    """Solve g(P x + q) = c P f(x) for P = c T F with T a permutation, with a number each if `is_scaled`, or any matrix.
+    """Solve g(P x + q) = c P f(x) for P = c T F, where F is the frame.
 
-    F is the frame. Then the terms of degree 2 are free of c and q, and are solved first.
+    T is a permutation, scaled if `is_scaled`, or any matrix if `order` is None. With this P the quadratic terms do not
+    contain c and q, and are solved first.
     """
     n = f.dim
     count(300 * n)
     entries = [(i, j) for i in range(n) for j in range(n) if order is None or order[j] == i]
-    # In the order in which they are set to their defaults where there is a choice.
+    # Where there is a choice, unknowns are set to their defaults in this order.
     scales = [f"t{i}{j}" for i, j in entries]
     unknowns = ring(["c", *(f"q{i}" for i in range(n)), *scales, *(f"a{k}" for k in g.defaults)])
     defaults = [fmpq(1), *[fmpq(0)] * n, *(fmpq(int(order is not None or i == j)) for i, j in entries)]
     defaults += g.defaults.values()
-    highest, lower = _equations(f, g, frame, entries, unknowns)
-    # No change of scale and no translation is tried first: then parameters are unknowns of linear equations as a rule.
+    highest, lower = _equivalence_equations(f, g, frame, entries, unknowns)
+    # Without scaling and translation first: then the equations for the parameters are usually linear.
     simple = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
     shift, scale = simple[: n + 1], simple[n + 1 :][: len(entries)]
     always = shift if f.is_homogeneous and g.system.is_homogeneous else []
@@ -204,19 +214,19 @@ def _matched(
                     T[i, j] = t
                 P = T * frame * c
                 if c != 0 and P.det() != 0:
-                    there = (g.system.at(values) if values else g.system).renamed(f.variables)
-                    if there.composed(P, q).rhs == f.transformed(P).scaled(c).rhs:
+                    candidate = (g.system.at(values) if values else g.system).renamed(f.variables)
+                    if candidate.composed(P, q).rhs == f.transformed(P).scaled(c).rhs:
                         parameters = dict(zip(g.defaults, values, strict=True))
                         return Equivalence(g.name, parameters, f.variables, P, tuple(q), c)
     return None
 
 
-def _equations(
+def _equivalence_equations(
     f: QuadraticSystem, g: _Known, frame: fmpq_mat, entries: Sequence[tuple[int, int]], unknowns: fmpq_mpoly_ctx
 ) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
-    """The coefficients of g(P x + q) - c P f(x), those of degree 2 in x apart, and those of the divergences with them.
+    """Return the coefficients of g(P x + q) - c P f(x), those of degree 2 in x separately from the others.
 
-    That the divergences go along follows; these equations are of lower degree.
+    The equations for the divergences are added: they follow, and have lower degree in the unknowns.
     """
     n = f.dim
     joint = ring([*(f"x{i}" for i in range(n)), *unknowns.names()])
@@ -252,12 +262,12 @@ def _points(
     budget: Budget,
     depth: int = 0,
 ) -> Iterator[list[fmpq]]:
-    """Some rational solutions, one of each family: `values` where the equations for their variables hold."""
+    """Yield rational solutions, one from each family: the `values` where the equations for their variables hold."""
     context = values[0].context()
     solved = solve_system([p for p in equations if not p.is_zero()], values, budget)
     for component in solved.components:
         yield [evaluate(value, QQ, defaults) for value in component.values]
-    for part in solved.unsolved if depth < _DEPTH and not budget.is_spent else ():
+    for part in solved.unsolved if depth < _MAX_DEPTH and not budget.is_spent else ():
         i = part.free[0]
         for value in (defaults[i], defaults[i] + 1):
             fixed = [*part.equations, context.gen(i) - value]

@@ -151,7 +151,7 @@ def darboux_polynomials(
             reason = f"degrees above {flow_result.degree} are not settled: {flow_result.reason}"
     if flow or laboratory.defect:
         names = () if laboratory.defect else tuple(cofactor.name for cofactor in cofactors)
-        return DarbouxSearch(*laboratory.asked, degree, names, tuple(spaces), reason, flow=flow)
+        return DarbouxSearch(*laboratory.request, degree, names, tuple(spaces), reason, flow=flow)
     names, map_, requested = tuple(cofactor.name for cofactor in cofactors), laboratory.maps[0], degree
     while comb(map_.dim + degree, degree) > _MAX_TERMS:
         degree -= 1
@@ -166,7 +166,7 @@ def darboux_polynomials(
         sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
         for product in candidates:
             if budget.is_spent:
-                reason = "the budget was spent before all products of cofactors were tried (--effort)"
+                reason = "work limit reached before all products of cofactors were tried; raise --effort"
                 break
             progress(f"cofactor {product.text(cofactors)}")
             all_spaces |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
@@ -189,7 +189,7 @@ def darboux_polynomials(
                     spaces.append(result)
     except NoPoint as error:
         reason = str(error)
-    return DarbouxSearch(*laboratory.asked, requested, names, tuple(spaces), reason, flow=flow)
+    return DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), reason, flow=flow)
 
 
 def _is_spanned_by_products(known: dict[Law, DarbouxSpace], law: Law, prime: int) -> bool:

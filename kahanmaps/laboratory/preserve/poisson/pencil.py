@@ -124,7 +124,7 @@ def pencil_of(
         effort: the work before the computation is given up: each step above 1 doubles it, each step below halves it.
 
     Returns:
-        The `Pencil`; None if the degree is above 12, the budget was spent, or a consistency check failed.
+        The `Pencil`; None if the degree is above 12, the work limit was reached, or a consistency check failed.
 
     Source: docs/mathematics.md.
 
@@ -153,7 +153,7 @@ def pencil_of(
 
 
 class _Unclear(Exception):
-    """The curves are not generic, or the budget was spent."""
+    """The curves are not generic, or the work limit was reached."""
 
 
 def _require(condition: bool) -> None:

@@ -298,7 +298,7 @@ def find_poisson(
     if 1 < len(tensors) <= _MAX_PENCIL and all(P.jacobi.holds for P in tensors):
         identity = jacobi_identity(_pencil([P.tensor for P in tensors]), laboratory.eps)
         pencil, _ = _verdict(laboratory, identity, budget)
-    search = PoissonSearch(*laboratory.asked, tuple(tensors), (), degree, denominator, pencil, reason)
+    search = PoissonSearch(*laboratory.request, tuple(tensors), (), degree, denominator, pencil, reason)
     if tensors and integrals is None:
         progress("integrals, for their brackets")
         half = budget.part(0.5)
