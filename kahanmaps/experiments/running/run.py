@@ -120,7 +120,7 @@ def run(
     shard: tuple[int, int] = (1, 1),
     retry_failed: bool = False,
 ) -> Iterator[Record]:
-    """Do the tasks of a spec and yield their records as they come in.
+    """Run the tasks of a spec and yield their records as they finish.
 
     `spec` is a path, the text of a spec (anything with a line break), or a Spec. With `db`, a path, tasks that have
     a record there are not done again, and every record is in the database before it is yielded; without, nothing is
