@@ -225,13 +225,13 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"no period of {system.name} can be computed: {normal_form.reason}")
     point = _drawn(system, seed) if start is None else start
-    found = period_of(normal_form, eps, point, prime)
+    result = period_of(normal_form, eps, point, prime)
     return {
         "start": format_point(point),
-        "status": found.status,
-        "period": None if found.period is None else str(found.period),
-        "meets_pole": found.meets_pole,
-        "planes": [plane.text for plane in found.planes],
+        "status": result.status,
+        "period": None if result.period is None else str(result.period),
+        "meets_pole": result.meets_pole,
+        "planes": [plane.text for plane in result.planes],
     }
 
 
