@@ -142,7 +142,7 @@ from .maps.convention import CONVENTION as CONVENTION
 from .maps.convention import convention as convention
 from .maps.convention import eps_record as eps_record
 from .maps.convention import eps_share as eps_share
-from .maps.convention import eps_told as eps_told
+from .maps.convention import eps_suffix as eps_suffix
 from .maps.convention import time_step as time_step
 from .maps.floats.ensemble import starts_in_box as starts_in_box
 from .maps.floats.float_conversion import FloatArray as FloatArray

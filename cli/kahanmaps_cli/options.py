@@ -394,6 +394,6 @@ def settings_from(options: dict[str, Any], progress: Callable[[str], None], star
         seed=options["seed"],
         error_bits=options["error_bits"],
         max_digits=options["max_digits"],
-        orbit_is_asked=options["start"] is not None or steps is not None,
+        orbit_is_requested=options["start"] is not None or steps is not None,
         progress=progress,
     )

@@ -62,15 +62,6 @@ def _read_point(text: str, has_names: bool = False) -> Any:
     return _read_number(text, lib.parse_point)
 
 
-def _read_whole(text: str, least: int) -> int:
-    text = _without_exponent(text.strip())
-    digits = text.removeprefix("-").removeprefix("+")
-    # Python's own limit on digits would raise another error.
-    if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
-        raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
-    return int(text)
-
-
 def _read_short_integer(text: str) -> int:
     text = text.strip()
     if len(text) > _MAX_DIGITS:
@@ -86,18 +77,6 @@ def _read_seconds(text: str) -> float:
     if not (isfinite(seconds) and seconds > 0):
         raise InputError(f"found {quoted(text)}, expected a number of seconds above 0")
     return seconds
-
-
-def _read_pair(text: str, name_is_optional: bool) -> tuple[str, str]:
-    left, equals, right = (piece.strip() for piece in text.partition("="))
-    if name_is_optional and "," in left:  # a formula without a name, followed by definitions of letters
-        return "", text.strip()
-    if equals and left and right and left.isprintable():
-        return left, right
-    if name_is_optional and not equals and left:
-        return "", left
-    hint = f" (the prime of cycles is --prime {text.strip()})" if re.fullmatch("[0-9]{1,20}", text.strip()) else ""
-    raise InputError(f"found {quoted(text)}, expected NAME=VALUE{hint}")
 
 
 def _read_steps(text: str) -> list[int]:
@@ -132,12 +111,33 @@ ShortInteger = partial(ParameterKind, "integer", _read_short_integer)  # replace
 
 def Whole(least: int = 0) -> ParameterKind:
     """An integer that is at least `least`."""
-    return ParameterKind("integer", _read_whole, least)
+
+    def read(text: str) -> int:
+        text = _without_exponent(text.strip())
+        digits = text.removeprefix("-").removeprefix("+")
+        # Python's own limit on digits would raise another error.
+        if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
+            raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
+        return int(text)
+
+    return ParameterKind("integer", read)
 
 
 def NameValue(name_is_optional: bool = False) -> ParameterKind:
     """NAME=VALUE; with `name_is_optional` a text without a name is the value."""
-    return ParameterKind("name=value", _read_pair, name_is_optional)
+
+    def read(text: str) -> tuple[str, str]:
+        name, equals, value = (piece.strip() for piece in text.partition("="))
+        if name_is_optional and "," in name:  # a formula without a name, followed by definitions of letters
+            return "", text.strip()
+        if equals and name and value and name.isprintable():
+            return name, value
+        if name_is_optional and not equals and name:
+            return "", name
+        hint = f" (the prime of cycles is --prime {text.strip()})" if re.fullmatch("[0-9]{1,20}", text.strip()) else ""
+        raise InputError(f"found {quoted(text)}, expected NAME=VALUE{hint}")
+
+    return ParameterKind("name=value", read)
 
 
 def _without_exponent(text: str) -> str:

@@ -43,7 +43,7 @@ def _checked(check: Check) -> None:
 
     def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
         is_requested = options["start"] is not None or options["steps"] != Settings.steps
-        settings = Settings(**options, orbit_is_asked=is_requested)
+        settings = Settings(**options, orbit_is_requested=is_requested)
         return _of_report(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
 
     perform.__doc__ = check.for_batch or check.question

@@ -114,7 +114,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         if status and not quiet:
             print_stderr(f"{found.status}: {message}")
     else:
-        print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, {options['arithmetic']} arithmetic")
+        print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, {options['arithmetic']} arithmetic")
         print_stdout(str(found))
     return status
 

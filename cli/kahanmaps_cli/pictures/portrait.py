@@ -145,7 +145,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     orbits = counted(found.orbits, "orbit")
     origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from automatic initial points"
     backward = ", backward" if options["backward"] else ""
-    at_eps = "" if eps is None else lib.eps_told(eps, file.map)
+    at_eps = "" if eps is None else lib.eps_suffix(eps, file.map)
     messages = [f"{file.label}: {orbits}{origin}, {counted(len(found.points) - 1, 'step')}{backward}{at_eps}"]
     messages += [f"{count} of {orbits} ended early: {reason}" for reason, count in found.ended.items()]
     points = found.points.shape[0] * found.points.shape[1]

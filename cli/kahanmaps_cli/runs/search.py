@@ -54,7 +54,7 @@ def scope(found: Any) -> str:
     """Return text behind the name of the map: for which eps and symbols the formulas hold."""
     if getattr(found, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
-    step = lib.eps_told(found.eps, found.file.map)
+    step = lib.eps_suffix(found.eps, found.file.map)
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 
 
