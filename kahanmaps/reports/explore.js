@@ -52,7 +52,7 @@ function orbit(rows, start, eps, steps) {
 
 function functionAt(f, x, eps) {
   const at = [...x, eps];
-  return valueOf(f.above, at) / valueOf(f.below, at);
+  return valueOf(f.numerator, at) / valueOf(f.denominator, at);
 }
 
 // Return a range that contains the first value and most others, as in other pictures: outliers are ignored.

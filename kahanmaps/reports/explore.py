@@ -82,7 +82,7 @@ def explore_data(found: Analysis) -> dict[str, Any]:
         sides = [_terms(part, names, file.parameters) for part in (function.numerator, function.denominator)]
         if sum(map(len, sides)) <= _MAX_TERMS:
             text = format_rational_function(function)
-            watched.append({"name": name, "text": text, "word": word, "above": sides[0], "below": sides[1]})
+            watched.append({"name": name, "text": text, "word": word, "numerator": sides[0], "denominator": sides[1]})
     if file.is_quadratic:  # a start whose orbit stays, in the middle of those that a portrait takes
         starts = automatic_starts(file.system, DEFAULT_EPS if found.eps is None else found.eps)
         start, reach = starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")

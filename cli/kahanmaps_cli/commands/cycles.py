@@ -65,8 +65,8 @@ def command(system: str | None, **options: Any) -> int:
             for eps in values if file.map.has_eps else [1]:
                 if not search.is_over:
                     runs.append(lib.cycle_census(file.map, eps, prime, **limits, seed=options["seed"], progress=search))
-        words = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
-        line = ", ".join(f"{word} modulo {run.prime}" for word, run in zip(words, runs, strict=True))
+        results = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
+        line = ", ".join(f"{text} modulo {run.prime}" for text, run in zip(results, runs, strict=True))
 
         def print_text() -> None:
             what = "the Kahan map" if file.is_quadratic else file.map.kind
