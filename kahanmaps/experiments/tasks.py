@@ -38,7 +38,7 @@ _MAX_POINT = 400  # characters of a last point; of a longer one only the hash is
 _CHECKED = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
-def _checked(check: Check) -> None:
+def _register_check(check: Check) -> None:
     """Register the task of a check of one system, or of a pair at two time steps."""
 
     def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
@@ -52,7 +52,7 @@ def _checked(check: Check) -> None:
 
 
 for _check in CHECKS.values():
-    _checked(_check)
+    _register_check(_check)
 
 
 @task("verify", needs=MEMBER, reports=True)
