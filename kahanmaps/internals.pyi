@@ -106,7 +106,6 @@ from .invariants.growth import Growth as Growth
 from .laboratory.analysis import Analysis as Analysis
 from .laboratory.analysis import analyze as analyze
 from .laboratory.analysis_result import Statement as Statement
-from .laboratory.cycles import Census as Census
 from .laboratory.cycles import cycle_census as cycle_census
 from .laboratory.cycles import default_eps as default_eps
 from .laboratory.defaults import ITERATE_DEGREE as ITERATE_DEGREE
@@ -142,7 +141,7 @@ from .maps.convention import CONVENTION as CONVENTION
 from .maps.convention import convention as convention
 from .maps.convention import eps_record as eps_record
 from .maps.convention import eps_share as eps_share
-from .maps.convention import eps_told as eps_told
+from .maps.convention import eps_suffix as eps_suffix
 from .maps.convention import time_step as time_step
 from .maps.floats.ensemble import starts_in_box as starts_in_box
 from .maps.floats.float_conversion import FloatArray as FloatArray
@@ -150,7 +149,6 @@ from .maps.floats.float_conversion import to_float as to_float
 from .maps.floats.float_conversion import to_floats as to_floats
 from .maps.floats.float_orbit import FloatEnsemble as FloatEnsemble
 from .maps.floats.float_orbit import float_function as float_function
-from .maps.floats.lyapunov import Lyapunov as Lyapunov
 from .maps.floats.lyapunov import lyapunov_exponents as lyapunov_exponents
 from .maps.floats.npy_file import NpyFile as NpyFile
 from .maps.kahan import KahanFamily as KahanFamily
@@ -166,7 +164,6 @@ from .paper.claims.beyond_table import beyond_table as beyond_table
 from .paper.claims.beyond_table import table as table
 from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
-from .plots.curves.invariant_curves import InvariantCurves as InvariantCurves
 from .plots.curves.invariant_curves import find_invariant_curves as find_invariant_curves
 from .plots.curves.level_sets import level_curves as level_curves
 from .plots.curves.level_sets import levels_through as levels_through
@@ -174,7 +171,6 @@ from .plots.curves.plot_invariant_curves import panels_of as panels_of
 from .plots.curves.plot_invariant_curves import plot_invariant_curves as plot_invariant_curves
 from .plots.curves.plot_invariant_curves import view_of as view_of
 from .plots.drifts.drift import METHODS as METHODS
-from .plots.drifts.drift import DriftSurvey as DriftSurvey
 from .plots.drifts.drift import clipped_from as clipped_from
 from .plots.drifts.drift import plot_drift as plot_drift
 from .plots.drifts.drift import small_start as small_start

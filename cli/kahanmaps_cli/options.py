@@ -260,8 +260,8 @@ def load_pair(
     if other == "-":  # which can be read once
         raise click.UsageError("-p with OTHER on standard input is ambiguous: write OTHER to a file")
     named = [
-        set(given) if are_equations(one) else set(_loaded(one, {}).document.get("parameters", ()))
-        for one in (other, *([] if reference in (None, "-") else [reference]))
+        set(given) if are_equations(other_system) else set(_loaded(other_system, {}).document.get("parameters", ()))
+        for other_system in (other, *([] if reference in (None, "-") else [reference]))
     ]
     of_first = [pair for pair in options["parameters"] if pair[0] not in named[0] or pair[0] in named[-1]]
     if len(named) == 1:  # the first system is inline or on standard input: its parameters are unknown
@@ -343,9 +343,9 @@ def load_with_start(
     words = set(re.findall(r"[A-Za-z_]\w*", text))
     roots = {name: lib.parse_root(value) for name, value in options["parameters"] if name in words}
     known = set[str]()
-    for one in references:
-        if one is not None and one != "-" and not are_equations(one):
-            known |= set(_loaded(one, {}).document.get("parameters", ()))
+    for other_system in references:
+        if other_system is not None and other_system != "-" and not are_equations(other_system):
+            known |= set(_loaded(other_system, {}).document.get("parameters", ()))
     inline = " ".join([*map(str, filter(are_equations, references)), *options["rhs"], *options["image"]])
     # The parameters of a system on standard input are not known yet.
     known |= {name for name in roots if "-" in references or re.search(rf"\b{name}\b", inline)}
@@ -394,6 +394,6 @@ def settings_from(options: dict[str, Any], progress: Callable[[str], None], star
         seed=options["seed"],
         error_bits=options["error_bits"],
         max_digits=options["max_digits"],
-        orbit_is_asked=options["start"] is not None or steps is not None,
+        orbit_is_requested=options["start"] is not None or steps is not None,
         progress=progress,
     )

@@ -56,88 +56,108 @@ def _read_number(text: str, read: Callable[[str], Any] | None = None) -> Any:
         raise ExpressionError("; ".join([error.message, *hints]), text, error.column) from None
 
 
-def _read_point(text: str, has_names: bool = False) -> Any:
-    if has_names and _NAME.search(text):
-        return text  # names are resolved when the system is loaded
-    return _read_number(text, lib.parse_point)
-
-
-def _read_whole(text: str, least: int) -> int:
-    text = _without_exponent(text.strip())
-    digits = text.removeprefix("-").removeprefix("+")
-    # Python's own limit on digits would raise another error.
-    if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
-        raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
-    return int(text)
-
-
-def _read_short_integer(text: str) -> int:
-    text = text.strip()
-    if len(text) > _MAX_DIGITS:
-        raise InputError(f"found {quoted(text)}, expected an integer of at most {_MAX_DIGITS} digits")
-    return int(click.INT(_without_exponent(text)))
-
-
-def _read_seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not (isfinite(seconds) and seconds > 0):
-        raise InputError(f"found {quoted(text)}, expected a number of seconds above 0")
-    return seconds
-
-
-def _read_pair(text: str, name_is_optional: bool) -> tuple[str, str]:
-    left, equals, right = (piece.strip() for piece in text.partition("="))
-    if name_is_optional and "," in left:  # a formula without a name, followed by definitions of letters
-        return "", text.strip()
-    if equals and left and right and left.isprintable():
-        return left, right
-    if name_is_optional and not equals and left:
-        return "", left
-    hint = f" (the prime of cycles is --prime {text.strip()})" if re.fullmatch("[0-9]{1,20}", text.strip()) else ""
-    raise InputError(f"found {quoted(text)}, expected NAME=VALUE{hint}")
-
-
-def _read_steps(text: str) -> list[int]:
-    steps = set()
-    for piece in text.split(","):
-        piece = _without_exponent(piece.strip())
-        if not (piece.isascii() and piece.isdigit()) or len(piece) > _MAX_STEP_DIGITS:
-            expected = f"step numbers of at most {_MAX_STEP_DIGITS} digits, separated by commas"
-            raise InputError(f"found {quoted(piece)}, expected {expected}")
-        steps.add(int(piece))
-    return sorted(steps)
-
-
-def _read_shard(text: str) -> tuple[int, ...]:
-    pieces = text.partition("/")[::2]
-    numbers = tuple(int(part) if part.isascii() and part.isdigit() and len(part) < 10 else 0 for part in pieces)
-    if not 1 <= numbers[0] <= numbers[1]:
-        raise InputError(f"found {text[:40]!r}, expected I/N with 1 <= I <= N, e.g. 3/16")
-    return numbers
-
-
 ExactNumber = partial(ParameterKind, "number", _read_number)  # an integer, p/q or a decimal, read exactly
-PointText = partial(ParameterKind, "point", _read_point)  # such numbers separated by commas
 Arithmetic = partial(
     ParameterKind, "kind", lambda text: lib.Arithmetic.parse(text)
 )  # exact, float, mod:P (P a prime), ball:BITS or ball:auto
-Seconds = partial(ParameterKind, "seconds", _read_seconds)  # a time above 0
-Steps = partial(ParameterKind, "n1,n2,...", _read_steps)  # step numbers separated by commas
-Shard = partial(ParameterKind, "i/n", _read_shard)  # I/N: the I-th of N parts
-ShortInteger = partial(ParameterKind, "integer", _read_short_integer)  # replaces `type=int` in all commands
+
+
+def PointText(has_names: bool = False) -> ParameterKind:
+    """A point: exact numbers separated by commas; with `has_names` they may contain names."""
+
+    def read(text: str) -> Any:
+        if has_names and _NAME.search(text):
+            return text  # names are resolved when the system is loaded
+        return _read_number(text, lib.parse_point)
+
+    return ParameterKind("point", read)
+
+
+def Seconds() -> ParameterKind:
+    """A time above 0, in seconds."""
+
+    def read(text: str) -> float:
+        try:
+            seconds = float(text)
+        except ValueError:
+            seconds = 0.0
+        if not (isfinite(seconds) and seconds > 0):
+            raise InputError(f"found {quoted(text)}, expected a number of seconds above 0")
+        return seconds
+
+    return ParameterKind("seconds", read)
+
+
+def Steps() -> ParameterKind:
+    """Step numbers separated by commas."""
+
+    def read(text: str) -> list[int]:
+        steps = set()
+        for piece in text.split(","):
+            piece = _without_exponent(piece.strip())
+            if not (piece.isascii() and piece.isdigit()) or len(piece) > _MAX_STEP_DIGITS:
+                expected = f"step numbers of at most {_MAX_STEP_DIGITS} digits, separated by commas"
+                raise InputError(f"found {quoted(piece)}, expected {expected}")
+            steps.add(int(piece))
+        return sorted(steps)
+
+    return ParameterKind("n1,n2,...", read)
+
+
+def Shard() -> ParameterKind:
+    """I/N: the I-th of N parts."""
+
+    def read(text: str) -> tuple[int, ...]:
+        pieces = text.partition("/")[::2]
+        numbers = tuple(int(part) if part.isascii() and part.isdigit() and len(part) < 10 else 0 for part in pieces)
+        if not 1 <= numbers[0] <= numbers[1]:
+            raise InputError(f"found {text[:40]!r}, expected I/N with 1 <= I <= N, e.g. 3/16")
+        return numbers
+
+    return ParameterKind("i/n", read)
+
+
+def ShortInteger() -> ParameterKind:
+    """An integer of bounded length, which replaces `type=int` in all commands."""
+
+    def read(text: str) -> int:
+        text = text.strip()
+        if len(text) > _MAX_DIGITS:
+            raise InputError(f"found {quoted(text)}, expected an integer of at most {_MAX_DIGITS} digits")
+        return int(click.INT(_without_exponent(text)))
+
+    return ParameterKind("integer", read)
 
 
 def Whole(least: int = 0) -> ParameterKind:
     """An integer that is at least `least`."""
-    return ParameterKind("integer", _read_whole, least)
+
+    def read(text: str) -> int:
+        text = _without_exponent(text.strip())
+        digits = text.removeprefix("-").removeprefix("+")
+        # Python's own limit on digits would raise another error.
+        if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= least):
+            raise InputError(f"found {quoted(text)}, expected an integer, {least} or more")
+        return int(text)
+
+    return ParameterKind("integer", read)
 
 
 def NameValue(name_is_optional: bool = False) -> ParameterKind:
     """NAME=VALUE; with `name_is_optional` a text without a name is the value."""
-    return ParameterKind("name=value", _read_pair, name_is_optional)
+
+    def read(text: str) -> tuple[str, str]:
+        name, equals, value = (piece.strip() for piece in text.partition("="))
+        if name_is_optional and "," in name:  # a formula without a name, followed by definitions of letters
+            return "", text.strip()
+        if equals and name and value and name.isprintable():
+            return name, value
+        if name_is_optional and not equals and name:
+            return "", name
+        hint = f" (the prime of cycles is --prime {text.strip()})" if re.fullmatch("[0-9]{1,20}", text.strip()) else ""
+        raise InputError(f"found {quoted(text)}, expected NAME=VALUE{hint}")
+
+    return ParameterKind("name=value", read)
 
 
 def _without_exponent(text: str) -> str:

@@ -39,8 +39,8 @@ class Settings:
     `eps` is half the time step, None for every eps. Claims are also tried along `steps` steps of an exact orbit from
     the initial point `start` (None: a random one), within `max_digits` digits (None: by dimension). `eps` and the
     coordinates may be any exact numbers: 1, Fraction(1, 10), "1/10"; coordinates also elements of one number field.
-    `orbit_is_asked` is true if the user gave the initial point or the number of steps: then the report must say whether
-    the orbit was completed.
+    `orbit_is_requested` is true if the user gave the initial point or the number of steps: then the report must say
+    whether the orbit was completed.
     """
 
     eps: fmpq | None = None
@@ -49,7 +49,7 @@ class Settings:
     seed: int = 0
     error_bits: int = DEFAULT_ERROR_BITS
     max_digits: int | None = None
-    orbit_is_asked: bool = False
+    orbit_is_requested: bool = False
     progress: Callable[[str], None] = lambda _: None
 
     def __post_init__(self) -> None:
@@ -74,7 +74,7 @@ class Settings:
 
     def cut_short(self, run: OrbitRun) -> bool:
         """Return whether an orbit that the user requested ended early."""
-        return self.orbit_is_asked and not run.end.is_whole
+        return self.orbit_is_requested and not run.end.is_whole
 
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
         """Return the data needed to reproduce the check, including the systems."""

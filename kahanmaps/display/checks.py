@@ -13,7 +13,7 @@ from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witnes
 from kahanmaps.display import markup
 from kahanmaps.display_protocols import html_form, shorten, text_form
 from kahanmaps.errors import counted
-from kahanmaps.maps.convention import eps_words
+from kahanmaps.maps.convention import eps_record_suffix
 
 _MAX_CLAIMS = 30  # in a notebook
 _MAX_TEXT = 400  # characters
@@ -178,7 +178,7 @@ def headline(report: Report) -> str:
         names = ", ".join(f"{name} ({text})" if text else name for name, text in pair)
     else:
         names = ", ".join(filter(None, (context["system"], values[0])))
-    eps = eps_words(context)
+    eps = eps_record_suffix(context)
     if "eps2" in context:
         eps += f", second map at eps2 = {context['eps2']}"
     return f"{report.check}: {names}{eps}"

@@ -33,7 +33,7 @@ from kahanmaps.laboratory.scan.result import Scan
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import MATRICES, Symmetries
-from kahanmaps.maps.convention import eps_record, eps_told
+from kahanmaps.maps.convention import eps_record, eps_suffix
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -110,7 +110,7 @@ def _text(text: str, width: int = _TEXT) -> str:
 
 def analysis_title(found: Analysis) -> str:
     """The title of a report: the system, its dimension and parameters, and eps."""
-    step = eps_told(found.eps, found.file.map)
+    step = eps_suffix(found.eps, found.file.map)
     values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
     formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
     return f"{found.file.name}, dimension {found.dim}{values}{step}{formulas}"

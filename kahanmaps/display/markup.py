@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from kahanmaps.errors import printable
-from kahanmaps.maps.convention import eps_words
+from kahanmaps.maps.convention import eps_record_suffix
 
 # A symbol, and a color to be mixed with that of the text; the contrast is above 4.5 : 1 on white and on near black.
 WORDS = {
@@ -82,7 +82,7 @@ def eps_phrase(record: Mapping[str, Any]) -> str:
     'eps = 1/10 (time step 2 eps = 1/5)'
     """
     step = record["time_step"] and shortened(record["time_step"])
-    return eps_words({**record, "eps": shortened(record["eps"]), "time_step": step}).removeprefix(", ")
+    return eps_record_suffix({**record, "eps": shortened(record["eps"]), "time_step": step}).removeprefix(", ")
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:

@@ -40,7 +40,7 @@ _MAX_FILES = 10_000
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
 
-Place = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 
 def _read_system(value: Any) -> None:
@@ -82,48 +82,48 @@ _REQUIRED = ("experiments", "task")
 _OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
 
 
-def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
+def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[KeyPath, str, str]]:
     """Return the mistakes in the shape as triples of a path, the key as text, and a sentence.
 
     >>> shape_mistakes({"experiments": {"a": {"task": 1}}})
     [(('experiments', 'a', 'task'), 'experiments.a.task', 'found 1, expected the name of a task, e.g. check-commute')]
     """
-    found = _mistakes(document, (dict, "a table", _SPEC), ())
-    return [(place, key_of(place), sentence) for place, sentence in found]
+    mistakes = _mistakes(document, (dict, "a table", _SPEC), ())
+    return [(path, key_of(path), sentence) for path, sentence in mistakes]
 
 
-def _mistakes(value: Any, shape: Any, place: Place) -> Iterator[tuple[Place, str]]:
+def _mistakes(value: Any, shape: Any, path: KeyPath) -> Iterator[tuple[KeyPath, str]]:
     """Yield the paths in a value that do not have the expected shape, with a sentence."""
     if callable(shape):
         try:
             shape(value)
         except ValueError as error:
-            yield place, str(error)
+            yield path, str(error)
         return
     kind, expected, *inner = shape
     if not isinstance(value, kind) or (shape is _EXPERIMENTS and not value):
-        yield place, f"found {show(value)}, expected {expected}"
+        yield path, f"found {show(value)}, expected {expected}"
         return
     (parts,) = inner or [None]
     if isinstance(parts, tuple):
         for name, item in enumerate(value) if kind is list else value.items():
-            yield from _mistakes(item, parts, (*place, name))
+            yield from _mistakes(item, parts, (*path, name))
     elif parts is not None:
         for name, part in parts.items():
             if name in value:
-                yield from _mistakes(value[name], part, (*place, name))
+                yield from _mistakes(value[name], part, (*path, name))
             elif name in _REQUIRED:
-                yield (*place, name), f"missing, expected {part[1]}"
+                yield (*path, name), f"missing, expected {part[1]}"
         for name in (name for name in value if name not in parts):
-            here = (*place, name)
-            is_of_system = here in _OF_SYSTEM_FILES
+            unknown = (*path, name)
+            is_of_system = unknown in _OF_SYSTEM_FILES
             hint = " (a system file is for the other commands)" if is_of_system else suggestion(name, list(parts))
-            yield here, f"unknown key, expected one of {', '.join(parts)}{hint}"
+            yield unknown, f"unknown key, expected one of {', '.join(parts)}{hint}"
 
 
-def key_of(place: Place) -> str:
+def key_of(path: KeyPath) -> str:
     """Return a path as text, with lists counted from 1: experiments.a.zip[1]."""
-    return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
+    return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
 
 
 class SpecDocument:
@@ -139,7 +139,7 @@ class SpecDocument:
         self.folder = folder
         self.mistakes: list[tuple[str, str]] = []
         self.documents: dict[str, str] = {}
-        self._misshapen: list[Place] = []
+        self._misshapen: list[KeyPath] = []
         for path, key, sentence in shape_mistakes(document):
             self._misshapen.append(path)
             self.mistake(key, sentence)
@@ -251,16 +251,16 @@ class ExperimentReader:
         if kind is None:
             return None  # what an option means depends on the task
         fixed, axes = self._read_values(kind, "options"), self._read_values(kind, "axes")
-        places: dict[str, str] = {}
-        for option, place, _ in [entry for part in ("options", "axes") for entry in self.entries(part)]:
-            if option in places:
-                both = {place.rpartition(".")[2], places[option].rpartition(".")[2]}
+        keys: dict[str, str] = {}
+        for option, option_key, _ in [entry for part in ("options", "axes") for entry in self.entries(part)]:
+            if option in keys:
+                both = {option_key.rpartition(".")[2], keys[option].rpartition(".")[2]}
                 hint = " (the time step is 2 eps)" if TIME_STEP in both and len(both) > 1 else ""
-                self.mistake(place, f"found {places[option]} as well, expected one of the two{hint}")
-            places.setdefault(option, place)
+                self.mistake(option_key, f"found {keys[option]} as well, expected one of the two{hint}")
+            keys.setdefault(option, option_key)
         zips = self._read_zips(axes)
         limits = self._read_limits(kind, fixed)
-        self._require(kind)
+        self._require_options(kind)
         if len(self.spec.mistakes) > reported_before:
             return None
         constant = {key: values[0] for key, values in fixed.items()}
@@ -299,26 +299,26 @@ class ExperimentReader:
 
     def given(self) -> dict[str, str]:
         """Return the keys of the options in the spec, valid or not, by canonical names."""
-        return {name: place for part in ("axes", "options") for name, place, _ in self.entries(part)}
+        return {name: key for part in ("axes", "options") for name, key, _ in self.entries(part)}
 
     def _read_values(self, kind: TaskKind, part: str) -> dict[str, AxisValues]:
         """Return the valid values of one of the tables by canonical names, and report the others."""
-        found: dict[str, AxisValues] = {}
-        for name, place, raw in self.entries(part):
-            with self._at(place):
+        valid: dict[str, AxisValues] = {}
+        for name, key, raw in self.entries(part):
+            with self._at(key):
                 if name == "parameters" and self.has_parameters:
                     raise InputError(f"found {show(raw)}, expected a table of parameters")
-                option = self._option(kind, name, place.removeprefix(f"{part}."))
+                option = self._find_option(kind, name, key.removeprefix(f"{part}."))
                 if part == "options" and isinstance(raw, list):
                     raise InputError("found a list, expected one value; lists and ranges go to axes")
-                values = self._read_one(place, option, raw)
+                values = self._read_axis(key, option, raw)
                 if values is not None and part == "options" and len(values) > 1:
                     raise InputError(f"found {len(values)} values, expected one; lists and ranges go to axes")
                 if values is not None:
-                    found[name] = values
-        return found
+                    valid[name] = values
+        return valid
 
-    def _option(self, kind: TaskKind, name: str, written: str) -> Option:
+    def _find_option(self, kind: TaskKind, name: str, written: str) -> Option:
         """Return the option or parameter of this name. Raises InputError where there is none."""
         if name.startswith(PARAMETERS) and self.has_parameters:
             key = name.removeprefix(PARAMETERS)
@@ -340,21 +340,21 @@ class ExperimentReader:
         expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
         raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")
 
-    def _read_one(self, place: str, option: Option, raw: Any) -> AxisValues | None:
+    def _read_axis(self, key: str, option: Option, raw: Any) -> AxisValues | None:
         """Return the values of one option; None where a mistake was reported."""
         if option.name == OTHER:
             references = raw if isinstance(raw, list) else [raw]
             if not references or not all(isinstance(reference, str) for reference in references):
                 raise InputError(f"found {show(raw)}, expected a file, a name of the catalogue, or a list of these")
-            system_specs = self._read_files(place, references)
+            system_specs = self._read_files(key, references)
             return AxisValues(option, [system_specs]) if system_specs else None
-        if place.endswith(f".{TIME_STEP}"):
-            read_eps = option.read  # of half the time step
+        if key.endswith(f".{TIME_STEP}"):
+            read_eps = option.read  # reads half the time step
             option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
         zipped = {name for names in self._written_zips() for name in names or []}
         values, mistakes = read_values(option, raw, repeats=option.name in zipped)
         for position, sentence in mistakes:
-            self.mistake(place + "".join(f"[{k}]" for k in position), sentence)
+            self.mistake(key + "".join(f"[{k}]" for k in position), sentence)
         return values
 
     def _written_zips(self) -> list[list[str] | None]:
@@ -371,33 +371,33 @@ class ExperimentReader:
         before: set[str] = set()
         given = {name for name, _, _ in self.entries("axes")}
         for number, names in enumerate(self._written_zips(), start=1):
-            place = f"zip[{number}]"
+            key = f"zip[{number}]"
             if names is None:
                 continue
             unknown = [name for name in names if name not in axes]
             for name in unknown:
                 if name not in given:  # else another mistake was reported
-                    self.mistake(place, f"{name} is not an axis{suggestion(name, list(axes))}")
+                    self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
             twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
             if len(names) < 2:
-                self.mistake(place, f"found {show(names)}, expected at least two axes that run together")
+                self.mistake(key, f"found {show(names)}, expected at least two axes that run together")
                 continue
             before |= set(names)
             for name in twice:
-                self.mistake(place, f"found {name} twice, expected every axis in one zip at most")
+                self.mistake(key, f"found {name} twice, expected every axis in one zip at most")
             if not unknown and not twice:
                 zips.append(tuple(names))
                 lengths = {name: len(axes[name]) for name in names}
                 if len(set(lengths.values())) > 1:
                     counts = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-                    self.mistake(place, f"{counts} values, expected equal numbers: the axes of a zip run together")
+                    self.mistake(key, f"{counts} values, expected equal numbers: the axes of a zip run together")
                 elif any(has_repeats(axes[name]) for name in names):
                     rows: dict[tuple[str, ...], int] = {}
                     for k in range(1, 1 + lengths[names[0]]):
                         row = tuple(repr(axes[name][k - 1]) for name in names)
                         if rows.setdefault(row, k) != k:
                             self.mistake(
-                                place, f"found equal values at positions {rows[row]} and {k}, expected them once"
+                                key, f"found equal values at positions {rows[row]} and {k}, expected them once"
                             )
                             break
         return zips
@@ -407,15 +407,15 @@ class ExperimentReader:
         time, memory, digits = (
             self.sound("limits", name) or self.spec.sound("limits", name) for name in ("time", "memory", "digits")
         )
-        place = self.given().get("max_digits")
+        key = self.given().get("max_digits")
         if "digits" in own and self.sound("limits", "digits") is None:
             pass  # reported with the shape
         elif "max_digits" not in kind.options:
             if "digits" in own:
                 self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
-        elif place is not None:
+        elif key is not None:
             if "digits" in own:
-                self.mistake("limits.digits", f"found {place} as well, expected one of the two")
+                self.mistake("limits.digits", f"found {key} as well, expected one of the two")
         elif digits is not None:
             fixed["max_digits"] = AxisValues(VOCABULARY["max_digits"], [(digits,)])
         return TaskLimits(
@@ -423,7 +423,7 @@ class ExperimentReader:
             DEFAULT_LIMITS.memory if memory is None else read_memory(memory),
         )
 
-    def _require(self, kind: TaskKind) -> None:
+    def _require_options(self, kind: TaskKind) -> None:
         if any(self.sound(part) is None and part in self.raw for part in ("options", "axes")):
             return  # a missing option may be in the table of a wrong shape
         given = self.given()
@@ -477,9 +477,9 @@ class ExperimentReader:
         system_specs: dict[str, dict[str, Any]] = {}
         names: dict[str, str] = {}  # of the files with these documents
         for number, reference in enumerate(references, start=1):
-            place = f"{key}[{number}]" if len(references) > 1 else key
-            with self._at(place):
-                for name in self._names(reference):
+            item_key = f"{key}[{number}]" if len(references) > 1 else key
+            with self._at(item_key):
+                for name in self._match_files(reference):
                     try:
                         file = find_file(name, self.spec.folder)
                         system_spec = spec_of(file, self.spec.documents)
@@ -489,7 +489,7 @@ class ExperimentReader:
                         if self._skips and key == "system":
                             self.skipped.append((name, str(error)))
                         else:
-                            self.mistake(place, f"{error}{suggestion(name, [_FAMILY_WORD])}")
+                            self.mistake(item_key, f"{error}{suggestion(name, [_FAMILY_WORD])}")
                         continue
                     if system_spec["document"] in system_specs:
                         same = f"{name} says the same as {names[system_spec['document']]}"
@@ -497,18 +497,18 @@ class ExperimentReader:
                         if self._skips and key == "system":
                             self.skipped.append((name, sentence))
                             continue
-                        self.mistake(place, sentence)
+                        self.mistake(item_key, sentence)
                     system_specs[system_spec["document"]], names[system_spec["document"]] = system_spec, name
                     if key == "system":
                         self.files.append(file)
-                        with self._at(place):
+                        with self._at(item_key):
                             self._require_kind(file)
         if self.skipped and not system_specs:
             name, reason = self.skipped[0]
             self.mistake(key, f"found no usable system, expected at least one; {name} is skipped: {reason}")
         return list(system_specs.values())
 
-    def _names(self, reference: str) -> list[str]:
+    def _match_files(self, reference: str) -> list[str]:
         """Return the reference itself, or the files that match a pattern such as members/*.toml."""
         if not any(mark in reference for mark in "*?["):
             return [reference]

@@ -21,12 +21,11 @@ _RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/
 _MAX_VALUES = 2**62  # of an axis: the limit of Python's `len`
 _TOO_MANY = "too many values"
 
-Place = tuple[int, ...]
-Mistake = tuple[Place, str]
+Mistake = tuple[tuple[int, ...], str]  # the position in a list, and a sentence
 
 
 class RationalRange(Sequence[fmpq]):
-    """first, first + step, ... up to last, which is met only if it is first plus a multiple of step.
+    """The numbers first, first + step, ... up to last, which is included only if last - first is a multiple of step.
 
     >>> [str(value) for value in RationalRange.from_text("1/10..1/2 step 1/5")]
     ['1/10', '3/10', '1/2']
@@ -51,12 +50,12 @@ class RationalRange(Sequence[fmpq]):
 
     @classmethod
     def from_text(cls, text: str) -> RationalRange:
-        """The range that a text such as "2..5" spells. Raises InputError for any other text."""
-        first, dots, rest = text.partition("..")
-        words = rest.split()
-        if not dots or not first.strip() or not (len(words) == 1 or (len(words) == 3 and words[1] == "step")):
+        """Read a range such as "2..5". Raises InputError for any other text."""
+        first, dots, bounds = text.partition("..")
+        parts = bounds.split()
+        if not dots or not first.strip() or not (len(parts) == 1 or (len(parts) == 3 and parts[1] == "step")):
             raise InputError(f"found {show(text)}, {_RANGE_FORM}")
-        return cls(parse_number(first), parse_number(words[0]), parse_number(words[2]) if len(words) > 1 else fmpq(1))
+        return cls(parse_number(first), parse_number(parts[0]), parse_number(parts[2]) if len(parts) > 1 else fmpq(1))
 
     def __len__(self) -> int:
         return len(self.numerators)
@@ -88,14 +87,14 @@ class AxisValues(Sequence[Any]):
 
 
 def is_range(raw: Any) -> bool:
-    """Whether a value of a spec is meant as a range."""
+    """Whether a value of a spec is a range, valid or not."""
     return isinstance(raw, str) and ".." in raw
 
 
 def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisValues | None, list[Mistake]]:
-    """The values that a spec gives to an option, and the mistakes with their places (from 1) in a list.
+    """Read the values of an option in a spec; return also the mistakes with their positions (from 1) in a list.
 
-    `raw` is one value, a range or a list of both. With `repeats` a single value may be there several times.
+    `raw` is one value, a range or a list of both. With `repeats` a single value may occur several times.
     """
     pieces: list[Sequence[Any]] = []
     mistakes: list[Mistake] = []
@@ -104,16 +103,16 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
     if not items:
         mistakes.append(((), "found an empty list, expected at least one value"))
     for number, item in enumerate(items, start=1):
-        place = (number,) if isinstance(raw, list) else ()
+        position = (number,) if isinstance(raw, list) else ()
         try:
             if option.numbers and is_range(item):
-                found = RationalRange.from_text(item)
-                # Between the ends nothing can go wrong that does not go wrong there, but for eps = 0 and fractions.
-                values = AxisValues(option, [found])
-                zero = found.numerators.index(0) if 0 in found.numerators else 0
-                for k in {0, min(1, len(found) - 1), len(found) - 1, zero}:
+                values_range = RationalRange.from_text(item)
+                # If the ends are valid, so are all values in between, except eps = 0 and fractions.
+                values = AxisValues(option, [values_range])
+                zero = values_range.numerators.index(0) if 0 in values_range.numerators else 0
+                for k in {0, min(1, len(values_range) - 1), len(values_range) - 1, zero}:
                     values[k]
-                pieces.append(found)
+                pieces.append(values_range)
                 continue
             value = option.read(item)
             if value in seen and not repeats:
@@ -121,20 +120,20 @@ def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[AxisVa
             seen[value] = number
             pieces.append((value,))
         except InputError as error:
-            mistakes.append((place, str(error)))
+            mistakes.append((position, str(error)))
     if not mistakes and sum(map(len, pieces)) > _MAX_VALUES:
         mistakes.append(((), f"found {_TOO_MANY}"))
     return (None if mistakes else AxisValues(option, pieces)), mistakes
 
 
 def has_repeats(values: AxisValues) -> bool:
-    """Whether a single value is there several times: those of ranges are not looked at."""
+    """Whether a single value occurs several times, not counting values in ranges."""
     single = [repr(piece[0]) for piece in values.pieces if not isinstance(piece, RationalRange)]
     return len(set(single)) < len(single)
 
 
 class Grid:
-    """All combinations of named axes, the last one running fastest; zipped axes, equally long, run together.
+    """All combinations of named axes, the last one varying fastest; zipped axes, equally long, vary together.
 
     >>> grid = Grid({"m": [2, 3], "seed": range(3), "steps": [10, 20]}, zips=[("m", "steps")])
     >>> grid.size, grid[3]
@@ -149,18 +148,18 @@ class Grid:
 
     @property
     def size(self) -> int:
-        """The number of combinations (not `len`, which Python bounds)."""
+        """The number of combinations (`len` cannot exceed 2^63)."""
         return prod(self._lengths)
 
     def __getitem__(self, index: int) -> dict[str, Any]:
         if not 0 <= index < self.size:
             raise IndexError(index)
-        places = []
+        indices = []
         for length in reversed(self._lengths):
-            index, place = divmod(index, length)
-            places.append(place)
+            index, position = divmod(index, length)
+            indices.append(position)
         return {
-            name: self.axes[name][place]
-            for group, place in zip(self.groups, reversed(places), strict=True)
+            name: self.axes[name][position]
+            for group, position in zip(self.groups, reversed(indices), strict=True)
             for name in group
         }

@@ -1,9 +1,9 @@
-"""The tasks of the laboratory: what a map preserves and how it grows, and what is seen of it from outside.
+"""The tasks of the laboratory: preserved structures and growth of degrees, singularities, cycles, Lyapunov exponents.
 
-As in tasks.py results are small, words and numbers to group by; `report = true` keeps all that was found. Without eps
-an analysis is for every eps. The effort bounds its work, and so belongs to the key; "status" says what is open. The
-verdict is that of the formulas that were found; growth and numbers of integrals are measured, and have words of their
-own. Singularities, cycles and exponents are all measured: they have no verdict.
+As in tasks.py results are small, short texts and numbers to group by; `report = true` stores the full result. Without
+eps an analysis is for every eps. The effort limits its work, and so belongs to the key; "status" says what is open. The
+verdict is that of the formulas that were found. Growth and numbers of integrals are measured, and have entries of their
+own. Singularities, cycles and exponents are only measured, and have no verdict.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
 POISSON = {"symbolic": "symbols", "max_degree": "degree"}
-_ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are known for all iterates
+_ENDINGS = ("constant", "singular")  # of sequences of degrees known for all iterates without a recurrence
 
 
 @analysis(
     "degrees", "growth.degrees:degree_growth", of="map", eps=None, terms=None, max_degree=20_000, effort=1, seed=0
 )
-def degrees(found: DegreeGrowth) -> Result:
+def degrees(growth: DegreeGrowth) -> Result:
     """Compute degrees of the iterates: growth, dynamical degree, recurrence."""
     return {
-        "status": found.ended,
-        **_growth(found),
-        "estimate": found.estimate,
-        "degrees": list(found.degrees),
-        "reached": len(found.degrees) - 1,
-        "ending": found.message,
+        "status": growth.ended,
+        **_growth(growth),
+        "estimate": growth.estimate,
+        "degrees": list(growth.degrees),
+        "reached": len(growth.degrees) - 1,
+        "ending": growth.message,
     }
 
 
@@ -55,7 +55,7 @@ def scan_parameters(
     system: SystemFile,
     over: list[str],
     eps: Any = None,
-    by: str = "degrees",  # nothing else any more; it stays for the keys of earlier databases
+    by: str = "degrees",  # the only value; kept for the keys of earlier databases
     terms: int | None = None,
     primes: list[int] | None = None,
     effort: int = 1,
@@ -65,49 +65,59 @@ def scan_parameters(
     from kahanmaps.laboratory.scan.result import growth_on
     from kahanmaps.laboratory.scan.scan import scan
 
-    found = scan(system, over, eps=eps, terms=terms, primes=primes, effort=effort, seed=seed, jobs=1)
-    kinds = [(str(growth.growth), some) for _, some in found.classes if (growth := growth_on(some)) is not None]
+    result = scan(system, over, eps=eps, terms=terms, primes=primes, effort=effort, seed=seed, jobs=1)
+    by_growth = [
+        (str(growth.growth), components)
+        for _, components in result.classes
+        if (growth := growth_on(components)) is not None
+    ]
     return {
-        "status": found.ended,
-        "growth": kinds[0][0] if kinds else None,  # the slowest
-        "components": len(found.components),
-        "confirmed": sum(one.is_confirmed for one in found.components),
-        "integrable": [one.text for kind, some in kinds if kind != "exponential" for one in some if one.is_confirmed],
-        "generic": list(found.generic),
-        "unassigned": max(found.unassigned, default=0),
-    }, found
+        "status": result.ended,
+        "growth": by_growth[0][0] if by_growth else None,  # the slowest
+        "components": len(result.components),
+        "confirmed": sum(component.is_confirmed for component in result.components),
+        "integrable": [
+            component.text
+            for growth_kind, components in by_growth
+            if growth_kind != "exponential"
+            for component in components
+            if component.is_confirmed
+        ],
+        "generic": list(result.generic),
+        "unassigned": max(result.unassigned, default=0),
+    }, result
 
 
 @analysis(
     "find-integrals", "preserve.integrals:find_integrals", eps=None, symbolic=None, max_degree=None, effort=1, seed=0
 )
-def integrals(found: IntegralSearch) -> Result:
+def integrals(search: IntegralSearch) -> Result:
     """Search for rational integrals, and find their number by theorems and by orbits."""
     return {
-        "verdict": _weakest(verdict for _, verdict in found.formulas),
-        "status": _state_of_integrals(found),
-        "integrals": found.formula_count,
-        "codimension": found.codimension if found.profile.nullities else found.by_theorems or None,
-        "formulas": [text for text, _ in found.formulas],
-        "nullities": list(found.profile.nullities),
-        "period": found.profile.period,
-        "reason": found.reason,
+        "verdict": _weakest(verdict for _, verdict in search.formulas),
+        "status": _state_of_integrals(search),
+        "integrals": search.formula_count,
+        "codimension": search.codimension if search.profile.nullities else search.by_theorems or None,
+        "formulas": [text for text, _ in search.formulas],
+        "nullities": list(search.profile.nullities),
+        "period": search.profile.period,
+        "reason": search.reason,
     }
 
 
 @analysis(
     "find-density", "preserve.densities:find_densities", eps=None, symbolic=None, max_degree=None, effort=1, seed=0
 )
-def density(found: DensitySearch) -> Result:
+def density(search: DensitySearch) -> Result:
     """Search for invariant volume forms dx/phi with phi of least degree or a product of powers."""
     return {
-        "verdict": _weakest(one.verdict for one in found.densities),
-        "status": _state_of_densities(found),
-        "densities": len(found.densities),
-        "degree_tried": None if found.degree < 0 else found.degree,
-        "formulas": [one.text for one in found.densities],
-        "period": found.period,
-        "reason": found.reason,
+        "verdict": _weakest(density.verdict for density in search.densities),
+        "status": _state_of_densities(search),
+        "densities": len(search.densities),
+        "degree_tried": None if search.degree < 0 else search.degree,
+        "formulas": [density.text for density in search.densities],
+        "period": search.period,
+        "reason": search.reason,
     }
 
 
@@ -121,34 +131,34 @@ def density(found: DensitySearch) -> Result:
     effort=1,
     seed=0,
 )
-def poisson(found: PoissonSearch) -> Result:
+def poisson(search: PoissonSearch) -> Result:
     """Search for Poisson tensors with polynomial entries: number, ranks, Casimirs among the integrals."""
     return {
-        "verdict": _weakest(one.verdict for one in found.tensors),
-        "status": "found" if found.tensors else "none" if found.reason.startswith("no tensor") else "open",
-        "tensors": len(found.tensors),
-        "degree_tried": None if found.degree < 0 else found.degree,
-        "formulas": [one.text for one in found.tensors],
-        "ranks": [one.rank for one in found.tensors],
-        "jacobi": [str(one.jacobi) for one in found.tensors],
-        "casimirs": [list(one.casimirs) for one in found.tensors],
-        "reason": found.reason,
+        "verdict": _weakest(tensor.verdict for tensor in search.tensors),
+        "status": "found" if search.tensors else "none" if search.reason.startswith("no tensor") else "open",
+        "tensors": len(search.tensors),
+        "degree_tried": None if search.degree < 0 else search.degree,
+        "formulas": [tensor.text for tensor in search.tensors],
+        "ranks": [tensor.rank for tensor in search.tensors],
+        "jacobi": [str(tensor.jacobi) for tensor in search.tensors],
+        "casimirs": [list(tensor.casimirs) for tensor in search.tensors],
+        "reason": search.reason,
     }
 
 
 @analysis("find-symmetry", "symmetry.symmetries:linear_symmetries", of="system", effort=1)
-def symmetry(found: Symmetries) -> Result:
+def symmetry(result: Symmetries) -> Result:
     """Find affine symmetries and reversing symmetries for every eps: number and generators."""
     return {
-        "verdict": str(Certainty.PROVED if found.complete else Certainty.UNDECIDED),
-        "status": "complete" if found.complete else "undecided",
-        "group_order": found.order,
-        "symmetries": len(found.symmetries),
-        "reversing": len(found.reversing),
-        "infinitesimal": len(found.infinitesimal),
-        "scaling": found.scaling is not None,
-        "generators": [one.text for one in found.generators],
-        "open": found.undecided,
+        "verdict": str(Certainty.PROVED if result.complete else Certainty.UNDECIDED),
+        "status": "complete" if result.complete else "undecided",
+        "group_order": result.order,
+        "symmetries": len(result.symmetries),
+        "reversing": len(result.reversing),
+        "infinitesimal": len(result.infinitesimal),
+        "scaling": result.scaling is not None,
+        "generators": [generator.text for generator in result.generators],
+        "open": result.undecided,
     }
 
 
@@ -161,52 +171,52 @@ def symmetry(found: Symmetries) -> Result:
     seed=0,
     error_bits=DEFAULT_ERROR_BITS,
 )
-def commuting(found: CommutingSystems) -> Result:
-    """Find the quadratic systems whose Kahan maps commute with this one for every eps."""
+def commuting(result: CommutingSystems) -> Result:
+    """Find the quadratic systems whose Kahan maps commute with this system for every eps."""
     return {
-        "verdict": str(found.verdict),
-        "status": "complete" if found.complete else "undecided",
-        "commuting": len(found.nontrivial),
-        "families": len(found.families),
-        "family_parameters": max((len(family.directions) for family in found.families), default=0),
-        "bracket_dimension": found.dimension,
-        "every_g_commutes": found.every_g_commutes,
-        "systems": [one.rhs for one in found.nontrivial],
-        "irrational": found.irrational,
-        "open": found.undecided,
+        "verdict": str(result.verdict),
+        "status": "complete" if result.complete else "undecided",
+        "commuting": len(result.nontrivial),
+        "families": len(result.families),
+        "family_parameters": max((len(family.directions) for family in result.families), default=0),
+        "bracket_dimension": result.dimension,
+        "every_g_commutes": result.every_g_commutes,
+        "systems": [system.rhs for system in result.nontrivial],
+        "irrational": result.irrational,
+        "open": result.undecided,
     }
 
 
 @analysis("analyze", "analysis:analyze", eps=None, symbolic=None, effort=1, seed=0)
-def all_analyses(found: Analysis) -> Result:
+def all_analyses(result: Analysis) -> Result:
     """Run all analyses: integrability, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.system_normal_form import SystemNormalForm
 
-    final, confined = found.conclusion, {run.verdict for run in found.singularities}
-    # The parts that were begun and did not come to their end, be it for want of budget or of formulas.
+    final, confined = result.conclusion, {run.verdict for run in result.singularities}
+    # The parts that were begun and not completed, for lack of budget or of formulas.
     states = {
-        "degrees": found.degrees is None or found.degrees.recurrence is not None or found.degrees.ended in _ENDINGS,
-        "integrals": found.integrals is None or _state_of_integrals(found.integrals) == "complete",
-        "densities": found.densities is None or _state_of_densities(found.densities) != "open",
-        "symmetries": found.symmetries is None or found.symmetries.complete,
-        "commuting systems": found.commuting is None or found.commuting.complete,
-        "singularities": not any(run.stopped or run.verdict == "undecided" for run in found.singularities),
+        "degrees": result.degrees is None or result.degrees.recurrence is not None or result.degrees.ended in _ENDINGS,
+        "integrals": result.integrals is None or _state_of_integrals(result.integrals) == "complete",
+        "densities": result.densities is None or _state_of_densities(result.densities) != "open",
+        "symmetries": result.symmetries is None or result.symmetries.complete,
+        "commuting systems": result.commuting is None or result.commuting.complete,
+        "singularities": not any(run.stopped or run.verdict == "undecided" for run in result.singularities),
     }
     unfinished = [name for name, is_done in states.items() if not is_done]
     return {
-        "status": "partial" if found.skipped or unfinished else "complete",
+        "status": "partial" if result.skipped or unfinished else "complete",
         "integrability": final.kind,
-        "integrals": final.integrals if found.integrals_were_counted else None,
-        **(_growth(found.degrees) if found.degrees is not None else {}),
+        "integrals": final.integrals if result.integrals_were_counted else None,
+        **(_growth(result.degrees) if result.degrees is not None else {}),
         "growth": final.growth,
-        "densities": None if found.densities is None else len(found.densities.densities),
-        "group_order": None if found.symmetries is None else found.symmetries.order,
-        "commuting": None if found.commuting is None else len(found.commuting.nontrivial),
+        "densities": None if result.densities is None else len(result.densities.densities),
+        "group_order": None if result.symmetries is None else result.symmetries.order,
+        "commuting": None if result.commuting is None else len(result.commuting.nontrivial),
         "confinement": None if not confined else confined.pop() if len(confined) == 1 else "undecided",
-        "in_family": isinstance(found.normal_form, SystemNormalForm),
+        "in_family": isinstance(result.normal_form, SystemNormalForm),
         "sentence": final.sentence,
         "unfinished": unfinished,
-        "skipped": found.skipped,
+        "skipped": result.skipped,
     }
 
 
@@ -294,59 +304,59 @@ def lyapunov(
     transient: int | None = None,
     seed: int = 0,
 ) -> Result:
-    """Lyapunov exponents of float orbits from random starts, by the exact tangent map, per unit of time."""
+    """Compute Lyapunov exponents per unit of time of float orbits from random points, by the exact tangent map."""
     from kahanmaps.maps.floats.ensemble import starts_in_box
     from kahanmaps.maps.floats.float_conversion import to_floats
     from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     skipped = steps // 10 if transient is None else transient
-    found = lyapunov_exponents(system.map, starts, eps, steps, transient=skipped)
-    mean, volume = found.mean, found.log_volume
+    result = lyapunov_exponents(system.map, starts, eps, steps, transient=skipped)
+    mean, volume = result.mean, result.log_volume
     return {
-        "status": "completed" if len(found.exponents) else "no orbit left",
-        "ended": found.ended,
-        "counted": found.steps,
+        "status": "completed" if len(result.exponents) else "no orbit left",
+        "ended": result.ended,
+        "counted": result.steps,
         "largest": _number(mean[0]),
         "smallest": _number(mean[-1]),
         "exponents": [_number(value) for value in mean],
-        "spread": [_number(value) for value in found.spread],
-        "change_from_half": [_number(value) for value in found.change],
+        "spread": [_number(value) for value in result.spread],
+        "change_from_half": [_number(value) for value in result.change],
         "sum": _number(mean.sum()),
         "log_volume": _number(volume.mean()) if len(volume) else None,
-        "residual": _number(found.residual) if len(volume) else None,
+        "residual": _number(result.residual) if len(volume) else None,
     }
 
 
-def _state_of_integrals(found: IntegralSearch) -> str:
-    if not found.profile.nullities:
+def _state_of_integrals(search: IntegralSearch) -> str:
+    if not search.profile.nullities:
         return "not measured"
-    if not found.is_complete:
+    if not search.is_complete:
         return "formulas missing"
-    return "unfinished" if found.reason else "complete"
+    return "unfinished" if search.reason else "complete"
 
 
-def _state_of_densities(found: DensitySearch) -> str:
-    """ "none" is measured up to the degree that was tried; what is "open" has its reason."""
-    if found.densities:
+def _state_of_densities(search: DensitySearch) -> str:
+    """Return "found", "none" (measured, up to the degree that was tried) or "open" (see the reason)."""
+    if search.densities:
         return "found"
-    return "none" if found.reason.startswith("no polynomial") else "open"
+    return "none" if search.reason.startswith("no polynomial") else "open"
 
 
 def _weakest(verdicts: Iterable[Certainty]) -> str | None:
-    """The weakest of the verdicts; None where nothing was found: that there is nothing is no claim here."""
+    """Return the weakest of the verdicts, None if there are no formulas."""
     given = list(verdicts)
     return str(combined(given)) if given else None
 
 
-def _growth(found: DegreeGrowth) -> Result:
+def _growth(growth: DegreeGrowth) -> Result:
     """Return the entries on the growth of degrees."""
-    recurrence, rate = found.recurrence, found.dynamical_degree
+    recurrence, rate = growth.recurrence, growth.dynamical_degree
     return {
-        "growth": str(found.growth),
-        "looks_exponential": found.looks_exponential,  # an estimate, where there is no recurrence
-        "unconfirmed": found.unconfirmed,  # why a recurrence that fits is not given
-        "singularities": None if found.patterns is None else found.patterns.text,
+        "growth": str(growth.growth),
+        "looks_exponential": growth.looks_exponential,  # an estimate, where there is no recurrence
+        "unconfirmed": growth.unconfirmed,  # why a recurrence that fits is not given
+        "singularities": None if growth.patterns is None else growth.patterns.text,
         "dynamical_degree": None if rate is None else rate.digits,
         "minimal_polynomial": None if rate is None else format_univariate(fmpq_poly(rate.minimal_polynomial)),
         "power": None if recurrence is None else recurrence.power,

@@ -134,9 +134,9 @@ def _read_prime(value: Any) -> str:
 
 
 def _read_names(value: Any) -> str:
-    if "eps" in (found := _read_names_or_eps(value)).split(","):
+    if "eps" in (names := _read_names_or_eps(value)).split(","):
         raise InputError("found eps, expected names of parameters: eps is symbolic whenever it has no value")
-    return found
+    return names
 
 
 def _read_names_or_eps(value: Any) -> str:
@@ -182,8 +182,8 @@ def read_time(value: Any) -> float | None:
     (90.0, None)
     """
     expected = "seconds, or a text like 90 s, 5 min, 2 h, none"
-    found = _with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MAX_SECONDS)
-    return None if found is None else float(found)
+    seconds = _with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MAX_SECONDS)
+    return None if seconds is None else float(seconds)
 
 
 def read_memory(value: Any) -> int | None:
@@ -193,18 +193,18 @@ def read_memory(value: Any) -> int | None:
     1500000000
     """
     expected = "bytes, or a text like 500 MB, 2 GB, 1 GiB, none"
-    found = _with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MAX_BYTES)
-    return None if found is None else int(found)
+    size = _with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MAX_BYTES)
+    return None if size is None else int(size)
 
 
 def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fraction, most: int) -> Fraction | None:
     if value == _NONE:
         return None
     text = value if isinstance(value, str) else show(value)
-    found = re.fullmatch(r"\s*([0-9]{1,18}(?:\.[0-9]{1,9})?(?:[eE][+-]?[0-9]{1,2})?)\s*([A-Za-z]*)\s*", text)
-    if found is None or (found[2] and found[2] not in units):
+    match = re.fullmatch(r"\s*([0-9]{1,18}(?:\.[0-9]{1,9})?(?:[eE][+-]?[0-9]{1,2})?)\s*([A-Za-z]*)\s*", text)
+    if match is None or (match[2] and match[2] not in units):
         raise ValueError(f"found {show(value)}, expected {expected}")
-    amount = Fraction(found[1]) * units.get(found[2], 1)
+    amount = Fraction(match[1]) * units.get(match[2], 1)
     if not least <= amount <= most:
         unit = "s" if units is _TIME_UNITS else "bytes"
         raise ValueError(f"found {show(value)}, expected {float(least):g} to {float(most):g} {unit}, or none")

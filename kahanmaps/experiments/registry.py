@@ -2,15 +2,15 @@
 
     @task("family-space", needs=MEMBER)
     def family_space(system: SystemFile) -> Result:
-        '''The space of cubics that belong to A.'''
+        '''Compute the space of cubics that belong to A.'''
 
 The parameters are names of `options.VOCABULARY`, optional if they have a default; `system`, if present, is the system.
 A result is plain data; its "verdict" becomes the verdict of the record. A task of the laboratory only summarizes the
 result of a function, which is called with these options and defaults:
 
     @analysis("find-density", "preserve.densities:find_densities", eps=None, effort=1, seed=0)
-    def density(found: DensitySearch) -> Result:
-        '''The densities phi for which the measure dx/phi is invariant.'''
+    def density(search: DensitySearch) -> Result:
+        '''Search for densities phi such that the measure dx/phi is invariant.'''
 
 Tasks of users are in modules named in the environment variable KAHANMAPS_TASKS (separated by commas), which each
 worker process imports.
@@ -98,7 +98,11 @@ def task(
             parameters = dict(inspect.signature(function).parameters)
             takes_system = parameters.pop("system", None) is not None
             names = list(parameters)
-            defaults = {key: one.default for key, one in parameters.items() if one.default is not one.empty}
+            defaults = {
+                key: parameter.default
+                for key, parameter in parameters.items()
+                if parameter.default is not parameter.empty
+            }
         unknown = [key for key in names if key not in VOCABULARY]
         if unknown:
             raise TypeError(f"task {name}: {unknown[0]} is not an option{suggestion(unknown[0], list(VOCABULARY))}")
@@ -141,9 +145,9 @@ def analysis(
 
 
 def task_kinds() -> Mapping[str, TaskKind]:
-    """All kinds of tasks by name, those of KAHANMAPS_TASKS among them."""
-    for ours in LIBRARY:
-        import_module(ours)
+    """Return all kinds of tasks by name, including those of KAHANMAPS_TASKS."""
+    for library_module in LIBRARY:
+        import_module(library_module)
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):
         try:
             import_module(module)
@@ -154,7 +158,7 @@ def task_kinds() -> Mapping[str, TaskKind]:
 
 
 def task_kind(name: str) -> TaskKind:
-    """The kind of task of this name. Raises InputError where there is none."""
+    """Return the kind of task with this name. Raises InputError if there is none."""
     kinds = task_kinds()
     if name not in kinds:
         raise InputError(

@@ -1,10 +1,10 @@
-"""What a batch is to do, in TOML: experiments, each a task for many systems and many values of its options.
+"""The spec of a batch, in TOML: experiments, each a task for many systems and many values of its options.
 
     [experiments.commute]
     task = "check-commute"
     system = "family"                        # or a name of the catalogue, a path, or a list of these
     options = { draw = "generic" }           # the same for all tasks
-    zip = [["m", "steps"]]                   # axes that run together; all others are combined
+    zip = [["m", "steps"]]                   # axes that vary together; all others are combined
 
     [experiments.commute.axes]               # one value, a list, a range, or a list with ranges in it
     m = "2..5"
@@ -17,9 +17,8 @@
     memory = "1 GB"
     digits = 20000
 
-Reading it finds every mistake at once, each with its key; docs/batch.md has all keys.
-
-What one of the tables means is the matter of experiment.py.
+All mistakes in a spec are reported together, each with its key; docs/batch.md lists all keys. Tables of experiments are
+read in experiment.py.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ _MAX_LISTED = 3
 
 
 class SpecError(SystemFileError):
-    """A spec with mistakes: all of them at once, each with its key."""
+    """Raised for a spec with mistakes: it lists all of them, each with its key."""
 
 
 _TOML = TomlKind("spec", MAX_BYTES, SpecError)
@@ -61,10 +60,10 @@ class Spec:
 
 
 def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS, skip_bad: bool = False) -> Spec:
-    """The spec in a TOML file; paths of systems in it are relative to its folder.
+    """Read the spec in a TOML file; paths of systems in it are relative to its folder.
 
     With `skip_bad` systems that cannot be read, or are of the wrong kind for the task, are left out and listed.
-    Raises SpecError with every mistake, InputError where the file cannot be read.
+    Raises SpecError with all mistakes, and InputError if the file cannot be read.
     """
     data = _TOML.read(path)
     with reading(path):
@@ -79,7 +78,7 @@ def parse_spec(
     max_tasks: int = MAX_TASKS,
     skip_bad: bool = False,
 ) -> Spec:
-    """The spec that a text in TOML describes; `where` names it in messages.
+    """Read the spec from text in TOML; `where` names it in messages.
 
     >>> table = '[experiments.a]\\ntask = "orbit"\\nsystem = "lorenz"\\n'
     >>> spec = parse_spec(table + 'axes = {eps = ["0.1", "1/7"], seed = "0..4"}')

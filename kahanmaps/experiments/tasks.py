@@ -38,12 +38,12 @@ _MAX_POINT = 400  # characters of a last point; of a longer one only the hash is
 _CHECKED = {"eps": None, "start": None, "steps": 10, "seed": 0, "error_bits": DEFAULT_ERROR_BITS, "max_digits": None}
 
 
-def _checked(check: Check) -> None:
+def _register_check(check: Check) -> None:
     """Register the task of a check of one system, or of a pair at two time steps."""
 
     def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
         is_requested = options["start"] is not None or options["steps"] != Settings.steps
-        settings = Settings(**options, orbit_is_asked=is_requested)
+        settings = Settings(**options, orbit_is_requested=is_requested)
         return _of_report(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
 
     perform.__doc__ = check.for_batch or check.question
@@ -52,7 +52,7 @@ def _checked(check: Check) -> None:
 
 
 for _check in CHECKS.values():
-    _checked(_check)
+    _register_check(_check)
 
 
 @task("verify", needs=MEMBER, reports=True)
@@ -225,13 +225,13 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"no period of {system.name} can be computed: {normal_form.reason}")
     point = _drawn(system, seed) if start is None else start
-    found = period_of(normal_form, eps, point, prime)
+    result = period_of(normal_form, eps, point, prime)
     return {
         "start": format_point(point),
-        "status": found.status,
-        "period": None if found.period is None else str(found.period),
-        "meets_pole": found.meets_pole,
-        "planes": [plane.text for plane in found.planes],
+        "status": result.status,
+        "period": None if result.period is None else str(result.period),
+        "meets_pole": result.meets_pole,
+        "planes": [plane.text for plane in result.planes],
     }
 
 

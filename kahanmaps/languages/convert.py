@@ -1,4 +1,4 @@
-"""A system, its Kahan map, integrals and density as a file for another program.
+"""Conversion of a system, its Kahan map, integrals and density to a file for another program.
 
 Expressions are written by the code printers of SymPy (the extra `[sympy]`), for PARI by our own; what stands around
 them is in languages.toml. Exact numbers stay exact in all languages but C, Fortran and NumPy, whose numbers are floats.
@@ -45,25 +45,25 @@ def convert(
     symbols: Sequence[str] = (),
     command: str = "",
 ) -> str:
-    """A map and what is known of it as a file that another program runs as it stands, exactly.
+    """Return a map with its known integrals and density as a complete, exact file for another program.
 
     A system stands for its Kahan map.
 
     Args:
         system: the system; its parameters are written as the numbers that the file gives.
         language: one of `LANGUAGES`.
-        what: of `PARTS`; None for the system, the map, and integrals and density where they are known.
-        name: put before the names of all functions, so that two systems fit into one session; in LaTeX nothing.
-        symbols: parameters that stay symbols (not in a [family] file); the functions take them as arguments after eps.
-        command: the command line that makes this file, for the comment on top.
+        what: a list of `PARTS`; None for the system, the map, and the integrals and density if they are known.
+        name: prefix of the names of all functions, so that one session can load two systems; ignored in LaTeX.
+        symbols: parameters that stay symbols (not in a [family] file); they are arguments of functions after eps.
+        command: the command line that creates this file, for the initial comment.
 
     Returns:
-        The text of the file. eps is an argument of all functions of the map (the time step is 2 eps, as the comment on
-        top says), if it has one. Nothing in it depends on the day or the machine.
+        The text of the file, which is reproducible. If the map depends on eps, its functions have the argument eps (the
+        time step is 2 eps, as stated in the initial comment).
 
     Raises:
-        InputError: for an unknown language or part, a name that is none, integrals or a density where none is known,
-            a closed form ("map-formulas") that is too large, and where SymPy is needed and missing.
+        InputError: for an unknown language or part, an invalid name, unknown integrals or density, a closed form
+            ("map-formulas") that is too large, and if SymPy is needed and missing.
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(convert(load("harmonic"), "pari", ["system"]).split("\\n\\n")[1].strip())
@@ -86,7 +86,7 @@ def convert(
 
 
 def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
-    """The parts in the order of `PARTS`. Raises InputError for one that is unknown or cannot be written."""
+    """Return the parts in the order of `PARTS`. Raises InputError for unknown or unavailable parts."""
     if what is None:
         first = ["system", "map"] if formulas.rhs else ["map"]
         return [*first, *(part for part in ("integrals", "density") if part not in formulas.missing)]
@@ -108,7 +108,7 @@ def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
 
 
 class _Writer:
-    """One file: names are chosen first, then functions are written in the order of their needs."""
+    """The writer of a file: it chooses all names first, and writes functions after those that they call."""
 
     def __init__(self, language: str, formulas: Formulas, prefix: str) -> None:
         tables = tomllib.loads(files(__package__).joinpath("languages.toml").read_text("utf-8"))
@@ -116,21 +116,21 @@ class _Writer:
         self.formulas = formulas
         self.polynomial = _polynomial_writer(self.language)
         self.written: dict[str, str] = {}  # name in the language -> text
-        self.used = {"point", "image", "eps", "value"}  # names, in small letters: Fortran does not tell them apart
+        self.used = {"point", "image", "eps", "value"}  # names in lower case, since Fortran ignores case
         self.prefix = [prefix] if prefix else []
         kind = "kahan" if formulas.rhs else "map"
         called = {f"kahan_{what}": f"{kind}_{what}" for what in ("matrix", "vector", "inverse", "jacobian")}
         called |= {"kahan_map": "kahan_map" if formulas.rhs else "map_step"}
         called |= {"kahan_map_formula": called["kahan_map"] + "_formula"}
         called |= {key: key for key in ("vector_field", "modified_hamiltonian", "density")}
-        # Of functions: what they are -> how they are called.
+        # Maps functions to their names in the file.
         self.names = {key: self._fresh_name(*self.prefix, name) for key, name in called.items()}
         for key in (*formulas.integrals, *formulas.forms):
             self.names[f"integral {key}"] = self._fresh_name(*self.prefix, "integral", key)
         self.words = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
         self.words |= {key: self._fresh_name(*self.prefix, "kahan", key) for key in ("solve", "module")}
         self.words |= {key: self._fresh_name(*self.prefix, key) for key in ("vector", "matrix")}
-        # Every variable and symbol with its name here: itself where it means nothing else, always different ones.
+        # The names of variables and symbols in the file: unchanged unless they have another meaning, and all different.
         names = (*formulas.names, *formulas.new)
         free = {name for name in names if _FREE.fullmatch(name) and (self.language["underscores"] or "_" not in name)}
         self.safe = {name: self._fresh_name(name) for name in names if name in free}
@@ -139,14 +139,14 @@ class _Writer:
         self.symbols = [self.safe[name] for name in formulas.symbols]
 
     def _fresh_name(self, *words: str) -> str:
-        """A name of these words that is not in use, with a number behind it where it has to be, and in use from now."""
+        """Return an unused name made of these words, with a number if necessary, and reserve it."""
         number = 1
         while True:
             numbered = [*words, str(number)] if number > 1 else words
             pieces = [piece for word in numbered for piece in re.split(r"[^A-Za-z0-9]+", word) if piece]
             if self.language["underscores"]:
                 name = "_".join(pieces)
-            else:  # a small letter first: Sin and Integral would make a name of Mathematica
+            else:  # lower case first: Sin and Integral would be names of Mathematica
                 name = pieces[0][0].lower() + pieces[0][1:] + "".join(p[0].upper() + p[1:] for p in pieces[1:])
             if name.lower() not in self.used:
                 self.used.add(name.lower())
@@ -154,7 +154,7 @@ class _Writer:
             number += 1
 
     def text(self, parts: Sequence[str], command: str) -> str:
-        """The whole file."""
+        """Return the text of the file."""
         for part in parts:
             self._write_part(part)
         language, formulas = self.language, self.formulas
@@ -178,7 +178,7 @@ class _Writer:
         return "\n\n".join(filter(None, pieces)) + "\n"
 
     def _write_part(self, part: str) -> None:
-        """Write the functions of a part, and those that they call; one that is there already is written again."""
+        """Write the functions of a part and those that they call; rewriting a function has no effect."""
         formulas, is_kahan = self.formulas, bool(self.formulas.rhs)
         point = {"point": formulas.variables}
         if part == "system":
@@ -204,9 +204,9 @@ class _Writer:
         elif part == "jacobian":
             self._write_part("map")
             right = self._call("kahan_matrix", self._call("kahan_map", "point"), "-eps")
-            words_ = "Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))"
+            comment = "Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))"
             solve = "solve_matrix" if self.language["solve_matrix"] else "solve"
-            self._function("kahan_jacobian", words_, "matrix", self._solved(solve, right))
+            self._function("kahan_jacobian", comment, "matrix", self._solved(solve, right))
         elif part == "map-formulas":
             what, of = "Kahan map" if is_kahan else "map", "x and eps" if self.eps else "x"
             components = self._vector(formulas.closed_form())
@@ -214,21 +214,21 @@ class _Writer:
                 "kahan_map_formula", f"The {what} as rational functions of {of}", "vector", components, point
             )
         elif part == "density" and formulas.density is not None:
-            words_ = "phi; the file says that dx/phi is invariant under the map"
-            self._function("density", words_, "number", self._expression(formulas.density), point)
+            comment = "phi; the file says that dx/phi is invariant under the map"
+            self._function("density", comment, "number", self._expression(formulas.density), point)
         elif part == "density":
             self._write_part("map")
-            words_ = "dx/phi is invariant under the map, by a theorem: phi = det(I - eps f'(x))"
-            self._function("density", words_, "number", self._solved("det"))
+            comment = "dx/phi is invariant under the map, by a theorem: phi = det(I - eps f'(x))"
+            self._function("density", comment, "number", self._solved("det"))
         elif part == "integrals":
             for name, function in formulas.integrals.items():
-                words_ = f"{name}: the file says that it is an integral of the map"
-                self._function(f"integral {name}", words_, "number", self._expression(function), point)
-            for key, words_, function in formulas.integrals_by_theorem():
+                comment = f"{name}: the file says that it is an integral of the map"
+                self._function(f"integral {name}", comment, "number", self._expression(function), point)
+            for key, comment, function in formulas.integrals_by_theorem():
                 self._write_part("map")
                 self.names[f"{key} of two points"] = self._fresh_name(self.names[key], "of")
                 value = self._expression(function)
-                self._function(f"{key} of two points", words_, "number", value, point | {"image": formulas.new})
+                self._function(f"{key} of two points", comment, "number", value, point | {"image": formulas.new})
                 value = self._call(f"{key} of two points", "point", self._call("kahan_map", "point"), "eps")
                 self._function(key, "An integral of the map, by a theorem", "number", value)
 
@@ -243,7 +243,7 @@ class _Writer:
     ) -> None:
         """Write a function; `points` are its points and what their coordinates are called in the body.
 
-        Without them it has one point, which is used as a whole.
+        Without them the function has one point, used as a vector.
         """
         numbers = [*(self.eps if eps else []), *self.symbols]
         local = {point: [self.safe[name] for name in names] for point, names in (points or {"point": ()}).items()}
@@ -268,14 +268,14 @@ class _Writer:
             lines="".join(f"{line}\n{indent}" for line in lines),
             value=value,
         ).lstrip("\n")
-        if self.language["continued"]:  # lines of Fortran have 132 characters
+        if self.language["continued"]:  # lines of Fortran have at most 132 characters
             joined = text.replace("\n        ", " ").splitlines()
             wrapped = [textwrap.wrap(line, 110, break_long_words=False) for line in joined]
             text = "\n".join(f"{self.language['continued']}\n        ".join(line) for line in wrapped)
         self.written[self.names[key]] = f"{self._comment(words)}\n{text}"
 
     def _expression(self, function: RationalFunction | fmpq_mpoly) -> str:
-        """A polynomial or a quotient of two as an expression, exactly, on several lines where it is long."""
+        """Return a polynomial or a quotient of polynomials as an exact expression, on several lines if it is long."""
         if isinstance(function, RationalFunction):
             sides = [function.numerator] if function.is_polynomial else [function.numerator, function.denominator]
         else:
@@ -286,9 +286,9 @@ class _Writer:
             groups = [dict(terms[k : k + _TERMS_TOGETHER]) for k in range(0, len(terms), _TERMS_TOGETHER)] or [{}]
             sums = [self.polynomial(side.context().from_dict(group), self.safe) for group in groups]
             texts.append(sums[0] if len(sums) == 1 else " + ".join(f"({text})" for text in sums))
-        whole = texts[0] if len(texts) == 1 else f"({texts[0]})/({texts[1]})"
-        lines = [""]  # each but the last ends with + or -: in no language that is a whole statement
-        for piece in re.split(r"(?<= [+-] )", whole):
+        expression = texts[0] if len(texts) == 1 else f"({texts[0]})/({texts[1]})"
+        lines = [""]  # all but the last end with + or -, so that no language ends the statement there
+        for piece in re.split(r"(?<= [+-] )", expression):
             if lines[-1] and len(lines[-1]) + len(piece) > _LINE:
                 lines.append("")
             lines[-1] += piece
@@ -299,7 +299,7 @@ class _Writer:
         return self._listed("vector", list(map(self._expression, entries)))
 
     def _listed(self, kind: str, entries: Sequence[str], between: str = ",") -> str:
-        """Entries in the brackets of a vector, a row or a matrix, on one line where there is room."""
+        """Return entries in the brackets of a vector, a row or a matrix, on one line if they fit."""
         has_room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= _LINE
         before, after = (Template(bracket).substitute(self.words) for bracket in self.language[kind])
         return before + (between + (" " if has_room else "\n        ")).join(entries) + after
@@ -323,7 +323,7 @@ class _Writer:
 
 
 def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Mapping[str, str]], str]:
-    """The function that writes a polynomial, given the names of the language for those of its ring.
+    """Return the function that writes a polynomial with the names of the language for those of its ring.
 
     Raises InputError where SymPy is needed and not installed.
     """
@@ -357,7 +357,7 @@ def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Map
             terms.append(sympy.Mul(coefficient, *map(sympy.Pow, symbols, powers)))
         try:
             text = str(code(sympy.Add(*terms), **settings))
-        except ValueError as error:  # Python makes no text of more than 4300 digits
+        except ValueError as error:  # Python refuses to print more than 4300 digits
             raise InputError(f"found a number that is too long for SymPy: {error}") from error
         return re.sub(r"&\n\s*", "", text)  # long lines of Fortran are broken where all are
 

@@ -1,7 +1,6 @@
-"""What can be written in another language: a system, and everything a formula is known for, as exact polynomials.
+"""The formulas of a system that can be converted to another language, as exact polynomials.
 
-A system has numbers for its parameters, or leaves some of them symbols; then all polynomials are in the variables, the
-symbols and, where it may occur, eps.
+Parameters of the system are numbers or symbols. Polynomials are in the variables, the symbols and, if needed, eps.
 """
 
 from __future__ import annotations
@@ -33,15 +32,15 @@ MAX_DIMENSION_OF_FORMULAS = 8
 
 
 class Formulas:
-    """The formulas of a system file, its parameters numbers or, those in `symbols`, symbols.
+    """The formulas of a system file; the parameters in `symbols` stay symbolic, the others are numbers.
 
-    An algebraic number is such a symbol. `names` are the variables, then the symbols; `rhs`, its derivatives `jacobian`
-    and `H` are in these names, all else in these names and eps. Of a map that is not Kahan's there is no `rhs`. `new`
-    are names for the coordinates of the image x~ of a point.
+    An algebraic number is also a symbol. `names` are the variables, then the symbols; `rhs`, its derivatives `jacobian`
+    and `H` are polynomials in these names, all others in these names and eps. For maps other than Kahan's `rhs` is
+    empty. `new` are names for the coordinates of the image x~ of a point.
     """
 
     def __init__(self, file: SystemFile, symbols: Sequence[str] = ()) -> None:
-        """Raises InputError where these parameters cannot be left as symbols."""
+        """Raises InputError if these parameters cannot be symbols."""
         self.file = file
         if isinstance(file.map, AlgebraicMap):
             if symbols:
@@ -61,7 +60,7 @@ class Formulas:
         self.jacobian = [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
         self.integrals: Mapping[str, RationalFunction] = file.integrals
         self.density, self.H = file.density, None if file.hamiltonian is None else file.hamiltonian.H
-        if self.symbols:  # then claims are read once more, with these names
+        if self.symbols:  # then claims are parsed again, with these names
             constants = {name: value for name, value in file.parameters.items() if name not in self.symbols}
             document = file.document
 
@@ -89,7 +88,7 @@ class Formulas:
         return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
 
     def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
-        """Integrals of a Hamiltonian system in x and x~: name, formula in words, function.
+        """Yield the integrals of a Hamiltonian system in x and x~: name, formula as text, function.
 
         x^T M x~/eps with the matrices of a member, else H(x) + grad H(x)^T (x~ - x)/3; in the variables, those of x~
         (`new`), the symbols and eps.
@@ -101,10 +100,10 @@ class Formulas:
         generators = context.gens()
         x, y, eps = generators[:n], generators[n : 2 * n], generators[-1]
         for k, (name, form) in enumerate(self.forms.items()):
-            words = "J" if k == 0 else "J A^T" if k == 1 else f"J (A^T)^{k}"
+            matrix_text = "J" if k == 0 else "J A^T" if k == 1 else f"J (A^T)^{k}"
             terms = (x[i] * entry * y[j] for i, row in enumerate(form.tolist()) for j, entry in enumerate(row))
             function = RationalFunction(sum(terms, context.constant(0)), eps)
-            yield f"integral {name}", f"x^T M x~/eps with M = {words}", function
+            yield f"integral {name}", f"x^T M x~/eps with M = {matrix_text}", function
         if not self.forms:
             images = (*x, *generators[2 * n : -1])
             slopes = [self.H.derivative(k).compose(*images, ctx=context) for k in range(n)]
@@ -114,30 +113,30 @@ class Formulas:
 
     @cached_property
     def missing(self) -> dict[str, str]:
-        """Of integrals and density what is neither claimed by the file nor given by a theorem, with what to do."""
-        if self.H is not None:  # then there is the modified H, and det(I - eps f'(x))
+        """The messages for integrals and density if they are neither claimed in the file nor given by a theorem."""
+        if self.H is not None:  # then the modified H and det(I - eps f'(x)) are known
             return {}
-        found = {}
+        messages = {}
         if not self.integrals:
-            found["integrals"] = (
+            messages["integrals"] = (
                 f"found no integral of {self.file.name}, expected a section [integrals] in its file: "
                 "'kahanmaps find-integrals SYSTEM --toml' looks for some and prints one"
             )
         if self.density is None:
-            found["density"] = (
+            messages["density"] = (
                 f"found no density of {self.file.name}, expected a section [density] in its file: "
                 "'kahanmaps find-density SYSTEM --toml' looks for one and prints it"
             )
-        return found
+        return messages
 
     def inverse_form(self) -> list[RationalFunction]:
-        """The components of the inverse of a map that is not Kahan's. Raises InputError where it is not found."""
+        """Return the components of the inverse of a map that is not Kahan's. Raises InputError if none is found."""
         return self._solved([[*row[:-1], -row[-1]] for row in self.map.inverse_rows])
 
     def closed_form(self) -> list[RationalFunction]:
-        """The components of the map as rational functions of the names and eps, in lowest terms, exact.
+        """Return the components of the map as exact rational functions of the names and eps, in lowest terms.
 
-        Raises InputError where they are too large, which is found out on the way: in a second, unless numbers are long.
+        Raises InputError if they are too large, after at most about a second unless coefficients are long.
 
         >>> from kahanmaps.algebra.printing import format_rational_function
         >>> from kahanmaps.documents.catalog import load
@@ -157,18 +156,18 @@ class Formulas:
             return product
 
         # (M | r) annihilates (x~, -1), hence the vector of its maximal minors, the last of which is -+det M.
-        *above, below = kernel_minors(equation, times)
-        found = []
-        for minor in above:
-            common = minor.gcd(below)
-            found.append(RationalFunction(-minor / common, below / common))
-        total = sum(len(function.numerator) + len(function.denominator) for function in found)
+        *numerators, denominator = kernel_minors(equation, times)
+        components = []
+        for minor in numerators:
+            common = minor.gcd(denominator)
+            components.append(RationalFunction(-minor / common, denominator / common))
+        total = sum(len(function.numerator) + len(function.denominator) for function in components)
         if total > MAX_TERMS:
             raise _too_large(f"{total} terms, expected at most {MAX_TERMS}")
-        return found
+        return components
 
     def header(self, command: str, width: int = 100) -> list[str]:
-        """What the comment on top says, line by line: the system, eps, parameters, sources, and what made it."""
+        """Return the lines of the initial comment: the system, eps, parameters, sources and the command."""
         file = self.file
         title = file.catalog.get("title", "")
         lines = [f"{file.name}: {title}" if title else file.name]
@@ -195,19 +194,19 @@ class Formulas:
         convention = file.catalog.get("convention")
         lines += [f"Convention of the source: {convention}"] if convention else []
         lines += [f"Source: {SOURCES[key]}" for key in file.catalog.get("sources", ())]
-        made = f"Written by kahanmaps {__version__}" + (f": {command}" if command else "")
-        lines.append(made)
+        origin = f"Written by kahanmaps {__version__}" + (f": {command}" if command else "")
+        lines.append(origin)
         wrapped: list[str] = []
         for line in lines:
             shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
-            keep = line is made or line.startswith("  ")  # a command is to be copied as a whole
+            keep = line is origin or line.startswith("  ")  # commands are not wrapped, so that they can be copied
             wrapped += [shown] if keep else textwrap.wrap(shown, width, subsequent_indent="  ", break_long_words=False)
-        # Python takes "coding: x" in one of the first two lines of a file for the name of its encoding.
+        # Python interprets "coding: x" in the first two lines of a file as its encoding.
         return [re.sub("coding(?=[:=])", "coding ", line) if k < 2 else line for k, line in enumerate(wrapped)]
 
 
-def _too_large(found: str) -> InputError:
+def _too_large(size: str) -> InputError:
     return InputError(
-        f"the closed form of the map is too large: found {found}; "
+        f"the closed form of the map is too large: found {size}; "
         "ask for 'map' instead, which solves the linear equations for x~ and works in every dimension"
     )

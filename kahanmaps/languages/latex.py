@@ -1,4 +1,4 @@
-r"""LaTeX: an article of displayed formulas that compiles as it stands; long sums are broken between terms."""
+r"""Conversion to LaTeX: a complete article of displayed formulas, long sums broken between terms."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Rows = list[tuple[str, str]]
 
 
 def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
-    """The document as text: a display for each of the parts (of `convert.PARTS`), in LaTeX with amsmath.
+    """Return the document as text, with a display for each of the parts (of `convert.PARTS`), in LaTeX with amsmath.
 
-    Raises InputError where the closed form of the map is requested and too large.
+    Raises InputError if the closed form of the map is requested and too large.
     """
     lines = [f"% {line}" for line in formulas.header(command)]
     lines += [r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks"]
@@ -34,7 +34,7 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
         lines += [rf"\noindent {share}: the time step is ${2 * formulas.map.time_steps} \varepsilon$.", ""]
     for part in parts:
         title, rows = _display(part, formulas)
-        # Where a right-hand side is long it is broken between its terms: what is long is a sum, in no braces.
+        # A long right-hand side is broken between its terms: it is always a sum outside braces.
         aligned = []
         for left, right in rows:
             pieces = [""]
@@ -52,7 +52,7 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
 
 
 def _display(part: str, formulas: Formulas) -> tuple[str, Rows]:
-    """The title of a part, and the two sides of its equations."""
+    """Return the title of a part, and the two sides of its equations."""
     claimed = "" if formulas.file.catalog else ", as the file claims"
     if part == "system":
         left = (rf"\dot{{{latex_name(name)}}}" for name in formulas.variables)
@@ -97,7 +97,7 @@ def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> Ro
 
 
 def _equations(formulas: Formulas) -> Rows:
-    """A map that is not Kahan's: its components, or the rows of M x~ = r."""
+    """Return the components of a map that is not Kahan's, or the rows of M x~ = r."""
     rows: Rows = []
     for row in formulas.equation:
         entries = [(entry, name) for entry, name in zip(row, formulas.variables, strict=False) if not entry.is_zero()]
@@ -116,9 +116,9 @@ def _matrix(matrix: fmpq_mat) -> str:
 
 
 def _label(name: str) -> str:
-    r"""The name of an integral, any printable text: as text where TeX's marks for it are none of math mode.
+    r"""Return the name of an integral, any printable text, for use in math mode.
 
-    Letters that are not ASCII are written as numbers, since not every TeX has them.
+    Letters that are not ASCII are written as numbers, since not every TeX supports them.
 
     >>> print(_label("F1"), _label("a_b"), _label("H~ é"))
     F_1 \mathrm{a\_b} \text{H\textasciitilde{} [U+00E9]}
@@ -129,10 +129,10 @@ def _label(name: str) -> str:
 
 
 def _quotient(left: str, function: RationalFunction) -> Rows:
-    """left = P/Q in one row where it is short; else P and Q have rows of their own, without fractions as well."""
-    whole = latex_rational_function(function)
-    if len(whole) <= _LINE or function.is_polynomial:
-        return [(left, whole)]
+    """Return left = P/Q in one row if it is short; otherwise P and Q, without fractions, have rows of their own."""
+    quotient = latex_rational_function(function)
+    if len(quotient) <= _LINE or function.is_polynomial:
+        return [(left, quotient)]
     is_negative, numerator, denominator = integer_fraction(function)
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
     quotient = rf"{'-' * is_negative}\frac{{{P}}}{{{Q}}}"

@@ -71,7 +71,7 @@ def eps_record(eps: fmpq | None, *maps: MapFamily) -> dict[str, str | None]:
     }
 
 
-def eps_words(context: Mapping[str, Any]) -> str:
+def eps_record_suffix(context: Mapping[str, Any]) -> str:
     """Return the text for the eps of a record and its time step, to follow the name of the map."""
     meaning = context.get("convention", CONVENTION)
     if meaning == NO_EPS:
@@ -82,10 +82,10 @@ def eps_words(context: Mapping[str, Any]) -> str:
     return f", eps = {context['eps']}{'' if step is None else f' (time step {multiple} = {step})'}"
 
 
-def eps_told(eps: fmpq | None, *maps: MapFamily) -> str:
+def eps_suffix(eps: fmpq | None, *maps: MapFamily) -> str:
     """Return the text for an eps and maps.
 
-    >>> eps_told(fmpq(1, 10)), eps_told(None)
+    >>> eps_suffix(fmpq(1, 10)), eps_suffix(None)
     (', eps = 1/10 (time step 2 eps = 1/5)', ', every eps (the time step is 2 eps)')
     """
-    return eps_words(eps_record(eps, *maps))
+    return eps_record_suffix(eps_record(eps, *maps))

@@ -1,4 +1,4 @@
-"""The objects that the paper denotes by letters, at one point, over one field; the claims are functions of them.
+"""The objects that the paper denotes by letters, at a point over a field; claims are functions of these objects.
 
 Letters are the paper's: A, J, H (with its chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated g, K;
 x and eps; x~ is the image of x under the map of f. Numbers are elements of `K`, which may be the rationals, GF(p),
@@ -104,7 +104,7 @@ class PaperObjects:
     # ---- numbers, vectors and matrices --------------------------------------------------------------------------
 
     def number(self, numerator: int, denominator: int = 1) -> Any:
-        """The rational number above/below as an element of K."""
+        """Return the rational number numerator/denominator as an element of K."""
         return self.K.convert(fmpq(numerator, denominator))
 
     @cached_property
@@ -141,11 +141,11 @@ class PaperObjects:
 
     @remembered
     def unit(self, k: int) -> Any:
-        """The k-th unit vector."""
+        """Return the k-th unit vector."""
         return self.K.column([self.K.one if i == k else self.K.zero for i in range(self.n)])
 
     def zeros(self, rows: int, columns: int) -> Any:
-        """The zero matrix."""
+        """Return the zero matrix."""
         return self.K.matrix(rows, columns, [self.K.zero] * (rows * columns))
 
     solve, det, trace = staticmethod(solve), staticmethod(det), staticmethod(trace)
@@ -159,27 +159,27 @@ class PaperObjects:
         return (left.transpose() * right)[0, 0]
 
     def sum(self, terms: Sequence[Any]) -> Any:
-        """The sum of numbers, vectors or matrices (at least one)."""
+        """Return the sum of numbers, vectors or matrices (at least one)."""
         total = terms[0]
         for term in terms[1:]:
             total = total + term
         return total
 
     def columns(self, vectors: Sequence[Any]) -> Any:
-        """The matrix with these columns."""
+        """Return the matrix with these columns."""
         rows = zip(*(vector.entries() for vector in vectors), strict=True)
         return self.K.matrix(self.n, len(vectors), [entry for row in rows for entry in row])
 
     def tensor(self, u: Any, v: Any, w: Any) -> Any:
-        """u (x) v (x) w as an n^2 x n matrix, like the third derivatives of H."""
+        """Return u (x) v (x) w as an n^2 x n matrix, in the format of the third derivatives of H."""
         return self.K.column([a * b for a in u.entries() for b in v.entries()]) * w.transpose()
 
     def rank(self, matrix: Any) -> int:
-        """The rank."""
+        """Return the rank of a matrix."""
         return rank(self.K, matrix)
 
     def power(self, matrix: Any, exponent: int) -> Any:
-        """matrix^exponent, exponent >= 0."""
+        """Return matrix^exponent, exponent >= 0."""
         result = self.I
         for _ in range(exponent):
             result = result * matrix
@@ -197,7 +197,7 @@ class PaperObjects:
         return f.jacobian(x.entries())
 
     def second(self, f: SystemOver, v: Any) -> Any:
-        """The matrix f''v, with f'(x + v) = f'(x) + f''v."""
+        """Return the matrix f''v, with f'(x + v) = f'(x) + f''v."""
         second = f.hessian_times(v.entries())
         return second if self.error_of_second is None else second + self.error_of_second * v[0, 0]
 
@@ -234,17 +234,17 @@ class PaperObjects:
     # ---- derivatives --------------------------------------------------------------------------------------------
 
     def slope(self, function: Callable[[Any, Any], Any], x: Any, v: Any) -> Any:
-        """The derivative at x, along v, of a number-valued function of (objects, point): exact, by dual numbers."""
+        """Return the exact derivative at x along v of a scalar function of (objects, point), by dual numbers."""
         return function(self.lifted(), self._moving(x, v)).slope
 
     @remembered
     def _moving(self, x: Any, v: Any) -> Any:
-        """x + d v."""
+        """Return the dual number x + d v."""
         dual: Any = self.lifted().K
         return dual.matrix(self.n, 1, [dual.dual(a, b) for a, b in zip(x.entries(), v.entries(), strict=True)])
 
     def second_slope(self, function: Callable[[Any, Any], Any], x: Any, v: Any, w: Any) -> Any:
-        """The second derivative of a number-valued function at x along v and w."""
+        """Return the second derivative of a scalar function at x along v and w."""
 
         def along_w(o: Any, x: Any) -> Any:
             dual: Any = o.K
@@ -253,7 +253,7 @@ class PaperObjects:
         return self.slope(along_w, x, v)
 
     def gradient(self, function: Callable[[Any, Any], Any], x: Any) -> Any:
-        """The gradient at x of a number-valued function of (objects, point), a column."""
+        """Return the gradient at x of a scalar function of (objects, point), a column."""
         return self.K.column([self.slope(function, x, self.unit(k)) for k in range(self.n)])
 
     # ---- A, f and x ---------------------------------------------------------------------------------------------
@@ -305,7 +305,7 @@ class PaperObjects:
         return self.A_to(i) * gradient
 
     def H(self, x: Any, i: int = 0) -> Any:
-        """H_i(x), the function with gradient A^i nabla H_0 if there is one, by Euler's formula term by term."""
+        """Return H_i(x), where nabla H_i = A^i nabla H_0 if it exists, by Euler's formula for each degree."""
         return self.potential(self.A_to(i), x)
 
     def gradient_of_chain(self, i: int, x: Any) -> Any:
@@ -356,7 +356,7 @@ class PaperObjects:
 
     @property
     def free(self) -> Sequence[int]:
-        """The indices i that a claim "for all i" is tried at."""
+        """The indices i at which a claim "for all i" is tested."""
         return self.each if self.free_indices is None else self.free_indices
 
     @remembered
@@ -393,7 +393,7 @@ class PaperObjects:
         return product
 
     def associates(self) -> Iterator[Any]:
-        """The matrices B of the associated systems, I itself not among them, up to an overall sign."""
+        """The matrices B of the associated systems except I, up to sign."""
         if self.associate_matrices is not None:
             yield from self.associate_matrices
             return
@@ -403,7 +403,7 @@ class PaperObjects:
             yield self._memory["B", signs]
 
     def all_signs(self) -> tuple[tuple[int, ...], ...]:
-        """The sign vectors of the associated systems that are looked at."""
+        """The sign vectors of the associated systems that are tested."""
         count = len(self.lam)
         if self.sign_vectors is not None:
             return self.sign_vectors
@@ -426,7 +426,7 @@ class PaperObjects:
 
     @cached_property
     def chi_of_roots(self) -> list[Any]:
-        """The coefficients of prod (t - lambda_i), constant term first, the leading one 1 among them."""
+        """The coefficients of prod (t - lambda_i), constant term first, including the leading coefficient 1."""
         product = [self.K.one]
         for root in self.lam:
             product = _times_linear(self.K, product, root)
@@ -603,7 +603,7 @@ class PaperObjects:
         return objects
 
     def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
-        """A quadratic system without special structure: f'', B and c are random."""
+        """Return the objects of a quadratic system without special structure: f'', B and c are random."""
         n, K = self.n, self.K
         rows: dict[tuple[int, int], Any] = {}
         for j in range(n):
@@ -674,13 +674,13 @@ class PaperObjects:
         return S, self.companion(self.chi)
 
     def companion(self, chi: Sequence[Any]) -> Any:
-        """The companion matrix of a monic polynomial of degree m, with -chi in its last column."""
+        """Return the companion matrix of a monic polynomial chi of degree m, with -chi in its last column."""
         m, one, zero = self.m, self.K.one, self.K.zero
         entries = [-chi[i] if j == m - 1 else one if i == j + 1 else zero for i in range(m) for j in range(m)]
         return self.K.matrix(m, m, entries)
 
     def doubled(self, W: Any) -> Any:
-        """diag(W, W^T) for an m x m matrix."""
+        """Return diag(W, W^T) for an m x m matrix W."""
         m, zeros = self.m, [self.K.zero] * self.m
         rows = [[W[i, j] for j in range(m)] + zeros for i in range(m)]
         rows += [zeros + [W[j, i] for j in range(m)] for i in range(m)]
@@ -696,7 +696,7 @@ class PaperObjects:
         return all(self.K.equal(a, b) for a, b in zip(matrix.entries(), expected, strict=True))
 
     def rank_of_cubic_equations(self) -> int:
-        """The rank of the linear system A nabla^2 H = nabla^2 H A^T for the coefficients of a cubic H."""
+        """Return the rank of the linear system A nabla^2 H = nabla^2 H A^T for the coefficients of a cubic H."""
         n, K = self.n, self.K
         pairs = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
         rows = []
@@ -714,7 +714,7 @@ class PaperObjects:
 
 
 def _times_linear(K: Field, polynomial: Sequence[Any], root: Any) -> list[Any]:
-    """(t - root) times a polynomial in t, coefficients with the constant term first."""
+    """Return (t - root) times a polynomial in t, given by its coefficients, constant term first."""
     product = [K.zero, *polynomial]
     for k, coefficient in enumerate(polynomial):
         product[k] = product[k] - root * coefficient

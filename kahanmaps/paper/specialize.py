@@ -1,4 +1,4 @@
-"""The paper's objects over one field after another: for a given member, and for the member with indeterminate data.
+"""The objects of the paper over several fields: for a given member, and for the member with indeterminate data.
 
 * `MemberObjects`: a member at a point, over QQ or GF(p); where the library has its own code for a letter (the chain,
   the associated systems, the integrals, Pi), that code is what is tested.
@@ -50,7 +50,7 @@ class MemberObjects(PaperObjects):
 
     @classmethod
     def at(cls, member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, **more: Any) -> MemberObjects:
-        """The objects of a member over K; `roots` are those of chi, None where they do not lie in K."""
+        """Return the objects of a member over K; `roots` are those of chi, None if they are not in K."""
         base, chi = member.hamiltonians[0].system.over(K), chi_of(member.A)
         known_chi = tuple(K.convert(chi[k]) for k in range(member.m + 1))
         objects = cls(**_given(member, K), roots=roots, base=base, known_chi=known_chi, **more)
@@ -107,7 +107,7 @@ class MemberObjects(PaperObjects):
 
 
 def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
-    """The roots of chi in the order of the signs, where they are rational and distinct."""
+    """Return the roots of chi in the order of the signs, None unless they are rational and distinct."""
     roots = [factor.root for factor in member.factors if factor.root is not None and factor.multiplicity == 1]
     return tuple(roots) if len(roots) == len(member.factors) else None
 
@@ -153,7 +153,7 @@ def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[P
 def point_over(
     member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int
 ) -> MemberObjects:
-    """A member at a random point over QQ or GF(p), eps random where it is not given."""
+    """Return the objects of a member at a random point over QQ or GF(p); eps is random unless it is given."""
     value = K.zero if eps is None else K.convert(eps)
     value = _not_zero(K, rng) if value == 0 else value
     signs, draw = sign_sample(member.m, rng), random_draw(K, member.dim, rng)
@@ -249,7 +249,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
 def member_functions(
     member: FamilyMember, vectors: Sequence[str], eps: fmpq | None, budget: int, order: int
 ) -> MemberObjects:
-    """A given member with indeterminate x (and eps, where it is not given) over the rational functions."""
+    """Return the objects of a member with indeterminate x (and eps, unless it is given) over the rational functions."""
     n = member.dim
     letters = _letters(vectors, n)
     names = ["eps", *(name for letter in letters.values() for name in letter)]
@@ -280,7 +280,7 @@ def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, or
 
 
 def complex_roots(member: FamilyMember, bits: int) -> tuple[Any, ...]:
-    """The complex roots of chi, enclosed in balls of so many bits."""
+    """Return balls of so many bits that enclose the complex roots of chi."""
     K = CC(bits)
     chi = chi_of(member.A)
     with K.working():
@@ -289,7 +289,7 @@ def complex_roots(member: FamilyMember, bits: int) -> tuple[Any, ...]:
 
 
 def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
-    """A member at a random rational point over complex balls, with all complex roots of chi enclosed."""
+    """Return the objects of a member at a random rational point over complex balls that enclose all roots of chi."""
     K = CC(bits)
     roots = complex_roots(member, bits)
     with K.working():
@@ -308,7 +308,7 @@ def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq 
 
 
 def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperObjects:
-    """Bounds for a given member: x and all vectors are variables, eps as well unless it is given."""
+    """Return degree bounds for a member: x and all vectors are variables, and eps unless it is given."""
     K = BoundField()
     n = member.dim
     chi = chi_of(member.A)
@@ -332,7 +332,7 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
 
 
 def universal_bound_objects(m: int, order: int) -> PaperObjects:
-    """Bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
+    """Return degree bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
     K = BoundField()
     n = 2 * m
     # Shears with entries of degree 1: entries of S and S^{-1} have degree 5, the sum of m^4 monomials.
@@ -360,7 +360,7 @@ def _not_zero(K: Field, rng: random.Random) -> Any:
 
 
 def _letters(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
-    """Names for the entries of vectors of indeterminates."""
+    """Return names for the entries of vectors of indeterminates."""
     return {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
 
 
@@ -394,5 +394,5 @@ def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]
 
 
 def _two_sign_vectors(m: int) -> tuple[tuple[int, ...], ...] | None:
-    """Two associated systems with as many factors B_i as there can be: what is bounded for them is so for any pair."""
+    """Return two associated systems with the maximal number of factors B_i: their bounds hold for all pairs."""
     return None if m == 1 else ((-1,) * m, (1,) + (-1,) * (m - 1))

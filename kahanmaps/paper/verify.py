@@ -263,7 +263,7 @@ class Verifier:
         return specialize.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
-        """The objects with bounds in place of numbers."""
+        """The objects with degree bounds in place of numbers."""
         if self.member is None:
             return specialize.universal_bound_objects(self.m, self.options.order)
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
@@ -296,7 +296,7 @@ class Verifier:
         form = normal_form(self.member)
 
         def vanishing(coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
-            """The monic polynomial of the roots at which all of these elements of Q[t]/chi vanish."""
+            """Return the monic polynomial of the roots at which all of these elements of Q[t]/chi vanish."""
             return reduce(fmpq_poly.gcd, coefficients, form.chi)
 
         zero = vanishing(form.coefficients)
@@ -419,7 +419,7 @@ class Verifier:
         return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
 
     def also(self, claim: Claim) -> Iterable[Evidence]:
-        """Further evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
+        """Return further evidence for a member with distinct roots: over Q[t]/chi, and over complex balls."""
         if self.member is None or not self.member.is_generic:
             return
         rng = random.Random(f"also {self._seed} {claim.key}")
@@ -470,7 +470,7 @@ class Verifier:
         return notes
 
     def controls(self, claim: Claim) -> list[Finding]:
-        """The claim on broken input, one finding for every control that it names: each is expected to be refuted."""
+        """Return a finding for each control of a claim, on input that violates a hypothesis; each should be refuted."""
         if claim.misprint:
             return [self.verify_claim(claim)]
         controls = []
@@ -556,7 +556,7 @@ class ClaimAtPoints:
         return " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
 
     def trials(self, seed: int) -> Iterator[Trial]:
-        """The claim at one random point after the other."""
+        """Yield the values of the claim at random points."""
         for number in count():
             objects = self._verifier.point(self._roots, number)
             if objects is None:

@@ -1,8 +1,8 @@
-"""Do two Kahan maps commute, seen from one point: the lattice Phi_f^i Phi_g^j x, reached along both orders. Exact.
+"""The test whether two maps commute at one point: the lattice Phi_f^i Phi_g^j x in both orders of the maps, exactly.
 
 The square x, Phi_f x, Phi_g x has two candidates for its fourth corner, Phi_g(Phi_f x) and Phi_f(Phi_g x). In the
-picture arrows of f start from points reached by g first, arrows of g from points reached by f first; a ring marks where
-g ends, a dot where f does. Where the maps commute every ring holds its dot.
+picture arrows of f start from points reached by g first, arrows of g from points reached by f first. A ring marks the
+end of an arrow of g, a dot that of an arrow of f. If the maps commute, every ring contains its dot.
 """
 
 from __future__ import annotations
@@ -35,17 +35,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAX_STEPS = 12
-MAX_BITS = 300_000  # of the numerators and denominators of one coordinate: seconds for a step
+MAX_BITS = 300_000  # of numerator and denominator of one coordinate: a step then takes seconds
 
 Point = tuple[fmpq, ...]
-Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j], None where a map has no value or numbers are too long
+Lattice = tuple[
+    tuple[Point | None, ...], ...
+]  # [i][j], None after an indeterminacy point or where numbers are too long
 
 
 @dataclass(frozen=True)
 class MapPair:
-    """Two maps that are compared, systems standing for theirs; the second is scaled where it has another step.
+    """Two maps to be compared; systems stand for their Kahan maps, the second one scaled if it has another time step.
 
-    `names` are short texts, `note` says how variables are matched, where that needs a word.
+    `names` are short texts, and `note` says how variables are matched if they differ.
     """
 
     f: QuadraticSystem | MapFamily
@@ -56,9 +58,9 @@ class MapPair:
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Two lattices from one point: `g_after_f[i][j]` is Phi_g^j(Phi_f^i x), `f_after_g[i][j]` is Phi_f^i(Phi_g^j x).
+    """The two lattices of a point: `g_after_f[i][j]` is Phi_g^j(Phi_f^i x), `f_after_g[i][j]` is Phi_f^i(Phi_g^j x).
 
-    `stopped` says in a sentence why points are missing, empty where none is.
+    `stopped` is a sentence on why points are missing, empty if none are.
     """
 
     pair: MapPair
@@ -68,31 +70,31 @@ class Squares:
 
     @property
     def steps(self) -> int:
-        """How often each map is applied."""
+        """The number of applications of each map."""
         return len(self.g_after_f) - 1
 
     @property
     def compared(self) -> list[tuple[Point, Point]]:
-        """The pairs of points that the two orders lead to, where both are there."""
+        """The pairs of points reached by the two orders, where both exist."""
         rows = zip(self.g_after_f[1:], self.f_after_g[1:], strict=True)
         pairs = (pair for row, other in rows for pair in zip(row[1:], other[1:], strict=True))
-        return [(one, other) for one, other in pairs if one is not None and other is not None]
+        return [(p, q) for p, q in pairs if p is not None and q is not None]
 
     @property
     def closes(self) -> bool | None:
-        """Whether the two orders lead to the same points, by ==; None where there is nothing to compare."""
+        """Whether the two orders lead to exactly the same points; None if there are no points to compare."""
         pairs = self.compared
-        return all(one == other for one, other in pairs) if pairs else None
+        return all(p == q for p, q in pairs) if pairs else None
 
     @property
     def gap(self) -> float:
-        """The largest distance, in all coordinates, between points that should be one."""
+        """The largest Euclidean distance between corresponding points."""
         squares = [sum(((a - b) ** 2 for a, b in zip(*pair, strict=True)), fmpq(0)) for pair in self.compared]
         return float(arb(max(squares, default=fmpq(0))).sqrt().mid())
 
     @property
     def verdict(self) -> str:
-        """In words: closes exactly, the gap, or that nothing could be compared."""
+        """The result as text: closes exactly, the gap, or that nothing could be compared."""
         if self.closes is None:
             return "no fourth corner"
         return "closes exactly" if self.closes else f"gap {self.gap:.3g}"
@@ -101,7 +103,7 @@ class Squares:
 def squares(
     pair: MapPair, start: Sequence[Any], eps: Any, steps: int = 1, progress: Callable[[str], None] = lambda _: None
 ) -> Squares:
-    """Walk `steps` steps of each map from an exact start in both orders; eps is exact, the time step is 2 eps.
+    """Apply each map `steps` times to an exact initial point in both orders; eps is exact, the time step is 2 eps.
 
     Raises InputError for wrong sizes.
 
@@ -120,20 +122,20 @@ def squares(
     missing: list[str] = []
 
     def orbit(phi: Map, first: Point | None, name: str) -> list[Point | None]:
-        found = [first]
+        points = [first]
         for k in range(steps):
             progress(f"{name}, step {k + 1} of {steps}")
             image = None
-            if found[-1] is not None:
+            if points[-1] is not None:
                 try:
-                    image = tuple(phi.step(found[-1]))
+                    image = tuple(phi.step(points[-1]))
                 except SingularStep:
                     missing.append(f"{name}: the map has no value at a point on the way")
             if image and max(entry.p.bit_length() + entry.q.bit_length() for entry in image) > MAX_BITS:
                 missing.append(f"{name}: the coordinates have more than {MAX_BITS} bits")
                 image = None
-            found.append(image)
-        return found
+            points.append(image)
+        return points
 
     along_f, along_g = orbit(phi_f, x, "Phi_f"), orbit(phi_g, x, "Phi_g")
     g_after_f = tuple(tuple(orbit(phi_g, point, f"Phi_g after {i} times Phi_f")) for i, point in enumerate(along_f))
@@ -143,10 +145,11 @@ def squares(
 
 
 def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
-    """The maps of a member that are drawn: two associated ones, and the control J grad H_0 and J grad H_1.
+    """Return the pairs of maps to be plotted for a member: two associated systems, and a control.
 
-    The first is the system itself, the second has the other sign at the last factor of chi. Where m = 1 the control is
-    f with 2 f. Raises InputError where the system is no member, declared or recognised, in its own coordinates.
+    The first system is the member itself, the second has the opposite sign at the last factor of chi. The control is
+    J grad H_0 with J grad H_1, and f with 2 f if m = 1. Raises InputError if the system is not a member of the family,
+    declared or recognised, in its own coordinates.
     """
     member = file.member
     if member is None:
@@ -170,7 +173,7 @@ def pairs_of_member(file: SystemFile) -> tuple[MapPair, MapPair]:
 
 
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> MapPair:
-    """Two systems of one dimension; with `eps2` the second has this step: it is scaled by eps2/eps."""
+    """Return the pair of two systems of equal dimension; with `eps2` the second one is scaled by eps2/eps."""
     g: QuadraticSystem | MapFamily
     g, note = matched(file, other)
     if eps2 is not None:
@@ -184,36 +187,36 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
 
 
 _F, _G, _GAP = COLORS[1], COLORS[5], COLORS[0]
-_LARGEST = 1e150  # what can be squared
-_SEEN = 0.06  # of the width of a panel: a gap below it is shown magnified
+_LARGEST = 1e150  # squares of larger numbers would overflow
+_SEEN = 0.06  # of the width of a panel: a smaller gap is magnified
 
 
 def plot_squares(
-    found: Sequence[Squares],
+    squares_of_pairs: Sequence[Squares],
     style: Style,
     axes: tuple[int, int] | None = None,
     captions: Sequence[str] = (),
 ) -> Figure:
-    """One panel for each pair of maps, in two coordinates: those given, or those in which the squares are widest.
+    """Plot one panel for each pair of maps, in two coordinates: those given, or those in which the squares are widest.
 
-    `captions` stand above the panels, in place of the names of the maps. Raises InputError for numbers that are none of
-    variables, and for a start beyond the range of what can be drawn.
+    `captions` replace the names of the maps above the panels. Raises InputError for invalid numbers of variables, and
+    for an initial point too large to be plotted.
     """
-    dim = found[0].pair.f.dim
-    if not all(np.isfinite(_table(squares.g_after_f)[0, 0]).all() for squares in found):
+    dim = squares_of_pairs[0].pair.f.dim
+    if not all(np.isfinite(_table(squares.g_after_f)[0, 0]).all() for squares in squares_of_pairs):
         raise InputError(f"found a start with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
-    chosen = widest_axes(found) if axes is None else axes
+    chosen = widest_axes(squares_of_pairs) if axes is None else axes
     if len(chosen) != 2 or not all(0 <= k < dim for k in chosen):
         raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
     with drawing(style):
         from matplotlib.lines import Line2D
 
         letter = style.font_size * 2.54 / 72
-        side = style.width / max(len(found), 1.25) - 4.2 * letter
+        side = style.width / max(len(squares_of_pairs), 1.25) - 4.2 * letter
         figure = new_figure(style, (side + 10 * letter) / style.width)
-        for k, panel in enumerate(figure.subplots(1, len(found), squeeze=False).ravel()):
+        for k, panel in enumerate(figure.subplots(1, len(squares_of_pairs), squeeze=False).ravel()):
             caption = captions[k] if k < len(captions) else ""
-            _draw(panel, found[k], chosen, caption, letter / side, style)
+            _draw(panel, squares_of_pairs[k], chosen, caption, letter / side, style)
         handles = [
             Line2D([], [], color=_F, marker="o", markersize=3, label=r"$\Phi_f$"),
             Line2D([], [], color=_G, marker="o", markersize=5.5, markerfacecolor="white", label=r"$\Phi_g$"),
@@ -222,15 +225,15 @@ def plot_squares(
     return figure
 
 
-def widest_axes(found: Sequence[Squares]) -> tuple[int, int]:
-    """The two coordinates in which the thinnest of the squares is thickest, and a gap is seen if there is one."""
-    dim = found[0].pair.f.dim
+def widest_axes(squares_of_pairs: Sequence[Squares]) -> tuple[int, int]:
+    """Return the two coordinates that maximize the smallest width of the squares and of their gaps."""
+    dim = squares_of_pairs[0].pair.f.dim
     if dim == 1:
         return 0, 0
 
     def score(pair: tuple[int, int]) -> float:
         widths = []
-        for squares in found:
+        for squares in squares_of_pairs:
             table = _table(squares.g_after_f)
             x, fx, gx = table[0, 0], table[-1, 0], table[0, -1]
             sides = np.stack([fx - x, gx - x])
@@ -247,17 +250,17 @@ def widest_axes(found: Sequence[Squares]) -> tuple[int, int]:
 
 
 def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, letter: float, style: Style) -> None:
-    """One panel; `letter` is the size of the letters in units of its side."""
-    one, other = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
-    every = np.concatenate([one.reshape(-1, 2), other.reshape(-1, 2)])
-    every = every[np.isfinite(every).all(axis=1)]
-    # Margins on each side, in units of the range of the points: the names of corners need room, more in small panels.
+    """Draw one panel; `letter` is the font size in units of its side."""
+    g_last, f_last = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
+    all_points = np.concatenate([g_last.reshape(-1, 2), f_last.reshape(-1, 2)])
+    all_points = all_points[np.isfinite(all_points).all(axis=1)]
+    # Margins on each side, in units of the range of the points: the names of corners need space, more in small panels.
     if squares.steps > 1:
-        window = np.array(window_of(every, one[0, 0][None]))
+        window = np.array(window_of(all_points, g_last[0, 0][None]))
         needed = np.array([[1.3 * letter], [1.7 * letter]])
         margins = np.maximum(0.12, needed / (1 - 2 * np.minimum(0.36, needed)))
-    else:  # five points, all of which are wanted
-        window = np.array([every.min(axis=0), every.max(axis=0)]).T
+    else:  # five points, all of which are shown
+        window = np.array([all_points.min(axis=0), all_points.max(axis=0)]).T
         window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
         needed = np.minimum(0.36, np.array([[3.2 * letter], [2.5 * letter]]))
         margins = np.maximum([[0.42], [0.36]], needed / (1 - 2 * needed))
@@ -275,66 +278,66 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, l
     else:
         f, g = (re.sub(r"^f_(.*)", r"f_{\1}", name).replace("grad ", r"\nabla ") for name in squares.pair.names)
         title = f"$f = {f}$,  $g = {g}$"
-    beyond = outside(every, tuple(map(tuple, window)))
-    note = f"\n{beyond} of {len(every)} points outside" if beyond else ""
+    beyond = outside(all_points, tuple(map(tuple, window)))
+    note = f"\n{beyond} of {len(all_points)} points outside" if beyond else ""
     axes.set_title(f"{title}\n{squares.verdict}{note}")
-    _draw_lattices(axes, one, other)
-    gap = (other[-1, -1] - one[-1, -1]) / np.diff(window, axis=1)[:, 0]
+    _draw_lattices(axes, g_last, f_last)
+    gap = (f_last[-1, -1] - g_last[-1, -1]) / np.diff(window, axis=1)[:, 0]
     is_small = bool(np.hypot(*gap) < _SEEN)
     if squares.steps == 1:
-        corners = [(one[0, 0], "$x$", ""), (one[1, 0], r"$\Phi_f x$", ""), (one[0, 1], r"$\Phi_g x$", "")]
+        corners = [(g_last[0, 0], "$x$", ""), (g_last[1, 0], r"$\Phi_f x$", ""), (g_last[0, 1], r"$\Phi_g x$", "")]
         if squares.closes or (squares.closes is False and is_small):
             sign = "=" if squares.closes else r"\neq"
-            corners.append((one[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$", ""))
-        else:  # the names of the last two corners stand side by side
-            sides = ("right", "left") if one[1, 1, 0] < other[1, 1, 0] else ("left", "right")
-            corners += [(one[1, 1], r"$\Phi_g\Phi_f x$", sides[0]), (other[1, 1], r"$\Phi_f\Phi_g x$", sides[1])]
+            corners.append((g_last[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$", ""))
+        else:  # the names of the last two corners are side by side
+            sides = ("right", "left") if g_last[1, 1, 0] < f_last[1, 1, 0] else ("left", "right")
+            corners += [(g_last[1, 1], r"$\Phi_g\Phi_f x$", sides[0]), (f_last[1, 1], r"$\Phi_f\Phi_g x$", sides[1])]
         middle = np.nanmean(np.stack([point for point, _, _ in corners]), axis=0)
         for point, text, side in corners:
             _label(axes, point, text, middle, letter, side)
     else:
-        _label(axes, one[0, 0], "$x$", np.nanmean(every, axis=0), letter)
+        _label(axes, g_last[0, 0], "$x$", np.nanmean(all_points, axis=0), letter)
     if squares.closes is False and is_small and np.any(gap != 0):
-        _magnify(axes, one, other, every, window, style)
+        _magnify(axes, g_last, f_last, all_points, window, style)
 
 
-def _draw_lattices(axes: Axes, one: Floats, other: Floats) -> None:
-    """Arrows, rings where steps of g end, dots where steps of f end, and dotted lines across the gaps."""
+def _draw_lattices(axes: Axes, g_last: Floats, f_last: Floats) -> None:
+    """Draw arrows, rings at the ends of steps of g, dots at those of f, and dotted lines across the gaps."""
     from matplotlib.patches import FancyArrowPatch
 
-    steps = len(one) - 1
+    steps = len(g_last) - 1
     width, size = (1.1, 5.5) if steps == 1 else (0.8, 4.0) if steps <= 4 else (0.5, 2.6)
     arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": width, "mutation_scale": 4 + 5 * width}
     arrow |= {"shrinkA": 2, "shrinkB": 2.5, "zorder": 2}
     for i in range(steps + 1):
         for j in range(steps + 1):
-            arrows = [(one[i, j], one[i, j + 1], _G)] if j < steps else []
-            arrows += [(other[i, j], other[i + 1, j], _F)] if i < steps else []
+            arrows = [(g_last[i, j], g_last[i, j + 1], _G)] if j < steps else []
+            arrows += [(f_last[i, j], f_last[i + 1, j], _F)] if i < steps else []
             for start, end, color in arrows:
                 if np.isfinite([*start, *end]).all() and not np.array_equal(start, end):
                     axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), color=color, **arrow))
-            if not np.array_equal(one[i, j], other[i, j], equal_nan=True):
-                ends = np.stack([one[i, j], other[i, j]])
+            if not np.array_equal(g_last[i, j], f_last[i, j], equal_nan=True):
+                ends = np.stack([g_last[i, j], f_last[i, j]])
                 axes.plot(ends[:, 0], ends[:, 1], color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
     ring: dict[str, Any] = {"linestyle": "none", "marker": "o", "zorder": 3}
-    rings, dots = one.reshape(-1, 2), other.reshape(-1, 2)
+    rings, dots = g_last.reshape(-1, 2), f_last.reshape(-1, 2)
     axes.plot(*rings.T, color=_G, markersize=size, markerfacecolor="white", markeredgewidth=0.8, **ring)
     axes.plot(*dots.T, color=_F, markersize=0.5 * size, markeredgewidth=0, **{**ring, "zorder": 4})
 
 
-def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floats, style: Style) -> None:
-    """The last corners once more, as large as it takes to see that they are two; in the emptiest corner."""
+def _magnify(axes: Axes, g_last: Floats, f_last: Floats, all_points: Floats, window: Floats, style: Style) -> None:
+    """Draw the last two corners magnified until they are distinguishable, in the emptiest corner of the panel."""
     lengths = np.diff(window, axis=1)[:, 0]
-    inside = (every - window[:, 0]) / lengths
-    if len(one) == 2:  # the name of the last corner is there as well
-        corner = (one[-1, -1] - window[:, 0]) / lengths
+    inside = (all_points - window[:, 0]) / lengths
+    if len(g_last) == 2:  # the name of the last corner is there as well
+        corner = (g_last[-1, -1] - window[:, 0]) / lengths
         inwards, down = -np.sign(corner - 0.5)
         name = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
         inside = np.concatenate([inside, np.array(name)])
     places = [(x, y) for x in (0.04, 0.64) for y in (0.04, 0.64)]
     x, y = max(places, key=lambda place: np.hypot(*(inside - np.array(place) - 0.16).T).min())
     inset = axes.inset_axes((x, y, 0.32, 0.32), zorder=7)
-    ends = np.stack([one[-1, -1], other[-1, -1]])
+    ends = np.stack([g_last[-1, -1], f_last[-1, -1]])
     half = 1.1 * (np.abs(ends[1] - ends[0]) / lengths).max() * lengths
     inset.set_xlim(ends[:, 0].mean() - half[0], ends[:, 0].mean() + half[0])
     inset.set_ylim(ends[:, 1].mean() - half[1], ends[:, 1].mean() + half[1])
@@ -343,7 +346,7 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     factor = rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half[0]))}$"
     how: dict[str, Any] = {"xycoords": "axes fraction", "fontsize": style.smallest}
     write_beside(inset, factor, (0.04, 0.96), (0, 0), 1.5, va="top", zorder=8, **how)
-    _draw_lattices(inset, one[-2:, -2:], other[-2:, -2:])
+    _draw_lattices(inset, g_last[-2:, -2:], f_last[-2:, -2:])
     inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
 
 

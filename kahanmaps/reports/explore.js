@@ -1,5 +1,5 @@
 "use strict";
-// A map M(x, eps) x~ = r(x, eps) in floating point, and the page that draws its orbits.
+// A map M(x, eps) x~ = r(x, eps) in floating-point numbers, and the page that plots its orbits.
 // A polynomial is a list of terms [coefficient, power of each variable ..., power of eps].
 
 function valueOf(terms, at) {
@@ -12,7 +12,7 @@ function valueOf(terms, at) {
   return total;
 }
 
-// The solution of (A | -b): null where a pivot is zero or no number.
+// Return the solution of (A | -b), or null if a pivot is zero or NaN.
 function solve(rows) {
   const n = rows.length;
   for (let k = 0; k < n; k++) {
@@ -27,9 +27,9 @@ function solve(rows) {
   }
   const x = new Array(n);
   for (let k = n - 1; k >= 0; k--) {
-    let right = -rows[k][n];
-    for (let j = k + 1; j < n; j++) right -= rows[k][j] * x[j];
-    x[k] = right / rows[k][k];
+    let remainder = -rows[k][n];
+    for (let j = k + 1; j < n; j++) remainder -= rows[k][j] * x[j];
+    x[k] = remainder / rows[k][k];
   }
   return x;
 }
@@ -39,7 +39,7 @@ function step(rows, x, eps) {
   return solve(rows.map((row) => row.map((terms) => valueOf(terms, at))));
 }
 
-// The points from the start on; fewer where the map has no value or numbers are too large.
+// Return the points of an orbit, fewer if it reaches an indeterminacy point or becomes too large.
 function orbit(rows, start, eps, steps) {
   const points = [start];
   while (points.length <= steps) {
@@ -52,11 +52,10 @@ function orbit(rows, start, eps, steps) {
 
 function functionAt(f, x, eps) {
   const at = [...x, eps];
-  return valueOf(f.above, at) / valueOf(f.below, at);
+  return valueOf(f.numerator, at) / valueOf(f.denominator, at);
 }
 
-// The range of the start, which comes first, and of most of the values, as in other pictures: a few far away do not
-// spoil it.
+// Return a range that contains the first value and most others, as in other pictures: outliers are ignored.
 function rangeOf(values) {
   const sorted = values.slice().sort((a, b) => a - b);
   const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
@@ -70,9 +69,9 @@ function rangeOf(values) {
 function ticksIn([low, high]) {
   const raw = (high - low) / 8, unit = 10 ** Math.floor(Math.log10(raw));
   const gap = [1, 2, 5, 10].map((m) => m * unit).find((m) => m >= raw);
-  const found = [];
-  for (let k = Math.ceil(low / gap); k * gap <= high; k++) found.push(k * gap);
-  return found;
+  const ticks = [];
+  for (let k = Math.ceil(low / gap); k * gap <= high; k++) ticks.push(k * gap);
+  return ticks;
 }
 
 function show(data) {
@@ -101,7 +100,7 @@ function show(data) {
   function drawFrame() {
     const names = [...data.variables, "step"], [a, b] = chosen();
     pen.font = "17px sans-serif";
-    left = 12 + Math.max(...[names[b], ...ticksIn(windows[1]).map(number)].map((word) => pen.measureText(word).width));
+    left = 12 + Math.max(...[names[b], ...ticksIn(windows[1]).map(number)].map((label) => pen.measureText(label).width));
     pen.fillStyle = "#ffffff";
     pen.fillRect(0, 0, canvas.width, canvas.height);
     pen.strokeStyle = "#888888";
@@ -142,10 +141,10 @@ function show(data) {
     pen.restore();
     sliders.forEach((slider, k) => { element("x" + k + "-value").textContent = number(Number(slider.value)); });
     if (epsSlider) element("eps-value").textContent = number(eps());
-    const asked = Number(element("steps").value), taken = points.length - 1;
-    element("steps-value").textContent = String(asked);
+    const requested = Number(element("steps").value), taken = points.length - 1;
+    element("steps-value").textContent = String(requested);
     element("status").textContent = `${taken} steps, ${outside} points outside the window`
-      + (taken < asked ? `: the orbit ends after step ${taken}, where the map has no value or leaves the range` : "");
+      + (taken < requested ? `: the orbit ends after step ${taken}, at an indeterminacy point of the map or outside the range of numbers` : "");
     data.functions.forEach((f, row) => {
       const values = points.map((x) => functionAt(f, x, eps()));
       const most = Math.max(...values.map((value) => Math.abs(value - values[0])));

@@ -29,41 +29,44 @@ _MAX_TERMS = 2000  # of all polynomials: the browser evaluates them at every ste
 _MAX_VARIABLES = 12
 
 
-def explore_sections(found: Analysis) -> list[Section]:
+def explore_sections(analysis: Analysis) -> list[Section]:
     """The sections of the page about what `analyze` found, with an orbit that its reader moves.
 
     Raises InputError where a map has too many variables or terms for a browser to follow the slider.
     """
-    data, final = explore_data(found), found.conclusion
+    data, final = explore_data(analysis), analysis.conclusion
     names, reach, eps = data["variables"], data["reach"], data["eps"]
     sliders = [(f"x{k}", name, -reach, reach, data["start"][k], "any") for k, name in enumerate(names)]
     if data["has_eps"]:
         largest = max(_LARGEST_EPS, 2 * abs(eps))
         sliders.insert(0, ("eps", "eps", -largest if eps < 0 else 0, largest, eps, "any"))
     sliders.append(("steps", "steps", 10, _MAX_STEPS, _DEFAULT_STEPS, "10"))
-    where = "for every eps" if found.eps is None else f"at eps = {format_number(found.eps)} only"
-    integrals = found.integrals.integrals if found.integrals is not None else ()
+    where = "for every eps" if analysis.eps is None else f"at eps = {format_number(analysis.eps)} only"
+    integrals = analysis.integrals.integrals if analysis.integrals is not None else ()
     explore = {
         "axes": [*names, "step"],
         "chosen": (1, 0) if len(names) == 1 else (0, 1),
         "sliders": sliders,
         "eps_moves": data["eps_moves"],
-        "verdict": f"The verdict{f', {where}' if found.file.map.has_eps else ''}",
+        "verdict": f"The verdict{f', {where}' if analysis.file.map.has_eps else ''}",
         "conclusion": (final.kind, final.sentence),
         "integrals": [
-            (Html(markup.verdict(str(one.verdict.value))), Html(formula(one.function, one.name or "I", CHARACTERS)))
-            for one in integrals
+            (
+                Html(markup.verdict(str(integral.verdict.value))),
+                Html(formula(integral.function, integral.name or "I", CHARACTERS)),
+            )
+            for integral in integrals
         ],
         "functions": data["functions"],
         # in a script element < could begin a tag, in text of JSON it can be written otherwise
         "data": Html(json.dumps(data, sort_keys=True).replace("<", "\\u003c")),
     }
-    return [Section("explore", "An orbit", explore=explore), system_section(found.file)]
+    return [Section("explore", "An orbit", explore=explore), system_section(analysis.file)]
 
 
-def explore_data(found: Analysis) -> dict[str, Any]:
-    """What explore.js works with: the rows of (M | -r), the functions to be watched, where to begin."""
-    file = found.file
+def explore_data(analysis: Analysis) -> dict[str, Any]:
+    """Return the data for explore.js: the rows of (M | -r), the functions to be plotted, the initial point."""
+    file = analysis.file
     map_, n = file.map, file.dim
     if n > _MAX_VARIABLES:
         raise InputError(f"found {n} variables, expected at most {_MAX_VARIABLES} to have a slider each")
@@ -72,19 +75,21 @@ def explore_data(found: Analysis) -> dict[str, Any]:
     size = sum(len(terms) for row in rows for terms in row)
     if size > _MAX_TERMS:
         raise InputError(f"found a map of {size} terms, expected at most {_MAX_TERMS} for a browser to step")
-    integrals = found.integrals.integrals if found.integrals is not None else ()
-    functions = [(one.name, one.function, str(one.verdict.value)) for one in integrals]
+    integrals = analysis.integrals.integrals if analysis.integrals is not None else ()
+    functions = [(integral.name, integral.function, str(integral.verdict.value)) for integral in integrals]
     if file.hamiltonian is not None and "H" not in {name for name, *_ in functions}:
         H = file.hamiltonian.H
         functions.append(("H", RationalFunction(H, H.context().constant(1)), "of the flow"))
     watched = []
-    for name, function, word in functions:
+    for name, function, certainty in functions:
         sides = [_terms(part, names, file.parameters) for part in (function.numerator, function.denominator)]
         if sum(map(len, sides)) <= _MAX_TERMS:
             text = format_rational_function(function)
-            watched.append({"name": name, "text": text, "word": word, "above": sides[0], "below": sides[1]})
-    if file.is_quadratic:  # a start whose orbit stays, in the middle of those that a portrait takes
-        starts = automatic_starts(file.system, DEFAULT_EPS if found.eps is None else found.eps)
+            watched.append(
+                {"name": name, "text": text, "word": certainty, "numerator": sides[0], "denominator": sides[1]}
+            )
+    if file.is_quadratic:  # an initial point with a bounded orbit, in the middle of those of a portrait
+        starts = automatic_starts(file.system, DEFAULT_EPS if analysis.eps is None else analysis.eps)
         start, reach = starts[len(starts) // 2], float(f"{2 * max(1.0, float(abs(starts).max())):.1g}")
     else:
         start, reach = to_floats([fmpq(k + 1, 2 * (k + 2)) for k in range(n)]), 3.0
@@ -92,8 +97,8 @@ def explore_data(found: Analysis) -> dict[str, Any]:
         "variables": list(file.variables),
         "rows": rows,
         "has_eps": map_.has_eps,
-        "eps": to_float(DEFAULT_EPS if found.eps is None else found.eps),
-        "eps_moves": found.eps is None,
+        "eps": to_float(DEFAULT_EPS if analysis.eps is None else analysis.eps),
+        "eps_moves": analysis.eps is None,
         "start": [float(f"{value:.4g}") for value in start],
         "reach": reach,
         "functions": watched,
@@ -101,12 +106,12 @@ def explore_data(found: Analysis) -> dict[str, Any]:
 
 
 def _terms(polynomial: fmpq_mpoly, names: tuple[str, ...], values: Mapping[str, fmpq]) -> list[list[Any]]:
-    """The terms, each its coefficient and the powers of the names; symbols have their values."""
-    places = names_of(polynomial)
+    """Return the terms as lists of a coefficient and the powers of the names; symbols are replaced by values."""
+    own_names = names_of(polynomial)
     terms = []
     for powers, coefficient in polynomial.terms():
-        power = dict(zip(places, powers, strict=True))
-        for name in set(places) - set(names):
+        power = dict(zip(own_names, powers, strict=True))
+        for name in set(own_names) - set(names):
             coefficient *= values[name] ** int(power[name])
         terms.append([to_float(coefficient), *(int(power.get(name, 0)) for name in names)])
     return terms

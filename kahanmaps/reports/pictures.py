@@ -13,7 +13,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.display import markup
 from kahanmaps.errors import InputError, KahanmapsError, counted
-from kahanmaps.maps.convention import eps_told
+from kahanmaps.maps.convention import eps_suffix
 from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
 from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
@@ -107,7 +107,7 @@ class Pictures:
             return plot_portrait(shown, style)
 
         where = " and ".join(axes)
-        sentence = f"{eps_told(at, file.map)}, {_STEPS} steps in floating point".removeprefix(", ")
+        sentence = f"{eps_suffix(at, file.map)}, {_STEPS} steps in floating point".removeprefix(", ")
         caption = f"Orbits of {'the Kahan map' if file.is_quadratic else 'the map'} in {where}: {sentence}."
         return self.draw("portrait", caption, f"Portrait of orbits in {where}, {sentence}", drawing, remarks)
 
@@ -124,7 +124,7 @@ class Pictures:
                     remarks.append(f"Orbit {k} ends before step {pole}: a pole, or closer to one than 2^-96.")
             return plot_invariant_curves(curves, style)
 
-        sentence = f"{eps_told(at)}, {_CURVE_STEPS} steps".removeprefix(", ")
+        sentence = f"{eps_suffix(at)}, {_CURVE_STEPS} steps".removeprefix(", ")
         caption = f"{_CURVES} orbits in the planes of the normal form, and the invariant curves through them: "
         alt = f"Invariant plane cubics with orbits on them, {sentence}"
         return self.draw("invariant-curves", f"{caption}{sentence}.", alt, drawing, remarks)

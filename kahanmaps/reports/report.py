@@ -1,4 +1,4 @@
-"""What was found as one HTML page: formulas, verdicts, pictures, and how to do it again."""
+"""Results as one HTML page: formulas, verdicts, pictures, and the command that reproduces them."""
 
 from __future__ import annotations
 
@@ -31,8 +31,10 @@ if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding
     from kahanmaps.laboratory.preserve.hirota_kimura import SparseRelation
 
-_LIMITS = checks.DisplayLimits(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
-_PARSED = 4_000  # characters of a relation that is read once more, to be set as a formula
+_LIMITS = checks.DisplayLimits(
+    CHARACTERS, CHARACTERS, CHARACTERS, 100
+)  # long enough for complete witnesses, so that a reader can check them
+_PARSED = 4_000  # maximal length of a relation that is typeset as a formula
 _PAPER = "petrera-suris-2016"
 _EXPLAINED = (
     "Proved: exactly, for every eps or the one that is named. Supported: held at random points over GF(p), with a "
@@ -42,7 +44,7 @@ _EXPLAINED = (
 
 
 def report_html(
-    found: Analysis | Report | Sequence[Report],
+    results: Analysis | Report | Sequence[Report],
     *,
     file: SystemFile | None = None,
     title: str | None = None,
@@ -51,23 +53,23 @@ def report_html(
     left_out: Sequence[str] = (),
     explore: bool = False,
 ) -> str:
-    """A page about what was found: one HTML text that needs no network, and no JavaScript unless it is to `explore`.
+    """Return an HTML page with results, which needs no network, and no JavaScript unless `explore` is true.
 
     Args:
-        found: an `Analysis`, the `Report` of `verify` or of a check, or several of checks of one system.
-        file: the system that reports are about, for its equations and pictures; an Analysis brings its own.
+        results: an `Analysis`, the `Report` of `verify` or of a check, or several reports on checks of one system.
+        file: the system of the reports, for its equations and pictures; an Analysis contains its system.
         title: the title (default: the name of the system).
-        pictures: whether to draw; without matplotlib the page says that there are none, and how to get them.
-        command: the command line that makes the page, printed on the page.
-        left_out: sentences on what is not on the page, printed as notes.
-        explore: for an Analysis, a page on which eps and the start of an orbit are moved by sliders.
+        pictures: whether to draw pictures; without matplotlib a note says how to install it.
+        command: the command line that creates the page, printed on the page.
+        left_out: sentences on omitted results, printed as notes.
+        explore: for an Analysis, add sliders for eps and the initial point of an orbit instead of the results.
 
     Returns:
-        The page, the same text for the same input (and the same versions of the libraries that make it). Formulas are
-        exact; those of more than about 6000 characters are cut, and say so.
+        The page, the same text for the same input (and the same versions of the libraries). Formulas are exact;
+        those of more than about 6000 characters are truncated, with a note.
 
     Raises:
-        InputError: for something else, no reports, and where the extra [report] is not installed.
+        InputError: for other types, for no reports, and if the extra [report] is not installed.
 
     >>> from kahanmaps.checks.conserve import check_integrals
     >>> from kahanmaps.documents.catalog import load
@@ -76,24 +78,24 @@ def report_html(
     >>> text[:15], text.count("</details>")
     ('<!DOCTYPE html>', 3)
     """
-    page_template()  # which says what has to be installed, before pictures are drawn
+    page_template()  # raises the error for a missing package before pictures are drawn
     drawn = Pictures(pictures and not explore)
     script, seed = "", None
-    if isinstance(found, Analysis):
-        file, seed = found.file, found.seed
-        about = (file.name, f"dimension {found.dim}", eps_sentence(found.eps, file.map))
+    if isinstance(results, Analysis):
+        file, seed = results.file, results.seed
+        about = (file.name, f"dimension {results.dim}", eps_sentence(results.eps, file.map))
         lead = ", ".join(filter(None, about))
         default_title = _title(file)
         if explore:
-            sections = explore_sections(found)
+            sections = explore_sections(results)
             script = (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
         else:
-            lead += f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
-            sections = [*_analysis_sections(found, drawn), Section("notes", "Notes", items=left_out)]
+            lead += f"; formulas for every {', '.join(results.symbols)}" if results.symbols else ""
+            sections = [*_analysis_sections(results, drawn), Section("notes", "Notes", items=left_out)]
     elif explore:
-        raise InputError(f"found {type(found).__name__}, expected an Analysis: it is what can be explored")
+        raise InputError(f"found {type(results).__name__}, expected an Analysis: it is what can be explored")
     else:
-        reports = list(found) if isinstance(found, Sequence) else [found]
+        reports = list(results) if isinstance(results, Sequence) else [results]
         if not reports or not all(isinstance(report, Report) for report in reports):
             kinds = ", ".join(sorted({type(report).__name__ for report in reports})) or "nothing"
             raise InputError(f"found {kinds}, expected an Analysis, a Report or several of them")
@@ -109,42 +111,42 @@ def report_html(
     return page(title, lead, sections, command=command, seed=seed, file=file, script=script)
 
 
-def write_report(path: str | Path, found: Any, **options: Any) -> None:
-    """Write the page of `report_html` to a file, whole or not at all; the options are those of `report_html`."""
-    write_atomically(Path(path), report_html(found, **options).encode())
+def write_report(path: str | Path, results: Any, **options: Any) -> None:
+    """Write the page of `report_html` atomically to a file; the options are those of `report_html`."""
+    write_atomically(Path(path), report_html(results, **options).encode())
 
 
 def _title(file: SystemFile) -> str:
-    """What the catalogue calls it; equations from the command line have no name and stand for themselves, if short."""
+    """Return the title in the catalogue, or else the label: the name, or short equations of an inline system."""
     return str(file.catalog.get("title", "")) or file.label
 
 
-# -- the page of an analysis: the verdict first, then what was found, each with how it is known
+# -- the page of an analysis: the verdict first, then the results with their certainty
 
 
-def _analysis_sections(found: Analysis, pictures: Pictures) -> list[Section]:
-    file, final = found.file, found.conclusion
+def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
+    file, final = analysis.file, analysis.conclusion
     of = " in x and eps" if file.map.has_eps else ""
-    words = (
+    explanation = (
         f"Proved and supported: formulas, as identities{of}. Measured: modulo primes and along orbits, "
         "which is evidence. The number of integrals and the growth are separate findings."
     )
     conclusion = Html(f"<strong>{text(final.kind)}</strong>"), final.sentence
-    sections = [Section("verdict", "Verdict", conclusion, [words]), system_section(file), _catalogue(file)]
-    formulas = formulas_of(found)
-    for name, lines in found.sections:
+    sections = [Section("verdict", "Verdict", conclusion, [explanation]), system_section(file), _catalogue(file)]
+    formulas = formulas_of(analysis)
+    for name, lines in analysis.sections:
         statements = [(Html(markup.verdict(line.status)), formulas.get(line.text, line.text)) for line in lines]
-        pieces, folded = _beside(found, name, pictures)
+        pieces, folded = _beside(analysis, name, pictures)
         title = name[0].upper() + name[1:]
         section = Section(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
         sections.append(section)
-    is_member = isinstance(file.normal_form, SystemNormalForm)  # in the coordinates that the picture is made in
-    drawn = (pictures.invariant_curves if is_member else pictures.portrait)(file, found.eps)
+    is_member = isinstance(file.normal_form, SystemNormalForm)  # in the coordinates of the system
+    drawn = (pictures.invariant_curves if is_member else pictures.portrait)(file, analysis.eps)
     return [*sections, Section("orbits", "Orbits", pieces=[Html(drawn)] if drawn else [])]
 
 
 def _catalogue(file: SystemFile) -> Section:
-    """What the catalogue, or the file, says of the system; empty for others."""
+    """Return the section with facts and claims of the catalogue or the file; empty if there are none."""
     claims = [
         formula(function, name or "I", CHARACTERS)
         for name, function in {**file.integrals, **file.integrals_in_iterates}.items()
@@ -171,21 +173,23 @@ def _catalogue(file: SystemFile) -> Section:
     )
 
 
-def _beside(found: Analysis, name: str, pictures: Pictures) -> tuple[list[Html], list[tuple[str, Html]]]:
-    """Pictures and folded tables below the statements of a section."""
+def _beside(analysis: Analysis, name: str, pictures: Pictures) -> tuple[list[Html], list[tuple[str, Html]]]:
+    """Return the pictures and folded tables below the statements of a section."""
     drawn: list[str] = []
     folded: list[tuple[str, Html]] = []
     if name == "singularities":
-        at = " at eps = {}" if found.file.map.has_eps else ""
-        for run in found.singularities:
-            folded.append((f"Hypersurfaces{at.format(format_number(run.eps))}", wide(result_html(run, found.file.map))))
-    growth, survey = found.degrees, found.heights
+        at = " at eps = {}" if analysis.file.map.has_eps else ""
+        for run in analysis.singularities:
+            folded.append(
+                (f"Hypersurfaces{at.format(format_number(run.eps))}", wide(result_html(run, analysis.file.map)))
+            )
+    growth, survey = analysis.degrees, analysis.heights
     if name == "growth" and growth is not None:
         first = ", ".join(map(str, growth.degrees[:8]))
         alt = f"Degrees of the iterates against their number, from {first}: {growth.growth_text}"
         caption = "Degrees of the iterates"
         caption += " and the recurrence that they satisfy." if growth.recurrence is not None else "."
-        label = found.file.label
+        label = analysis.file.label
         drawn.append(pictures.draw("degrees", caption, alt, lambda style: plot_degrees({label: growth}, style)))
         rows = [(str(n), str(d)) for n, d in enumerate(growth.degrees)]
         folded.append(("Degrees as a table", wide(markup.table(["n", "degree of the n-th iterate"], rows))))
@@ -197,42 +201,46 @@ def _beside(found: Analysis, name: str, pictures: Pictures) -> tuple[list[Html],
     return [Html(figure) for figure in drawn if figure], folded
 
 
-def formulas_of(found: Analysis) -> dict[str, Html]:
-    """HTML for statements that are formulas, by their text in `found.sections`."""
+def formulas_of(analysis: Analysis) -> dict[str, Html]:
+    """Return HTML for statements that are formulas, by their text in `analysis.sections`."""
     shown: dict[str, str] = {}
 
     def evidence(statement: Any) -> str:
         because = checks.because(statement.evidence, _LIMITS)
         return f"<details><summary>evidence</summary>{because}</details>"
 
-    for one in found.integrals.integrals if found.integrals is not None else ():
-        html = formula(one.function, one.name, CHARACTERS)
-        below = f'<span class="soft">{text(one.origin)}</span>\n{evidence(one)}'
-        shown[f"{one.name} = {one.text}  [{one.origin}]"] = f"{html}<br/>{below}"
-    for relation in found.relations:
-        if html := _relation(relation, (*relation.names, *found.file.variables, "eps")):
+    for integral in analysis.integrals.integrals if analysis.integrals is not None else ():
+        html = formula(integral.function, integral.name, CHARACTERS)
+        origin_and_evidence = f'<span class="soft">{text(integral.origin)}</span>\n{evidence(integral)}'
+        shown[f"{integral.name} = {integral.text}  [{integral.origin}]"] = f"{html}<br/>{origin_and_evidence}"
+    for relation in analysis.relations:
+        if html := _relation(relation, (*relation.names, *analysis.file.variables, "eps")):
             shown[f"along orbits {relation.text}"] = f"along orbits {html}"
-    for density in found.densities.densities if found.densities is not None else ():
+    for density in analysis.densities.densities if analysis.densities is not None else ():
         html = formula(density.function, "phi", CHARACTERS)
         shown[f"dx/phi is invariant, phi = {density.text}"] = f"dx/ϕ is invariant, {html}\n{evidence(density)}"
-    if found.degrees is not None and found.degrees.recurrence is not None and found.degrees.recurrence.closed_form:
-        closed = found.degrees.recurrence.closed_form
-        with suppress(KahanmapsError):  # where it is something else than a polynomial in n
+    if (
+        analysis.degrees is not None
+        and analysis.degrees.recurrence is not None
+        and analysis.degrees.recurrence.closed_form
+    ):
+        closed = analysis.degrees.recurrence.closed_form
+        with suppress(KahanmapsError):  # raised unless it is a polynomial in n
             shown[f"d_n = {closed}"] = typeset(f"d_n = {latex_polynomial(parse_polynomial(closed, ['n']))}")
-    if found.hamiltonian is not None and found.hamiltonian.hamiltonian is not None:
-        hamiltonian = found.hamiltonian.hamiltonian
+    if analysis.hamiltonian is not None and analysis.hamiltonian.hamiltonian is not None:
+        hamiltonian = analysis.hamiltonian.hamiltonian
         kind = "the standard J" if hamiltonian.is_standard else "a constant skew J"
         html = f"Hamiltonian with {kind}, {formula(hamiltonian.H, 'H', CHARACTERS)}"
         shown[f"Hamiltonian with {kind}, H = {format_polynomial(hamiltonian.H)}"] = html
-    for field in found.commuting.nontrivial if found.commuting is not None else ():
+    for field in analysis.commuting.nontrivial if analysis.commuting is not None else ():
         parts = "<br/>\n".join(formula(g, f"g{k}", CHARACTERS) for k, g in enumerate(field.system.rhs, start=1))
-        words = "commutes with the Kahan maps of g and -g"
-        shown[f"{words}, g = ({', '.join(field.rhs)})"] = f"{words},<br/>\n{parts}"
+        statement = "commutes with the Kahan maps of g and -g"
+        shown[f"{statement}, g = ({', '.join(field.rhs)})"] = f"{statement},<br/>\n{parts}"
     return {text: Html(html) for text, html in shown.items()}
 
 
 def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
-    """P = 0 as a formula, term by term in the order of its text; empty where it cannot be read as one."""
+    """Return P = 0 as a formula with terms in the order of its text; empty if it cannot be parsed or is too long."""
     if len(relation.text) > _PARSED:
         return ""
     text = ""
@@ -286,23 +294,23 @@ def _claims_sections(
 
 
 def _claim(finding: Finding, ids: Counter[str]) -> dict[str, Any]:
-    """One line with its verdict, to be unfolded; what is refuted and should not be stands open.
+    """Return the data of a line that unfolds to its evidence; it is open if the claim is refuted unexpectedly.
 
-    `ids` counts those that are on the page: a control has the key of its claim, once for each hypothesis it breaks.
+    `ids` counts the keys on the page: the controls of a claim, one for each hypothesis, have the key of the claim.
     """
     name = ""
     if key := finding.place.get("key"):
         name = f"claim-{_slug(str(key))}"
         ids[name] += 1
         name = name if ids[name] == 1 else f"{name}-{ids[name]}"
-    place = finding.place.get("place")
+    location = finding.place.get("place")
     return {
         "id": name,
         "is_open": str(finding.verdict) == "refuted" and not finding.control,
         "verdict": Html(checks.verdict_html(finding)),
-        "place": place,
-        "words": finding.claim.removeprefix(f"{place}: "),
-        "rows": [(word, Html(what)) for word, what in checks.evidence_rows(finding, _LIMITS)],
+        "place": location,
+        "words": finding.claim.removeprefix(f"{location}: "),
+        "rows": [(label, Html(what)) for label, what in checks.evidence_rows(finding, _LIMITS)],
     }
 
 

@@ -230,7 +230,7 @@ def test_variables_are_matched_by_name_where_the_names_agree(names):
 def test_an_indeterminate_initial_point_is_reported():
     # x' = x^2 at eps = 1/10: det = 1 - 2 eps x vanishes at x = 5.
     f = system_of("x", "x^2")
-    report = pair(f, f, Settings(eps="1/10", start=(5,), steps=3, orbit_is_asked=True))
+    report = pair(f, f, Settings(eps="1/10", start=(5,), steps=3, orbit_is_requested=True))
     assert report.verdict is PROVED
     assert report.ended_early
     orbit = report.to_json()["orbit"]

@@ -206,7 +206,7 @@ def test_a_page_names_the_second_system_its_eps_and_an_orbit_that_ended_early():
     top = km.load("euler_top")
     page = require_sound(report_html(km.check_commute(top, top, km.Settings(eps="1/10"), eps2="1/7"), pictures=False))
     assert "euler_top, euler_top, eps = 1/10 (time step 2 eps = 1/5), second map at eps2 = 1/7" in page.text
-    settings = km.Settings(eps="1/10", start=(1, "1/2"), steps=60, max_digits=200, orbit_is_asked=True)
+    settings = km.Settings(eps="1/10", start=(1, "1/2"), steps=60, max_digits=200, orbit_is_requested=True)
     report = km.check_integrals(km.load("planar_cubic_hamiltonian"), settings)
     assert "The requested orbit ended early" in require_sound(report_html(report, pictures=False)).text
     assert "ended early" in report._repr_html_()

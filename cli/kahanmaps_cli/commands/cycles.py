@@ -65,39 +65,40 @@ def command(system: str | None, **options: Any) -> int:
             for eps in values if file.map.has_eps else [1]:
                 if not search.is_over:
                     runs.append(lib.cycle_census(file.map, eps, prime, **limits, seed=options["seed"], progress=search))
-        words = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
-        line = ", ".join(f"{word} modulo {run.prime}" for word, run in zip(words, runs, strict=True))
-        return Cell(line, lambda: _record(file, options, runs), lambda: _print(file, runs))
+        results = ("stopped" if run.stopped and not run.longest else f"longest cycle {run.longest}" for run in runs)
+        line = ", ".join(f"{text} modulo {run.prime}" for text, run in zip(results, runs, strict=True))
+
+        def print_text() -> None:
+            what = "the Kahan map" if file.is_quadratic else file.map.kind
+            share = lib.eps_share(file.map)
+            print_stdout(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
+            for census in runs:
+                at = f", eps = {census.eps}" if file.map.has_eps else ""
+                print_stdout(f"\n# p = {census.prime}{at}")
+                print_stdout(str(census))
+
+        def record() -> dict[str, Any]:
+            return record_of(
+                "cycles",
+                file,
+                "exact modulo primes",
+                **opt.given(options, "seed", "samples", steps_asked="steps"),
+                primes=list(dict.fromkeys(options["primes"])),
+                runs=[
+                    {
+                        **lib.attributes(
+                            census, "prime", "complete", "stopped", "looked_at", "indeterminate", "open", "steps"
+                        ),
+                        **lib.attributes(census, "pre_indeterminate", "preperiodic", "periodic", "cycles", "longest"),
+                        "eps": str(census.eps),
+                        "time_step": lib.eps_record(census.eps, file.map)["time_step"],
+                        "points": str(census.points),
+                        "lengths": [[length, n] for length, n in census.lengths.items()],
+                    }
+                    for census in runs
+                ],
+            )
+
+        return Cell(line, record, print_text)
 
     return table(system, options, cell)
-
-
-def _print(file: lib.SystemFile, runs: list[lib.Census]) -> None:
-    what = "the Kahan map" if file.is_quadratic else file.map.kind
-    share = lib.eps_share(file.map)
-    print_stdout(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
-    for census in runs:
-        at = f", eps = {census.eps}" if file.map.has_eps else ""
-        print_stdout(f"\n# p = {census.prime}{at}")
-        print_stdout(str(census))
-
-
-def _record(file: lib.SystemFile, options: dict[str, Any], runs: list[lib.Census]) -> dict[str, Any]:
-    return record_of(
-        "cycles",
-        file,
-        "exact modulo primes",
-        **opt.given(options, "seed", "samples", steps_asked="steps"),
-        primes=list(dict.fromkeys(options["primes"])),
-        runs=[
-            {
-                **lib.attributes(census, "prime", "complete", "stopped", "looked_at", "indeterminate", "open", "steps"),
-                **lib.attributes(census, "pre_indeterminate", "preperiodic", "periodic", "cycles", "longest"),
-                "eps": str(census.eps),
-                "time_step": lib.eps_record(census.eps, file.map)["time_step"],
-                "points": str(census.points),
-                "lengths": [[length, n] for length, n in census.lengths.items()],
-            }
-            for census in runs
-        ],
-    )

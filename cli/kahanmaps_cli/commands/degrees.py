@@ -81,7 +81,27 @@ def command(system: str | None, **options: Any) -> int:
         undecided = ""
         if not is_done(growth, options["terms"]):
             undecided = f"undecided: {growth.unconfirmed}" if growth.unconfirmed else f"stopped early: {growth.message}"
-        return Cell(line, lambda: _record(file, options, growth, search), lambda: _print(file, growth), undecided)
+
+        def print_text() -> None:
+            eps, lines = growth.eps, f"{len(growth.primes)} random lines modulo primes of 61 bits"
+            at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_suffix(eps, file.map)
+            how = f"{lines}: measured, not proved" if growth.primes else "powers of the exponent matrix: exact"
+            print_stdout(f"# {file.name}{at}, {how}")
+            print_stdout(growth.text)
+
+        def record() -> dict[str, Any]:
+            time_step = lib.eps_record(growth.eps, file.map)["time_step"]
+            return record_of(
+                "degrees",
+                file,
+                "modulo the primes of the lines" if growth.primes else "exact",
+                time_step="generic" if time_step == "every" else time_step,
+                **search.work,
+                **opt.given(options, "max_degree", terms_asked="terms"),
+                **growth.to_json(),
+            )
+
+        return Cell(line, record, print_text, undecided)
 
     return table(system, options, cell)
 
@@ -99,26 +119,3 @@ def is_done(growth: lib.DegreeGrowth, terms: int | None) -> bool:
     if growth.ended in ("terms", "constant", "singular"):
         return True
     return terms is None and (growth.proof is not None or growth.recurrence is not None)
-
-
-def _print(file: lib.SystemFile, growth: lib.DegreeGrowth) -> None:
-    eps, lines = growth.eps, f"{len(growth.primes)} random lines modulo primes of 61 bits"
-    at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_told(eps, file.map)
-    how = f"{lines}: measured, not proved" if growth.primes else "powers of the exponent matrix: exact"
-    print_stdout(f"# {file.name}{at}, {how}")
-    print_stdout(growth.text)
-
-
-def _record(
-    file: lib.SystemFile, options: dict[str, Any], growth: lib.DegreeGrowth, search: SearchProgress
-) -> dict[str, Any]:
-    time_step = lib.eps_record(growth.eps, file.map)["time_step"]
-    return record_of(
-        "degrees",
-        file,
-        "modulo the primes of the lines" if growth.primes else "exact",
-        time_step="generic" if time_step == "every" else time_step,
-        **search.work,
-        **opt.given(options, "max_degree", terms_asked="terms"),
-        **growth.to_json(),
-    )

@@ -172,7 +172,7 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
 
 def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results: dict[str, Any]) -> None:
     """Print tab-separated lines, aligned on a terminal."""
-    print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
+    print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, float arithmetic{', backward' if backward else ''}")
     rows = [("orbits", str(results["orbits"])), ("steps", str(results["steps_taken"])), ("kernel", kernel)]
     rows += [(status, str(number)) for status, number in results["counts"].items()]
     near = results["near_singular"]

@@ -84,9 +84,23 @@ def command(system: str | None, **options: Any) -> int:
         undecided = f"undecided: {survey.text}" if survey.kind is lib.Growth.UNDECIDED else ""
         if not survey.is_whole:
             undecided = "stopped early: work limit reached before all orbits were finished; raise --effort"
-        return Cell(
-            survey.text, lambda: _record(file, options, survey, search), lambda: _print(file, survey), undecided
-        )
+
+        def print_text() -> None:
+            values = dict.fromkeys(orbit.eps for orbit in survey.orbits)
+            each = ", ".join(lib.eps_suffix(value, file.map).removeprefix(", eps = ") for value in values)
+            eps = f", eps = {each}" if file.map.has_eps else ""
+            print_stdout(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
+            print_stdout(str(survey))
+
+        def record() -> dict[str, Any]:
+            values = dict.fromkeys(orbit.eps for orbit in survey.orbits)
+            steps = [str(step) for value in values if (step := lib.time_step(value, file.map)) is not None]
+            requested = {**opt.given(options, "seed", "steps", "max_digits"), **search.work}
+            return record_of(
+                "heights", file, "exact", eps=lib.plain(list(values)), time_step=steps, **requested, **survey.to_json()
+            )
+
+        return Cell(survey.text, record, print_text, undecided)
 
     return table(system, options, cell)
 
@@ -107,20 +121,3 @@ def surveyed(file: lib.SystemFile, eps: Any, options: dict[str, Any], progress: 
         **opt.given(options, "steps", "max_digits", "effort", "seed"),
         progress=progress,
     )
-
-
-def _print(file: lib.SystemFile, found: lib.HeightSurvey) -> None:
-    values = dict.fromkeys(orbit.eps for orbit in found.orbits)
-    each = ", ".join(lib.eps_told(value, file.map).removeprefix(", eps = ") for value in values)
-    eps = f", eps = {each}" if file.map.has_eps else ""
-    print_stdout(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
-    print_stdout(str(found))
-
-
-def _record(
-    file: lib.SystemFile, options: dict[str, Any], found: lib.HeightSurvey, search: SearchProgress
-) -> dict[str, Any]:
-    values = dict.fromkeys(orbit.eps for orbit in found.orbits)
-    steps = [str(step) for value in values if (step := lib.time_step(value, file.map)) is not None]
-    asked = {**opt.given(options, "seed", "steps", "max_digits"), **search.work}
-    return record_of("heights", file, "exact", eps=lib.plain(list(values)), time_step=steps, **asked, **found.to_json())

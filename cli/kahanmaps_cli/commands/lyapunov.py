@@ -80,26 +80,22 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         )
         print_json(record)
     else:
-        _print(file, eps, result)
+        print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, double precision")
+        print_stdout(f"orbits\t{result.orbits - result.ended} of {result.orbits}")
+        if result.stopped and not result.steps:  # means over no steps would be nan
+            print_stdout(f"steps\tnone counted: stopped in the transient, after {result.transient} of its steps")
+        else:
+            print_stdout(f"steps\t{result.steps} after {result.transient}")
+            columns = {"per unit of time": result.mean} if file.map.time_steps else {}
+            columns |= {"per step": result.per_step, "spread": result.spread, "change from half": result.change}
+            rows = [
+                [str(k), *(f"{number:.6g}" for number in numbers)]
+                for k, numbers in enumerate(zip(*columns.values(), strict=True), 1)
+            ]
+            print_table([["exponent" if on_terminal() else "# exponent", *columns], *rows])
+            volume = result.log_volume.mean() if len(result.log_volume) else float("nan")
+            print_stdout(f"sum\t{result.mean.sum():.6g}")
+            print_stdout(f"log |det dPhi|\t{volume:.6g}\tresidual {result.residual:.2g}")
     if result.ended and not quiet:
         print_stderr(f"{result.ended} of {result.orbits} orbits overflowed or reached a pole")
     return 3 if result.ended or search.is_over else 0
-
-
-def _print(file: lib.SystemFile, eps: Any, result: lib.Lyapunov) -> None:
-    print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, double precision")
-    print_stdout(f"orbits\t{result.orbits - result.ended} of {result.orbits}")
-    if result.stopped and not result.steps:  # the means of nothing would be nan
-        print_stdout(f"steps\tnone counted: stopped in the transient, after {result.transient} of its steps")
-        return
-    print_stdout(f"steps\t{result.steps} after {result.transient}")
-    columns = {"per unit of time": result.mean} if file.map.time_steps else {}
-    columns |= {"per step": result.per_step, "spread": result.spread, "change from half": result.change}
-    rows = [
-        [str(k), *(f"{number:.6g}" for number in numbers)]
-        for k, numbers in enumerate(zip(*columns.values(), strict=True), 1)
-    ]
-    print_table([["exponent" if on_terminal() else "# exponent", *columns], *rows])
-    volume = result.log_volume.mean() if len(result.log_volume) else float("nan")
-    print_stdout(f"sum\t{result.mean.sum():.6g}")
-    print_stdout(f"log |det dPhi|\t{volume:.6g}\tresidual {result.residual:.2g}")

@@ -98,8 +98,22 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     eps = opt.eps_of(file, options)
     map_ = file.map
     if isinstance(start, lib.AlgebraicPoint):
-        map_, start = lib.over_number_field(map_, start.root), _numbers(start, options["arithmetic"])
-    with interruptible(_stop), Progress(quiet) as progress:
+        arithmetic = options["arithmetic"]
+        map_ = lib.over_number_field(map_, start.root)
+        if arithmetic == ("ball", 0):
+            raise click.UsageError(
+                "--arithmetic ball:auto needs a rational initial point: for an algebraic one use exact, mod:P or "
+                "ball:BITS"
+            )
+        if arithmetic.kind == "float":
+            start = start.real_approximation()
+        else:
+            start = start.over(start.root.number_field if arithmetic.kind == "exact" else arithmetic.field)
+
+    def stop() -> None:  # while the method is being chosen there are no points to keep
+        raise KeyboardInterrupt
+
+    with interruptible(stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"
         functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
         trajectory = lib.orbit(
@@ -148,17 +162,6 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     return 3 if is_unread else _STATUS.get(end.status, 3)
 
 
-def _numbers(start: lib.AlgebraicPoint, arithmetic: lib.Arithmetic) -> Any:
-    """Convert the coordinates to the arithmetic of the orbit."""
-    if arithmetic.kind == "float":
-        return start.real_approximation()
-    if arithmetic == ("ball", 0):
-        raise click.UsageError(
-            "--arithmetic ball:auto needs a rational initial point: for an algebraic one use exact, mod:P or ball:BITS"
-        )
-    return start.over(start.root.number_field if arithmetic.kind == "exact" else arithmetic.field)
-
-
 def _require_sense(options: dict[str, Any]) -> None:
     """Raise UsageError for options that contradict each other."""
     steps, at = options["steps"], options["at"]
@@ -196,8 +199,3 @@ def _form(options: dict[str, Any], output: str | None) -> str:
         if options["at"] is not None or options["integrals"]:
             raise click.UsageError("npy holds the points of --steps N --every K: for --at or --integral use npz")
     return form
-
-
-def _stop() -> None:
-    """Stop at once: while the method is being chosen there are no points to keep."""
-    raise KeyboardInterrupt

@@ -83,8 +83,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
             print_stderr(normal_form.text)
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _MAX_PRIME:
             print_stderr(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
-    found = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
-    message, status = found.text.splitlines()[0], _STATUS.get(found.status, 3)
+    result = lib.period_of(normal_form, eps, options["start"], prime if kind == "mod" else None)
+    message, status = result.text.splitlines()[0], _STATUS.get(result.status, 3)
     if as_json:
         # Numbers are text: periods exceed what readers of JSON hold exactly.
         planes = [
@@ -95,7 +95,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
                 "kind_text": str(plane.kind),
                 "field_size": str(plane.q) if plane.q else None,
             }
-            for plane in found.planes
+            for plane in result.planes
         ]
         record = record_of(
             "period",
@@ -105,17 +105,17 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
             structure=normal_form.text,
             **lib.eps_record(eps, file.map),
             start=lib.plain(options["start"]),
-            **lib.attributes(found, "status", "meets_pole"),
-            period=None if found.period is None else str(found.period),
+            **lib.attributes(result, "status", "meets_pole"),
+            period=None if result.period is None else str(result.period),
             planes=planes,
             message=message,
         )
         print_json(record)
         if status and not quiet:
-            print_stderr(f"{found.status}: {message}")
+            print_stderr(f"{result.status}: {message}")
     else:
-        print_stdout(f"# {file.name}{lib.eps_told(eps, file.map)}, {options['arithmetic']} arithmetic")
-        print_stdout(str(found))
+        print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}, {options['arithmetic']} arithmetic")
+        print_stdout(str(result))
     return status
 
 

@@ -85,10 +85,10 @@ def command(system: str | None, **options: Any) -> int:
             from kahanmaps_cli.runs.search import symbols_and_eps
 
             symbols, eps = symbols_and_eps(options)
-            asked = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
+            arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
             results: list[lib.Analysis] = []
             try:
-                lib.analyze(opt.load_system(system, options), **asked, progress=search, on_result=results.append)
+                lib.analyze(opt.load_system(system, options), **arguments, progress=search, on_result=results.append)
                 search("the page")
                 html = lib.report_html(results[-1], explore=options["explore"], **how)
             except lib.TimeLimit:

@@ -64,35 +64,29 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")
-    found, search = run_scan(system, quiet, options)
+    result, search = run_scan(system, quiet, options)
+    with_member = [component for component in result.components if component.values is not None]
     if options["folder"] is not None:
-        _write(found, options["folder"], quiet)
+        folder, name = Path(options["folder"]), file_name(result.file.name)
+        paths = [folder / f"{name}-{k}.toml" for k in range(1, len(with_member) + 1)]
+        folder.mkdir(parents=True, exist_ok=True)
+        earlier = {path for path in folder.iterdir() if re.fullmatch(rf"{re.escape(name)}-\d+\.toml", path.name)}
+        for path in earlier.union(paths):
+            will_write(str(path))
+        for path in earlier.difference(paths):
+            path.unlink()
+        for path, component in zip(paths, with_member, strict=True):
+            lib.write_atomically(str(path), result.member(component).to_toml().encode())
+        if not quiet:
+            print_stderr(f"{options['folder']}: {len(with_member)} system files")
     if options["as_toml"]:
-        for one in found.components:
-            if one.values is not None:
-                click.echo(f"# {one.text}\n{found.member(one).to_toml()}")
+        for component in with_member:
+            click.echo(f"# {component.text}\n{result.member(component).to_toml()}")
     elif as_json:
-        more = {**lib.eps_record(found.eps, found.file.map), **search.work, **found.to_json()}
-        print_json(record_of("scan", found.file, "modulo primes", **more))
+        entries = {**lib.eps_record(result.eps, result.file.map), **search.work, **result.to_json()}
+        print_json(record_of("scan", result.file, "modulo primes", **entries))
     else:
-        at = "" if "eps" in found.over else lib.eps_told(found.eps, found.file.map)
-        print_stdout(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
-        print_stdout(found.text)
-    return ending(found, search)
-
-
-def _write(found: lib.Scan, folder: str, quiet: bool) -> None:
-    """A system file for every component that has a rational member, in the place of those of an earlier scan."""
-    known = [one for one in found.components if one.values is not None]
-    name = file_name(found.file.name)
-    paths = [Path(folder) / f"{name}-{k}.toml" for k in range(1, len(known) + 1)]
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    earlier = {path for path in Path(folder).iterdir() if re.fullmatch(rf"{re.escape(name)}-\d+\.toml", path.name)}
-    for path in earlier.union(paths):
-        will_write(str(path))
-    for path in earlier.difference(paths):
-        path.unlink()
-    for path, one in zip(paths, known, strict=True):
-        lib.write_atomically(str(path), found.member(one).to_toml().encode())
-    if not quiet:
-        print_stderr(f"{folder}: {len(known)} system files")
+        at = "" if "eps" in result.over else lib.eps_suffix(result.eps, result.file.map)
+        print_stdout(f"# scan: {result.file.name} over {', '.join(result.over)}{at}")
+        print_stdout(result.text)
+    return ending(result, search)

@@ -180,7 +180,7 @@ def _print_terminal(report: lib.Report, verbose: bool) -> None:
             print_stdout(_LEGEND[method])
     # Further evidence, in addition to the one that gave the verdict.
     also = [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
-    bounds = [int(str(one.data["error_bound"])[3:]) for one in also if "error_bound" in one.data]
+    bounds = [int(str(e.data["error_bound"])[3:]) for e in also if "error_bound" in e.data]
     if bounds:
         sentence = f"also: {len(bounds)} claims held at random points over GF(p)"
         print_stdout(f"{sentence}, each false with probability below 2^-{min(bounds)}")

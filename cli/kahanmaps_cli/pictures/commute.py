@@ -70,13 +70,13 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     else:
         captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
         pairs = [lib.pair_of_systems(file, second, eps, options["eps2"])]
-    found = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
-    figure = lib.plot_squares(found, options["style"], chosen, captions)
+    squares_of_pairs = [lib.squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
+    figure = lib.plot_squares(squares_of_pairs, options["style"], chosen, captions)
     messages = []
-    for square in found:
+    for square in squares_of_pairs:
         names = captions[0] if captions else " and ".join(square.pair.names)
         messages.append(f"{names}: {square.verdict}")
         messages += [f"  {square.pair.note}"] * bool(square.pair.note)
         messages += [f"  points are missing: {square.stopped}"] * bool(square.stopped)
-    is_partial = any(square.stopped for square in found)
+    is_partial = any(square.stopped for square in squares_of_pairs)
     return Drawing(figure, file if second is None else None, messages, 3 if is_partial else 0)

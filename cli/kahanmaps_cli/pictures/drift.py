@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -97,26 +96,22 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         linear_bins=options["scale"] == "semilog",
         progress=progress,
     )
-    early = not all(end.is_whole for end in survey.ends.values())
-    figure = lib.plot_drift(survey, options["style"], scale=options["scale"])
-    return Drawing(figure, file, [*messages, *_messages(survey)], 3 if early else 0)
-
-
-def _messages(survey: lib.DriftSurvey) -> Iterator[str]:
-
     point = ",".join(lib.format_number(entry) for entry in survey.start)
     point = point if len(point) <= _MAX_START else point[:_MAX_START] + "..."
-    yield f"start {point}{lib.eps_told(survey.eps)}"
+    messages.append(f"start {point}{lib.eps_suffix(survey.eps)}")
     for name, is_relative in survey.relative.items():
         if not is_relative:
-            yield f"{name}: absolute errors, for it is 0 at the start"
+            messages.append(f"{name}: absolute errors, for it is 0 at the start")
     for curve in survey.curves:
         if curve.undefined:
             missing = lib.counted(curve.undefined, "step")
-            yield f"{curve.function} along {lib.METHODS[curve.method]}: no value at {missing}, left out"
+            messages.append(f"{curve.function} along {lib.METHODS[curve.method]}: no value at {missing}, left out")
         if (curve.errors > (limit := lib.clipped_from(survey, curve.function))).any():
             what = f"{curve.function} along {lib.METHODS[curve.method]}"
-            yield f"{what}: errors above {limit:.0e} are an arrow at the top"
+            messages.append(f"{what}: errors above {limit:.0e} are an arrow at the top")
     for method, end in survey.ends.items():
         if not end.is_whole:
-            yield f"{lib.METHODS[method]} ended early: {end.message}"
+            messages.append(f"{lib.METHODS[method]} ended early: {end.message}")
+    early = not all(end.is_whole for end in survey.ends.values())
+    figure = lib.plot_drift(survey, options["style"], scale=options["scale"])
+    return Drawing(figure, file, messages, 3 if early else 0)

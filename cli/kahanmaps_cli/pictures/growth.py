@@ -59,10 +59,10 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     """
     growths: dict[str, lib.DegreeGrowth] = {}
 
-    def add(name: str, found: lib.DegreeGrowth) -> None:
+    def add(name: str, growth: lib.DegreeGrowth) -> None:
         """Add a result; the second one of the same name is called name (2)."""
         names = chain([name], (f"{name} ({k})" for k in count(2)))
-        growths[next(free for free in names if free not in growths)] = found
+        growths[next(free for free in names if free not in growths)] = growth
 
     for path in options["records"]:
         add(*lib.degrees_of_record(read_record(path), path))
@@ -84,10 +84,10 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         def on_progress(sentence: str, name: str = file.label) -> None:
             progress(f"{name}: {sentence}")
 
-        found = measure(file, eps, options, on_progress)
-        add(file.label, found)
-        if not is_done(found, None):
-            early.append(f"{file.label}: stopped early: {found.message}")
+        measured = measure(file, eps, options, on_progress)
+        add(file.label, measured)
+        if not is_done(measured, None):
+            early.append(f"{file.label}: stopped early: {measured.message}")
     figure = lib.plot_degrees(growths, options["style"], scale=options["scale"])
     return Drawing(figure, files[0] if len(files) == 1 else None, early, 3 if early or progress.is_over else 0)
 
@@ -138,21 +138,21 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
             raise click.UsageError("give a SYSTEM or --from FILE, not both")
         record = read_record(options["record"])
         curves = lib.curves_of_record(record, options["record"])
-        whole, digits = record.get("whole") is not False, record.get("max_digits", digits)
+        is_complete, digits = record.get("whole") is not False, record.get("max_digits", digits)
     else:
         file = opt.load_system(options["system"], options)
         eps = opt.the_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
-        curves, whole = lib.height_curves(survey), survey.is_whole
+        curves, is_complete = lib.height_curves(survey), survey.is_whole
     figure = lib.plot_heights(curves, options["style"], scale=options["scale"])
     messages = []
     if short := sum(curve.status == "budget" for curve in curves):
         messages.append(f"{short} of {len(curves)} orbits ended where a number exceeded --max-digits {digits}")
     if early := sum(curve.status in _EARLY for curve in curves):
         messages.append(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
-    if not whole and not progress.is_over:
+    if not is_complete and not progress.is_over:
         messages.append("stopped early: work limit reached before all orbits were finished; raise --effort")
-    return Drawing(figure, file, messages, 3 if early or not whole or progress.is_over else 0)
+    return Drawing(figure, file, messages, 3 if early or not is_complete or progress.is_over else 0)
 
 
 def read_record(path: str) -> Any:

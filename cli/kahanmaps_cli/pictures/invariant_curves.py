@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -61,31 +60,26 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     file = load_system(options["system"], options)
     eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
     original = two_variables("--original", options["original"], file.variables)
-    found = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
+    curves = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
     texts = [lib.format_point(start) for start in options["starts"]]
     labels = [f"start {text if len(text) <= 30 else text[:30] + '...'}" for text in texts]
     figure = lib.plot_invariant_curves(
-        found, options["style"], options["projective"], options["flow"], original, labels
+        curves, options["style"], options["projective"], options["flow"], original, labels
     )
-    is_whole = all(pole is None for pole in found.poles)
-    return Drawing(figure, file, list(_messages(found, options["projective"])), 0 if is_whole else 3)
-
-
-def _messages(found: lib.InvariantCurves, projective: bool) -> Iterator[str]:
-    yield f"{found.normal_form}; {lib.eps_phrase(lib.eps_record(found.eps))}"
-    for k, pole in enumerate(found.poles, 1):
+    messages = [f"{curves.normal_form}; {lib.eps_phrase(lib.eps_record(curves.eps))}"]
+    for k, pole in enumerate(curves.poles, 1):
         if pole is not None:
-            which = f"start {k}: " if len(found.poles) > 1 else ""
-            yield f"{which}the orbit ends before step {pole}: a pole, or closer to one than 2^-96"
-    for plane in found.planes:
+            which = f"start {k}: " if len(curves.poles) > 1 else ""
+            messages.append(f"{which}the orbit ends before step {pole}: a pole, or closer to one than 2^-96")
+    for plane in curves.planes:
         if plane.shape == "0":
-            yield f"lambda = {plane.root_text}: h = 0, nothing moves in this plane"
-    if projective:
-        return
+            messages.append(f"lambda = {plane.root_text}: h = 0, nothing moves in this plane")
     outside = [
         f"{view.outside} ({'' if column == 'uv' else column + ', '}lambda = {plane.root_text})"
-        for _, plane, column in lib.panels_of(found)
-        if (view := lib.view_of(plane, column)).outside
+        for _, plane, column in lib.panels_of(curves)
+        if not options["projective"] and (view := lib.view_of(plane, column)).outside
     ]
     if outside:
-        yield f"dots outside the windows: {', '.join(outside)}; --projective shows all of them"
+        messages.append(f"dots outside the windows: {', '.join(outside)}; --projective shows all of them")
+    is_complete = all(pole is None for pole in curves.poles)
+    return Drawing(figure, file, messages, 0 if is_complete else 3)

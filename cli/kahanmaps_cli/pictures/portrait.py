@@ -102,14 +102,14 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         color = lib.requested_function(file, eps, color)
     levels = None if options["levels"] is None else lib.requested_axis(file, eps, options["levels"])
     axes = _requested_axes(file, eps, options)
-    found = lib.walked(
+    orbits = lib.walked(
         lib.ensemble_of_file(file, eps, starts, steps, backward=options["backward"]),
         steps,
         lambda step: progress(f"step {step} of {steps}"),
     )
     if axes is None:
         count = 3 if options["space"] else 2
-        chosen = [file.variables[k] for k in lib.fullest_axes(found.points.reshape(-1, file.dim), count)]
+        chosen = [file.variables[k] for k in lib.fullest_axes(orbits.points.reshape(-1, file.dim), count)]
         axes = tuple(lib.requested_axis(file, eps, name) for name in chosen)
         if file.dim > count:
             notes.append(f"axes {', '.join(chosen)}: the projection with the largest spread (--axes chooses)")
@@ -119,7 +119,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         euler = lib.euler_orbits(field or file.system, -eps if options["backward"] else eps, starts, steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
     window = window_from(options, len(axes))
-    shown = lib.portrait_of(found, axes, color=color, window=window, euler=euler, join=options["lines"])
+    shown = lib.portrait_of(orbits, axes, color=color, window=window, euler=euler, join=options["lines"])
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
     if field is None and options["flow"]:
         raise lib.InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
@@ -128,7 +128,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         if options["levels"] or options["euler"]:  # arrows would be invisible among gray lines
             flow = replace(flow, places=flow.places[:0], arrows=flow.arrows[:0])
         if options["flow"]:
-            flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, found, options["backward"]))
+            flow = replace(flow, solutions=lib.projected_solutions(field, eps, axes, orbits, options["backward"]))
         shown = replace(shown, flow=flow)
     if levels is not None:
         if len(plane) != 2 or len(axes) != 2:
@@ -142,21 +142,21 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
     figure = lib.plot_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
 
-    orbits = counted(found.orbits, "orbit")
+    orbit_count = counted(orbits.orbits, "orbit")
     origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from automatic initial points"
     backward = ", backward" if options["backward"] else ""
-    at_eps = "" if eps is None else lib.eps_told(eps, file.map)
-    messages = [f"{file.label}: {orbits}{origin}, {counted(len(found.points) - 1, 'step')}{backward}{at_eps}"]
-    messages += [f"{count} of {orbits} ended early: {reason}" for reason, count in found.ended.items()]
-    points = found.points.shape[0] * found.points.shape[1]
-    if chords := sum(one is None for one in shown.joined):
+    at_eps = "" if eps is None else lib.eps_suffix(eps, file.map)
+    messages = [f"{file.label}: {orbit_count}{origin}, {counted(len(orbits.points) - 1, 'step')}{backward}{at_eps}"]
+    messages += [f"{count} of {orbit_count} ended early: {reason}" for reason, count in orbits.ended.items()]
+    points = orbits.points.shape[0] * orbits.points.shape[1]
+    if chords := sum(curve is None for curve in shown.joined):
         what = f"{chords} of {counted(len(shown.joined), 'orbit')}"
         notes.append(f"{what} do not fill a curve: their lines join consecutive steps")
     if shown.left_out:
         notes.append(f"{shown.left_out} of {points} points lie outside the window (--window)")
     if shown.undefined:
         notes.append(f"{shown.undefined} of {points} points are left out: an axis or the color has a pole there")
-    return Drawing(figure, file, [*messages, *notes], 3 if found.ended else 0)
+    return Drawing(figure, file, [*messages, *notes], 3 if orbits.ended else 0)
 
 
 _STARTS = ("start", "starts", "count")

@@ -46,8 +46,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     names = names_of(options)
     if len(names) != 2:
         raise click.UsageError(f"found --over {','.join(names)}, expected two parameters")
-    found, search = run_scan(options["system"], options["quiet"], options)
-    status = ending(found, search)
-    if found.ended != "complete" and not (found.components or any(one.prime == modulo for one in found.sweeps)):
+    result, search = run_scan(options["system"], options["quiet"], options)
+    status = ending(result, search)
+    if result.ended != "complete" and not (result.components or any(sweep.prime == modulo for sweep in result.sweeps)):
         return Drawing(None, messages=["no picture is written: the scan ended before it found anything"], status=status)
-    return Drawing(lib.plot_scan(found, options["style"], window=window, modulo=modulo), found.file, status=status)
+    return Drawing(lib.plot_scan(result, options["style"], window=window, modulo=modulo), result.file, status=status)

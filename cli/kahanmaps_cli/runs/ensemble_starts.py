@@ -116,8 +116,8 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArr
         starts: lib.FloatArray = np.ascontiguousarray(rows, dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
     if len(bad):
-        found = starts[bad[0]][~np.isfinite(starts[bad[0]])][0]
-        raise InputError(f"{where}: row {bad[0]}: found {found}, expected finite numbers")
+        first_bad = starts[bad[0]][~np.isfinite(starts[bad[0]])][0]
+        raise InputError(f"{where}: row {bad[0]}: found {first_bad}, expected finite numbers")
     return starts
 
 

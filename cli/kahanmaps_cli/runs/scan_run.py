@@ -77,7 +77,7 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
         interrupted.set()
 
     with SearchProgress({**options, "quiet": quiet}) as search, interruptible(interrupt):
-        found = lib.scan(
+        result = lib.scan(
             file,
             names,
             eps=opt.the_eps(options["eps"], options["time_step"], required=False),
@@ -86,19 +86,19 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
             analysis=options.get("analysis"),
             progress=on_progress,
         )
-    return found, search
+    return result, search
 
 
-def ending(found: lib.Scan, search: SearchProgress) -> int:
+def ending(result: lib.Scan, search: SearchProgress) -> int:
     """Return the exit status, and print why the scan stopped early."""
     if search.is_over:
         return 3
-    if found.ended == "complete":
+    if result.ended == "complete":
         return 0
-    is_interrupted = found.ended == "interrupted"
+    is_interrupted = result.ended == "interrupted"
     if not search.quiet:
         why = "interrupted" if is_interrupted else "work limit reached; raise --effort"
-        print_stderr(f"stopped early: {why}; not done: {', '.join(found.omitted)}")
+        print_stderr(f"stopped early: {why}; not done: {', '.join(result.omitted)}")
     return INTERRUPTED if is_interrupted else 3
 
 

@@ -50,36 +50,36 @@ def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
     return {"symbols": symbols, "eps": eps, **opt.given(options, *names, "effort", "seed")}
 
 
-def scope(found: Any) -> str:
+def scope(result: Any) -> str:
     """Return text behind the name of the map: for which eps and symbols the formulas hold."""
-    if getattr(found, "flow", False):
-        return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
-    step = lib.eps_told(found.eps, found.file.map)
-    return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
+    if getattr(result, "flow", False):
+        return ", the flow x' = f(x)" + (f", every {', '.join(result.symbols)}" if result.symbols else "")
+    step = lib.eps_suffix(result.eps, result.file.map)
+    return f"{step}, every {', '.join(result.symbols)}" if result.symbols else step
 
 
-def heading(name: str, found: Any, search: SearchProgress) -> dict[str, Any]:
+def heading(name: str, result: Any, search: SearchProgress) -> dict[str, Any]:
     """Return the data needed to repeat a search, and its work, for JSON."""
     return {
         **envelope(name),
-        "system": found.file.name,
-        "parameters": {key: str(value) for key, value in found.file.parameters.items()},
-        "symbols": list(found.symbols),
-        **lib.eps_record(found.eps, found.file.map),
+        "system": result.file.name,
+        "parameters": {key: str(value) for key, value in result.file.parameters.items()},
+        "symbols": list(result.symbols),
+        **lib.eps_record(result.eps, result.file.map),
         "arithmetic": "exact formulas, from residues modulo primes",
-        "seed": found.seed,
+        "seed": result.seed,
         **search.work,
     }
 
 
-def record(name: str, found: Any, search: SearchProgress, **more: Any) -> dict[str, Any]:
+def record(name: str, result: Any, search: SearchProgress, **more: Any) -> dict[str, Any]:
     """Return the JSON record of a search."""
-    return {**heading(name, found, search), **found.to_json(), **more, "document": dict(found.file.document)}
+    return {**heading(name, result, search), **result.to_json(), **more, "document": dict(result.file.document)}
 
 
 def print_search(
     name: str,
-    found: Any,
+    result: Any,
     search: SearchProgress,
     options: dict[str, Any],
     formulas: Iterable[tuple[str, Any, str]],
@@ -91,32 +91,34 @@ def print_search(
     line after them.
     """
     if options["as_json"]:
-        print_json(record(name, found, search))
+        print_json(record(name, result, search))
     elif options["as_toml"]:
-        click.echo(found.toml_section(), nl=False)
+        click.echo(result.toml_section(), nl=False)
     elif options["as_latex"]:
-        for label, one, _ in formulas:
-            click.echo(f"{label} = {one.to_json()['latex']}")
+        for label, statement, _ in formulas:
+            click.echo(f"{label} = {statement.to_json()['latex']}")
     else:
-        print_stdout(f"{name}: {found.file.name}{scope(found)}")
-        for label, one, origin in formulas:
-            print_stdout(f"{label}\t{one.verdict}\t{formula(one.text)}\n\t{origin}{one.evidence.summary}")
+        print_stdout(f"{name}: {result.file.name}{scope(result)}")
+        for label, statement, origin in formulas:
+            print_stdout(
+                f"{label}\t{statement.verdict}\t{formula(statement.text)}\n\t{origin}{statement.evidence.summary}"
+            )
         if count:
             print_stdout(count)
-        for text in filter(None, (found.note, found.reason)):
+        for text in filter(None, (result.note, result.reason)):
             print_stdout(f"note\t{text}")
 
 
 def print_list(
-    name: str, heading: str, found: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
+    name: str, heading: str, result: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
     """Print the result of a search that is complete or says what is undecided; return the exit status."""
     if as_json:
-        print_json({"command": name, **context, **found.to_json()})
+        print_json({"command": name, **context, **result.to_json()})
     else:
         print_stdout(heading)
-        print_stdout(str(found))
+        print_stdout(str(result))
     if not search.quiet:
-        for sentence in found.undecided:
+        for sentence in result.undecided:
             print_stderr(f"undecided: {sentence}")
-    return 0 if found.complete and not search.is_over else 3
+    return 0 if result.complete and not search.is_over else 3

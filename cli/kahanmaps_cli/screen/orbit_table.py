@@ -80,7 +80,7 @@ def _elided(text: str, width: int) -> str:
     middle, plus_minus, radius = text.partition(" +/- ")
     if plus_minus:
         return f"{middle[: max(3, width - len(radius) - 6)]}.. +/-{radius}"
-    shown = next((one for one in _approximated(text) if len(one) <= width), None)
+    shown = next((candidate for candidate in _approximated(text) if len(candidate) <= width), None)
     if shown is not None:
         return shown
     keep = max(2, (width - 3) // 2)

@@ -91,15 +91,15 @@ class OutputFolder(click.Path):
             return path
         # Check that files can be written there, by creating the folder, before anything is computed.
         folder = Path(os.fsdecode(path))
-        missing = [one for one in (folder, *folder.parents) if not one.exists()]
+        missing = [directory for directory in (folder, *folder.parents) if not directory.exists()]
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not os.access(folder, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
         finally:
-            for one in missing:
-                if one.is_dir():
-                    one.rmdir()
+            for directory in missing:
+                if directory.is_dir():
+                    directory.rmdir()
         return path
 
 

@@ -1,21 +1,21 @@
-"""Results written out: JSON lines with all that is known, CSV and Parquet with one column for every entry.
+"""Export of results: JSON lines with all data, CSV and Parquet tables with one column for every entry.
 
-JSON lines lose nothing. A table has one cell for a value, so dicts become several columns (heights.max), lists JSON
-text, and None and what is absent are both empty cells. Its columns, in this order:
+JSON lines are lossless. In a table dicts become several columns (heights.max), lists become JSON text, and both None
+and absent entries become empty cells. The columns of a table, in this order:
 
     experiment number key task      always
-    document m seed parameters.a    the parts of the recipe of the system, those of a family by their own names
+    document m seed parameters.a    the entries of the spec of the system, those of a family without prefix
     eps steps                       options
     outcome verdict                 always; a missing task has no outcome
     dimension heights.max           entries of the result
     message                         always
-    seconds peak_memory host finished   unless the export is to be stable
+    seconds peak_memory host finished   unless the export is stable
 
-A name belongs to the first of these that has it: the columns that are always there, options, the recipe, the result.
-A later one is called option.seed, family.seed (system.document) or result.seed, in all rows of the export.
+If several entries have the same name, the first of these has it: the fixed columns, options, the system spec, the
+result. The others are called option.seed, family.seed (system.document) or result.seed, in all rows of the export.
 
-A stable export leaves out what depends on where, when and how the work was done, so that two exports of the same work
-are the same bytes.
+A stable export omits everything that depends on where, when and how the tasks were run, so that two exports of the same
+tasks have the same bytes.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ OF_THE_RUN = ("seconds", "peak_memory", "host", "finished")  # with stderr and v
 RESERVED = frozenset((*BEFORE, *BETWEEN, *AFTER, *OF_THE_RUN, "system", "options", "result", "stderr", "versions"))
 
 _ENCODER = json.JSONEncoder(sort_keys=True, allow_nan=False)
-_MAX_DIGITS = 2_000  # characters of a text that counts as a number
+_MAX_DIGITS = 2_000  # maximal length of text that is recognized as a number
 _ROW_GROUP = 10_000
 _CHARACTERS = 50_000_000  # of one row group: long lists would otherwise add up to gigabytes
 
 
-# Where a value stands: "option", "system" or "result", and the keys that lead to it.
+# The path of a value: "option", "system" or "result", and keys.
 Entry = tuple[str, ...]
 
 
 def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """The values in nested dicts, each with the keys that lead to it; lists are left whole.
+    """Yield the values in nested dicts, each with its path of keys; lists are values.
 
     >>> list(flatten({"a": 1, "b": {"c": [2, 3]}}))
     [(('a',), 1), (('b', 'c'), [2, 3])]
@@ -65,7 +65,7 @@ def flatten(data: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tup
 
 
 def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
-    """The options, the parts of the recipe and the entries of the result of a row."""
+    """Yield the options, the entries of the system spec and the entries of the result of a row."""
     result = row.record.result if row.record is not None else None
     for section, data in (("option", row.task.options), ("system", row.task.system), ("result", result)):
         yield from flatten(data or {}, (section,))
@@ -73,7 +73,7 @@ def entries(row: Row) -> Iterator[tuple[Entry, Any]]:
 
 @lru_cache(10_000)  # thousands of rows have the same few entries
 def names_of(entry: Entry) -> tuple[str, str]:
-    """The name of an entry where no other has it, and its name otherwise.
+    """Return the name of an entry if no other entry has it, and its longer name otherwise.
 
     >>> names_of(("system", "family", "m")), names_of(("result", "heights", "max"))
     (('m', 'family.m'), ('heights.max', 'result.heights.max'))
@@ -84,7 +84,7 @@ def names_of(entry: Entry) -> tuple[str, str]:
 
 
 def plain(value: Any) -> str:
-    """A value as text: integers and texts as they are, nothing for None, lists as JSON.
+    """Return a value as text: integers and texts unchanged, the empty text for None, lists as JSON.
 
     >>> [plain(value) for value in (None, True, 10**20, 0.1, "7/3", [1, 8])]
     ['', 'true', '100000000000000000000', '0.1', '7/3', '[1, 8]']
@@ -101,19 +101,19 @@ def plain(value: Any) -> str:
 
 
 def cell(value: Any) -> str:
-    """The text of a value in a CSV file: texts that a spreadsheet would run get an apostrophe, numbers never do."""
+    """Return a value as text for a CSV file; text that a spreadsheet would execute is escaped by an apostrophe."""
     return guarded(plain(value)) if isinstance(value, str) else plain(value)
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a finite number, or the text of an exact one: 7/3, 21.2031. True and False are."""
+    """Whether a value is a finite number, True or False, or the text of an exact number: 7/3, 21.2031."""
     if isinstance(value, str):
         return len(value) <= _MAX_DIGITS and NUMBER.fullmatch(value) is not None
     return isinstance(value, int | float) and -inf < value < inf
 
 
 def nearest(value: Any) -> float:
-    """The double nearest to an exact number, infinite where it is beyond their range.
+    """Return the double nearest to an exact number, infinite where it overflows.
 
     >>> nearest("7/3"), nearest("0.1"), nearest(-(10**400))
     (2.3333333333333335, 0.1, -inf)
@@ -126,11 +126,11 @@ def nearest(value: Any) -> float:
 
 
 def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -> None:
-    """Write one JSON object a line: a header, a result for every row, an end that counts them.
+    """Write one JSON object per line: a header, a result for every row, and an end with their number.
 
-    What is not known of a missing task is null. Dicts inside a line are sorted by their keys.
+    Unknown entries of a missing task are null. Dicts inside a line are sorted by their keys.
     """
-    from kahanmaps.maps.convention import CONVENTION  # loads FLINT: not before something is written
+    from kahanmaps.maps.convention import CONVENTION  # loads FLINT: only when results are written
 
     left_out = {*OF_THE_RUN, "stderr", "versions"} if stable else set()
     header = {"record": "header"} if stable else {"record": "header", "version": __version__}
@@ -143,8 +143,9 @@ def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -
 
 
 def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: bool = False) -> None:
-    """Write a table below a row of names. `rows` is called twice: for the columns, of which only names are kept, then
-    for the values. Open files with newline="", or "\\n" becomes what the machine likes.
+    """Write a table with a header row. `rows` is called twice: first for the names of the columns, then for the values.
+
+    Open files with newline="", since otherwise "\\n" is translated on some systems.
     """
     layout = _Layout(rows(), stable)
     stream.write(csv_line(map(cell, layout.names)))
@@ -154,12 +155,12 @@ def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: boo
 
 
 def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str], *, stable: bool = False) -> None:
-    """Write the same table as Parquet, which needs pyarrow. `rows` is called twice, and the file replaces `path` when
-    it is complete.
+    """Write the same table in the format Parquet, which needs pyarrow.
 
-    A column is int64, bool or float64 if all of its values are, and text otherwise. Integers next to floats count as
-    floats up to 2^53, so that no digit is lost. Beside a column NAME of text whose values are all exact numbers such as
-    7/3 there is NAME.number with the nearest doubles. "Same bytes" takes the same version of pyarrow too.
+    `rows` is called twice, and the complete file replaces `path`. A column is int64, bool or float64 if all of its
+    values are, and text otherwise. In a column with floats, integers up to 2^53 are converted to floats, which is
+    exact. A column NAME of text whose values are all exact numbers such as 7/3 is followed by NAME.number with the
+    nearest doubles. The bytes of a stable export also depend on the version of pyarrow.
     """
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
@@ -203,15 +204,14 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
 
 
 class _Layout:
-    """The columns of a table: their `names`; if `typed`, their `types`, and those of texts that are exact `numbers`."""
+    """The `names` of the columns of a table; if `typed`, also their `types` and the text columns of exact `numbers`."""
 
     def __init__(self, rows: Iterable[Row], stable: bool, typed: bool = False) -> None:
-        """The layout for these rows; they are read, not kept."""
         kinds: defaultdict[Entry, set[str]] = defaultdict(set)
         for row in rows:
             for entry, value in entries(row):
                 kinds[entry].add(_kind(value) if typed else "text")
-        self._called: dict[Entry, str] = {}
+        self._column_of: dict[Entry, str] = {}
         taken = set(RESERVED)
         parts: dict[str, list[str]] = {"option": [], "system": [], "result": []}
         for section, names in parts.items():
@@ -222,27 +222,29 @@ class _Layout:
                     name = f"{section}.{name}"
                 taken.add(name)
                 names.append(name)
-                self._called[entry] = name
+                self._column_of[entry] = name
         last = AFTER if stable else (*AFTER, *OF_THE_RUN)
         self._always = (*BEFORE, *BETWEEN, *last)
         self.names = (*BEFORE, *parts["system"], *parts["option"], *BETWEEN, *parts["result"], *last)
-        held = {name: kinds[entry] for entry, name in self._called.items()}
-        self.types = {name: _type(held[name]) if name in held else _FIXED.get(name, "string") for name in self.names}
-        self.numbers = [name for name in self.names if {"number"} <= held.get(name, set()) <= {*_NUMBERS, "none"}]
+        kinds_in = {name: kinds[entry] for entry, name in self._column_of.items()}
+        self.types = {
+            name: _type(kinds_in[name]) if name in kinds_in else _FIXED.get(name, "string") for name in self.names
+        }
+        self.numbers = [name for name in self.names if {"number"} <= kinds_in.get(name, set()) <= {*_NUMBERS, "none"}]
 
     def cells(self, row: Row) -> dict[str, Any]:
-        """The values of a row by the names of their columns."""
+        """Return the values of a row by the names of their columns."""
         fixed = known(row)
         cells = {name: fixed[name] for name in self._always}
         for entry, value in entries(row):
-            if entry not in self._called:
+            if entry not in self._column_of:
                 raise InputError(_CHANGED.format(f"the value {quoted(names_of(entry)[0])}", f" of task {row.number}"))
-            cells[self._called[entry]] = value
+            cells[self._column_of[entry]] = value
         return cells
 
 
 _CHANGED = "found {}{} changed while the table was written: export again when nobody works on the batch"
-# Types of Parquet and the kinds of values that each holds without loss; a column gets the first that will do.
+# Types of Parquet and the kinds of values that each represents exactly; a column has the first that fits.
 _HOLDS = {
     "bool": {"bool", "none"},
     "int64": {"small", "int64", "none"},
@@ -264,7 +266,7 @@ def _kind(value: Any) -> str:
 
 
 def _type(kinds: Set[str]) -> str:
-    """The type of a column of Parquet with values of these kinds.
+    """Return the type of a Parquet column with values of these kinds.
 
     >>> [_type(kinds) for kinds in ({"small", "none"}, {"small", "float64"}, {"int64", "float64"}, {"none"})]
     ['int64', 'float64', 'string', 'string']
@@ -273,7 +275,7 @@ def _type(kinds: Set[str]) -> str:
 
 
 def known(row: Row) -> dict[str, Any]:
-    """What every row has, in the order of JSON lines; of a missing task, None for what its record would say."""
+    """Return the entries that every row has, in the order of JSON lines; those of a missing record are None."""
     task, record = row.task, row.record
     of_record = ("verdict", "result", "message", "stderr", "seconds", "peak_memory", "host", "versions", "finished")
     return {
@@ -289,5 +291,5 @@ def known(row: Row) -> dict[str, Any]:
 
 
 def _line(record: Mapping[str, Any]) -> str:
-    """A line of JSON: the record in its own order, all within it sorted."""
+    """Return a line of JSON; only dicts inside the record are sorted by keys."""
     return "{" + ", ".join(f"{json.dumps(name)}: {_ENCODER.encode(value)}" for name, value in record.items()) + "}\n"

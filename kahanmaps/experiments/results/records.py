@@ -1,8 +1,8 @@
-"""What a batch is made of: tasks with their keys, limits, and the records of what became of them.
+"""The data types of a batch: tasks with their keys, limits, and records of their outcomes.
 
-All of it is plain data that JSON holds, because it crosses processes and lies in databases: matrices and polynomials of
-FLINT do neither. The key of a task is a hash of its canonical text, so that the same question has the same key in every
-batch, on every machine.
+All of them are plain data that JSON can represent, since they are sent between processes and stored in databases;
+matrices and polynomials of FLINT can be neither sent nor stored. The key of a task is a hash of its canonical text, so
+that the same question has the same key in every batch, on every machine.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from hashlib import sha256
 from typing import Any, Protocol
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
-# digest of a system document -> its canonical text
+# Maps the digest of a system document to its canonical text.
 Documents = Callable[[str], str]
 
-KEY_LENGTH = 32  # hexadecimal digits: 128 bits, no two tasks will ever share them
+KEY_LENGTH = 32  # hexadecimal digits: 128 bits make collisions negligible
 
 
 def canonical(data: Any) -> str:
-    """Plain data as JSON that is the same wherever it is written: sorted names, no spaces, ASCII.
+    """Return plain data as canonical JSON: sorted names, no spaces, ASCII.
 
     >>> canonical({"m": 2, "eps": "1/10"})
     '{"eps":"1/10","m":2}'
@@ -32,18 +32,18 @@ def canonical(data: Any) -> str:
 
 
 def digest(text: str) -> str:
-    """The hash by which tasks and documents are known."""
+    """Return the hash that identifies a task or document with this text."""
     return sha256(text.encode()).hexdigest()[:KEY_LENGTH]
 
 
 def encodable(text: str) -> str:
-    """The text, with lone surrogates spelled out: a file name or what a child printed may be no UTF-8."""
+    """Return the text with lone surrogates escaped: file names and output of workers need not be valid UTF-8."""
     return text if text.isascii() else text.encode(errors="backslashreplace").decode()
 
 
 @dataclass(frozen=True)
 class Task:
-    """One question: `kind` names the task, `system` says how to come by the system, `options` has every option.
+    """A task: the name of its kind, the spec of its system, and the values of all options.
 
     `system` is {"family": {"m": 3, "seed": 7, ...}}, or {"document": DIGEST, "name": ..., "parameters": {...}}, or None
     for tasks without a system. `options` are canonical: all that the kind of task knows, numbers as exact text.
@@ -58,7 +58,7 @@ class Task:
 
     @cached_property
     def text(self) -> str:
-        """The canonical text, from which `from_text` makes the task again."""
+        """The canonical text, from which `from_text` restores the task."""
         return canonical({"task": self.kind, "system": self.system, "options": self.options})
 
     @cached_property
@@ -68,49 +68,49 @@ class Task:
 
     @property
     def documents(self) -> list[str]:
-        """The digests of the documents that it needs, those of its system and of a second one."""
-        system_spec = (self.system, self.options.get("other"))
-        return [recipe["document"] for recipe in system_spec if isinstance(recipe, Mapping) and "document" in recipe]
+        """The digests of the documents of its system and of its second system."""
+        specs = (self.system, self.options.get("other"))
+        return [spec["document"] for spec in specs if isinstance(spec, Mapping) and "document" in spec]
 
     @classmethod
     def from_text(cls, text: str) -> Task:
-        """The task with this canonical text."""
+        """Return the task with this canonical text."""
         data = json.loads(text)
         return cls(data["task"], data["system"], data["options"])
 
     def value(self, name: str) -> Any:
-        """The option, or the piece of the system's recipe, of this name: m, seed, eps, parameters.a; None if absent."""
+        """Return the option or the entry of the system spec with this name, e.g. parameters.a; None if absent."""
         if name in self.options:
             return self.options[name]
-        recipe = self.system or {}
+        spec = self.system or {}
         if name.startswith("parameters."):
-            return recipe.get("parameters", {}).get(name.removeprefix("parameters."))
-        return recipe.get("family", {}).get(name)
+            return spec.get("parameters", {}).get(name.removeprefix("parameters."))
+        return spec.get("family", {}).get(name)
 
 
-def system_words(recipe: Mapping[str, Any] | None) -> str:
-    """A recipe of a system as people read it.
+def system_words(spec: Mapping[str, Any] | None) -> str:
+    """Return the spec of a system as readable text.
 
     >>> system_words({"document": "51b2", "name": "euler_top", "parameters": {"a1": "1/2"}}), system_words(None)
     ('euler_top a1=1/2', '-')
     """
-    if recipe is None:
+    if spec is None:
         return "-"
-    if "family" in recipe:
-        return "family " + option_words(recipe["family"])
-    return f"{recipe.get('name', recipe['document'])} {option_words(recipe['parameters'])}".rstrip()
+    if "family" in spec:
+        return "family " + option_words(spec["family"])
+    return f"{spec.get('name', spec['document'])} {option_words(spec['parameters'])}".rstrip()
 
 
 def option_words(values: Mapping[str, Any]) -> str:
-    """Names with their values: m=3 seed=0 size=null."""
+    """Return names with their values as text: m=3 seed=0 size=null."""
     return " ".join(f"{name}={v if isinstance(v, str) else json.dumps(v)}" for name, v in values.items())
 
 
 @dataclass(frozen=True)
 class TaskLimits:
-    """What one task may take: `time` in seconds, `memory` in bytes beyond what an idle child has; None: no limit.
+    """Limits of a single task: `time` in seconds, `memory` in bytes in addition to an idle worker; None: no limit.
 
-    Limits do not belong to a task and not to its key: a task that ran out of time may be tried again with more.
+    Limits are not part of the task or its key: a task that exceeded its time limit may be run again with a larger one.
     """
 
     time: float | None = None
@@ -119,17 +119,17 @@ class TaskLimits:
 
 @dataclass(frozen=True)
 class Job:
-    """A task to be done, within limits."""
+    """A task to be run, with its limits."""
 
     task: Task
     limits: TaskLimits = TaskLimits()
 
 
 class Outcome(StrEnum):
-    """What became of a task. Everything but `ok` is a failure of the task, not of a claim: that is its verdict.
+    """The outcome of a task. All outcomes except `ok` are failures of the task; whether a claim holds is its verdict.
 
-    `lost` is no result: what did the task was killed from outside at every try. No database has it, and the task stays
-    without a result.
+    `lost` is not a result: at every attempt the worker was killed from outside. It is never stored, and the task
+    remains without a result.
     """
 
     OK = "ok"
@@ -140,17 +140,17 @@ class Outcome(StrEnum):
     LOST = "lost"
 
 
-VERDICTS = ("proved", "supported", "refuted", "undecided")  # of checks; tasks of one's own may have others
+VERDICTS = ("proved", "supported", "refuted", "undecided")  # of checks; user-defined tasks may have others
 KEPT = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # the outcomes of results
 
 
 @dataclass(frozen=True)
 class Record:
-    """What became of one task, and where and how.
+    """The record of a task: its outcome, result, cost and environment.
 
-    `result` is plain data, None unless the outcome is ok; `verdict` is that of a check. `message` says what happened
-    otherwise, `stderr` is the end of what the child printed. `seconds` and `peak_memory` (bytes, None: not known) are
-    those of the task alone; `host`, `versions` and `finished` (UTC, ISO 8601) say where and when.
+    `result` is plain data, None unless the outcome is ok; `verdict` is that of a check. `message` explains a failure,
+    and `stderr` is the end of the output of the worker. `seconds` and `peak_memory` (bytes, None: unknown) refer to
+    this task alone. `host`, `versions` and `finished` (UTC, ISO 8601) say where and when it was run.
     """
 
     key: str
@@ -167,22 +167,22 @@ class Record:
 
     @property
     def is_ok(self) -> bool:
-        """Whether the task was done."""
+        """Whether the task was completed."""
         return self.outcome is Outcome.OK
 
     def to_json(self) -> dict[str, Any]:
-        """The record as plain data."""
+        """Return the record as plain data."""
         return {**asdict(self), "outcome": str(self.outcome)}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Record:
-        """The record that `to_json` wrote."""
+        """Return the record that `to_json` wrote."""
         return cls(**{**data, "outcome": Outcome(data["outcome"])})
 
 
 @dataclass(frozen=True)
 class Row:
-    """A task in its place: experiment, number in it (from 0), and its record, None while it is missing."""
+    """A row of a plan: the experiment, the number in it (from 0), the task, and its record (None if missing)."""
 
     experiment: str
     number: int
@@ -191,7 +191,7 @@ class Row:
 
 
 class Executor(Protocol):
-    """Takes jobs while it is `free`, hands back records in `wait`; never raises for what happens inside a task."""
+    """Accepts jobs while it `is_free` and returns records from `wait`; errors inside a task become records."""
 
     @property
     def is_free(self) -> bool:
@@ -199,13 +199,13 @@ class Executor(Protocol):
 
     @property
     def in_flight(self) -> int:
-        """How many jobs have been submitted and not yet handed back."""
+        """The number of jobs submitted whose records have not been returned."""
 
     def submit(self, job: Job) -> None:
-        """Take a job. Its record comes out of `wait` some time."""
+        """Accept a job; `wait` will return its record."""
 
     def wait(self, timeout: float) -> list[Record]:
-        """Records that are ready, as soon as there is one, or none after `timeout` seconds."""
+        """Return the finished records as soon as there is one, or none after `timeout` seconds."""
 
     def close(self) -> None:
-        """End at once: whatever is in flight is killed and forgotten. May be called twice."""
+        """End at once and kill all jobs in flight. May be called twice."""

@@ -1,18 +1,18 @@
-"""Where the results of a batch lie: one SQLite file, written by one process, read by others at the same time.
+"""The database with the results of a batch: one SQLite file, written by one process and read by others concurrently.
 
-A store holds experiments with their plans (which task comes where), the texts of tasks and of the documents that they
-need, and the latest result of every task. Tasks lie once, however often they are planned, so that a batch which has
-changed keeps what it has in common with the old one.
+A store contains experiments with their plans (the tasks in order), the texts of tasks and of the documents that they
+need, and the latest result of every task. A task is stored once, even if it is planned several times, so that a changed
+batch reuses the results that it has in common with the old one.
 
-Three rules keep it whole:
+Three rules ensure consistency:
 
 * what is reported as stored is stored: each method that writes is one transaction, and a kill at any moment leaves the
   state before it or after it;
-* one writer: opening for writing takes a lock that the operating system frees when the process ends, however it ends;
-* no reader holds the writer up: long reads go in chunks, each fetched completely before the first row is handed out;
-  only counts are one query, which takes a second for a million tasks.
+* there is one writer: opening for writing takes a lock that the operating system releases when the process ends;
+* readers do not block the writer for long: they read in chunks, each fetched completely before its first row is
+  yielded; only counts are single queries, which take a second for a million tasks.
 
-SQLite's rollback journal is used, never WAL: it is sound on every file system, those of networks among them.
+The rollback journal of SQLite is used, never WAL: it is safe on all file systems, including network file systems.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ from kahanmaps.experiments.results.records import (
     encodable,
 )
 
-# A change that older versions cannot read increases it. Format 2 is this one with two more columns, which nobody reads.
+# Increase the format if older versions cannot read the file. Format 2 is format 1 with two more, unused columns.
 FORMATS = (1, 2)
-APPLICATION_ID = 0x4B61684D  # "KahM", by which a file is recognized as ours
+APPLICATION_ID = 0x4B61684D  # "KahM", which identifies our databases
 SKIPPED = "TABLE skipped (experiment INTEGER, system TEXT, reason TEXT, PRIMARY KEY (experiment, system))"
 SCHEMA = f"""
 CREATE TABLE document (digest TEXT PRIMARY KEY NOT NULL, text TEXT NOT NULL);
 CREATE TABLE task (id INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, text TEXT NOT NULL);
--- id: also the place among the experiments
+-- id: also the position among the experiments
 CREATE TABLE experiment (
     id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, definition TEXT NOT NULL, digest TEXT NOT NULL,
     limits TEXT NOT NULL, total INTEGER NOT NULL, tasks INTEGER NOT NULL
@@ -73,20 +73,20 @@ CREATE TABLE result (
     peak_memory INTEGER, host TEXT NOT NULL, finished TEXT NOT NULL, versions TEXT NOT NULL, message TEXT NOT NULL,
     stderr TEXT NOT NULL, result TEXT
 );
--- What is only counted is read from here: the pages of the table itself are full of results.
+-- Counting uses this index, since the pages of the table itself contain long results.
 CREATE INDEX result_summary ON result (task, outcome, verdict, seconds);
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = 1;
 """
-PLAN_CHUNK = 1000  # rows of the plan that one read takes: they are short
+PLAN_CHUNK = 1000  # rows of the plan in one read: they are short
 RESULT_CHUNK = 50  # rows with their results, which may be megabytes
 MAX_FOUND = 20
 CONFLICTS_SHOWN = 5
 
 _BUSY_SECONDS = 30.0
 _MIN_BYTES = 512  # the smallest page that SQLite has
-# In KiB. The index of a million keys, hit at random while they are planned, has to fit into it; otherwise every key
-# costs a page written.
+# In KiB. The index of a million keys, accessed at random during planning, has to fit into the cache; otherwise every
+# key causes the write of a page.
 _CACHE = 128 << 10
 _OF_THE_MACHINE = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
 # fmt: off
@@ -98,18 +98,18 @@ _SELECTED = ", ".join(f"r.{column}" for column in (*_COLUMNS, "attempts"))
 
 
 class StoreError(InputError):
-    """A database that cannot be used, or not in this way: the message says what to do."""
+    """Raised for a database that cannot be used, or not in this way; the message says what to do."""
 
 
 class Unavailable(KahanmapsError, OSError):
-    """A database that cannot be used just now, by nobody's mistake: the disk is full or broken, the file is gone."""
+    """Raised for a database that is temporarily unusable: the disk is full or broken, or the file was removed."""
 
 
 @dataclass(frozen=True)
 class StoredExperiment:
-    """An experiment as it was planned: `total` rows, in which `tasks` different tasks appear.
+    """An experiment as planned: `total` rows with `tasks` different tasks.
 
-    `id` is its number in the database, `offset` counts the rows of the plan before its own.
+    `id` is its number in the database, `offset` the number of rows of the plans before its own.
     """
 
     name: str
@@ -123,10 +123,10 @@ class StoredExperiment:
 
 @dataclass(frozen=True)
 class ExperimentStatus:
-    """How far an experiment has come. `total` counts rows of its plan, everything else its `tasks` different tasks.
+    """The progress of an experiment. `total` counts rows of its plan, all other counts refer to different tasks.
 
-    So `missing` and the `outcomes` add up to `tasks`. `seconds` is the time the latest attempts took; `skipped` are
-    the systems that were left out when it was planned, and why.
+    Hence `missing` and the `outcomes` add up to `tasks`. `seconds` is the total time of the latest attempts; `skipped`
+    lists the systems omitted from the plan, with reasons.
     """
 
     name: str
@@ -141,10 +141,10 @@ class ExperimentStatus:
 
 @dataclass(frozen=True)
 class Planned:
-    """What planning did. `total` counts rows of the plan, everything else different tasks.
+    """The result of planning. `total` counts rows of the plan, all other counts refer to different tasks.
 
-    `known` of them were in the store already, `new_tasks` were not; `dropped` were in the plan that this one replaces
-    and are no longer. `is_resumed`: the same definition had been planned before, and nothing was done.
+    `known` tasks were already in the store, `new_tasks` were not; `dropped` tasks were only in the plan that this one
+    replaces. `is_resumed` is true if the same definition had been planned before, and nothing was done.
     """
 
     total: int
@@ -156,9 +156,9 @@ class Planned:
 
 @dataclass(frozen=True)
 class Merged:
-    """What came from another database: new tasks, new results, failures `replaced` by results.
+    """The result of a merge: numbers of new tasks, of new results, and of failures `replaced` by results.
 
-    `conflicts` counts tasks which are done in both with different results; `conflicting` has the keys of the first few.
+    `conflicts` counts tasks with different results in the two databases; `conflicting` has the keys of the first few.
     """
 
     tasks: int
@@ -169,7 +169,7 @@ class Merged:
 
 
 class StoredTask(NamedTuple):
-    """A task by its key, with its record if there is one, its places (experiment, number), and attempts at it."""
+    """A task with its record (None if missing), its positions (experiment, number), and the number of attempts."""
 
     task: Task
     record: Record | None
@@ -178,7 +178,7 @@ class StoredTask(NamedTuple):
 
 
 class Store(HtmlDisplay):
-    """A database of results. Make one with `Store.open`, and close it, best by `with`.
+    """A database of results. Open it with `Store.open`, and close it, preferably by `with`.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder, Store.open(f"{folder}/results.db", create=True) as store:
@@ -191,7 +191,7 @@ class Store(HtmlDisplay):
     path: Path  # resolved: otherwise two names of one file would have two locks
 
     def __init__(self, path: str | os.PathLike[str], readonly: bool) -> None:
-        self.name = os.fspath(path)  # as it was given, for messages
+        self.name = os.fspath(path)  # as given, for messages
         self._is_readonly = readonly
         self._lock: int | None = None
         self._connection: sqlite3.Connection | None = None
@@ -200,7 +200,7 @@ class Store(HtmlDisplay):
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
-        """The store in this file; `create` makes it if it is not there. Open for writing, it has the lock."""
+        """Open the store in a file, for writing unless `readonly`; with `create`, create a missing file."""
         if create and readonly:
             raise ValueError("a database opened for reading only cannot be created")
         store = cls(path, readonly)
@@ -218,7 +218,7 @@ class Store(HtmlDisplay):
         return store
 
     def close(self) -> None:
-        """Leave one complete file behind. May be called twice."""
+        """Close the database and release the lock. May be called twice."""
         if self._connection is not None:
             with suppress(sqlite3.Error):
                 self._connection.close()
@@ -241,7 +241,7 @@ class Store(HtmlDisplay):
         exists = self.path.exists()
         if exists and not self.path.is_file():
             raise StoreError(f"{self.name} is a folder or a device, expected a file: check the name")
-        # SQLite would take it for an empty one, and write over it.
+        # SQLite would treat such a file as an empty database, and overwrite it.
         if exists and 0 < self.path.stat().st_size < _MIN_BYTES:
             raise StoreError(f"{self.name} is not an SQLite database: check the name")
         if not exists and not create:
@@ -250,7 +250,7 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; create it first")
         mode = "rwc" if create else "rw"
         if self._is_readonly:
-            # Reading has to write where a killed writer left a journal. Where no process may write, none does.
+            # After a killed writer even reading has to write (the journal). Without permission nobody else writes.
             may_write = os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
             has_journal = any(Path(f"{self.path}{end}").exists() for end in ("-journal", "-wal"))
             mode = "rw" if may_write or has_journal else "ro&immutable=1"
@@ -258,12 +258,12 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} may not be written to: change its permissions, or work on a copy")
         address = f"{self.path.as_uri()}?mode={mode}"
         self._connection = sqlite3.connect(address, timeout=_BUSY_SECONDS, isolation_level=None, uri=True)
-        self._is_made(create)  # before the lock: no lock file beside what is not ours
+        self._is_made(create)  # before locking: no lock file beside a file that is not ours
         if not self._is_readonly:
             self._take_lock()
             self._execute(f"PRAGMA cache_size = -{_CACHE}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
-            if not self._is_made(create):  # under the lock once more: another process may have been making it
+            if not self._is_made(create):  # again, under the lock: another process may have created it meanwhile
                 with self._transaction():
                     for statement in SCHEMA.split(";"):  # executescript would commit
                         self._execute(statement)
@@ -273,8 +273,8 @@ class Store(HtmlDisplay):
             self._execute("PRAGMA query_only = ON")
 
     def _is_made(self, create: bool) -> bool:
-        """False for an empty file that may become a database. Raises StoreError for what is not ours."""
-        # The schema first: pragmas alone are answered for files that SQLite cannot read.
+        """Return False for an empty file if `create`. Raises StoreError for a file that is not ours."""
+        # The schema first: pragmas succeed even for files that SQLite cannot read.
         queries = ("SELECT count(*) FROM sqlite_master", "PRAGMA application_id", "PRAGMA user_version")
         tables, application, version = [self._execute(sql).fetchone()[0] for sql in queries]
         if not (tables or application or version):
@@ -291,15 +291,15 @@ class Store(HtmlDisplay):
         return True
 
     def _take_lock(self) -> None:
-        """Become the one that writes. The operating system frees the lock when the process ends, however it ends.
+        """Take the lock of the writer, which the operating system releases when the process ends.
 
-        The locked file cannot be the database: to close any descriptor of that would drop the locks that SQLite has.
+        The locked file cannot be the database itself: closing any of its descriptors would drop the locks of SQLite.
         """
         while self._lock is None:
             descriptor = os.open(f"{self.path}.lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # The one before may have removed the file after it was opened here: then it locks nobody out.
+                # The previous writer may have removed the file after it was opened here: then its lock has no effect.
                 with suppress(FileNotFoundError):
                     if os.path.samestat(os.fstat(descriptor), os.stat(f"{self.path}.lock")):
                         self._lock = descriptor
@@ -309,10 +309,10 @@ class Store(HtmlDisplay):
                 if self._lock is None:
                     os.close(descriptor)
 
-    # SQL, with the errors of SQLite as sentences
+    # SQL, with messages for the errors of SQLite
 
     def _execute(self, sql: str, values: Sequence[Any] = ()) -> sqlite3.Cursor:
-        """One statement of a transaction."""
+        """Execute one statement."""
         return self._opened().execute(sql, values)
 
     def _opened(self) -> sqlite3.Connection:
@@ -321,7 +321,7 @@ class Store(HtmlDisplay):
         return self._connection
 
     def _fetch(self, sql: str, values: Sequence[Any] = ()) -> list[Any]:
-        """All rows at once: a statement half read would keep its lock, and hold the writer up."""
+        """Return all rows of a query: a statement read in part would keep its lock and block the writer."""
         with self._errors():
             rows = self._execute(sql, values).fetchall()
         if any(isinstance(value, bytes) for row in rows for value in row):
@@ -329,13 +329,13 @@ class Store(HtmlDisplay):
         return rows
 
     def _fetch_plan(self, sql: str, experiment: StoredExperiment, size: int, *values: int) -> Iterator[list[Any]]:
-        """What `sql` finds in each stretch of the plan: a bounded number of rows is read, found or not."""
+        """Yield the rows of a query for each chunk of `size` rows of the plan, so that each read is bounded."""
         for first in range(0, experiment.total, size):
             yield self._fetch(sql, (experiment.id, first, first + size - 1, *values))
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        """What is executed in it is done completely or not at all."""
+        """Execute the statements in the block completely or not at all."""
         if self._is_readonly:
             raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
         with self._errors(), self._opened() as connection:  # which commits at the end, or rolls back
@@ -366,7 +366,7 @@ class Store(HtmlDisplay):
 
     @contextmanager
     def _reading(self, what: str) -> Iterator[None]:
-        """Values are made of what lies in the file: what cannot be made is damage, reported with this name."""
+        """Report errors in the block, where values of the file are parsed, as damage of the file at `what`."""
         try:
             yield
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -378,7 +378,7 @@ class Store(HtmlDisplay):
             return Task.from_text(text)
 
     def _record(self, key: str, row: Sequence[Any]) -> Record | None:
-        """The record in a row of `_SELECTED`; None if the task has no result."""
+        """Return the record in a row with the columns `_SELECTED`; None if the task has no result."""
         if row[0] is None:
             return None
         cells = dict(zip((*_COLUMNS, "attempts"), row, strict=True))
@@ -397,7 +397,7 @@ class Store(HtmlDisplay):
     # Experiments and their plans
 
     def experiments(self, names: Sequence[str] | None = None) -> list[StoredExperiment]:
-        """What is planned, in order; only the experiments with these names, if they are given."""
+        """Return the planned experiments in order, only those with these names if they are given."""
         rows = self._fetch(
             "SELECT name, definition, limits, total, tasks, id, "
             "(SELECT max(number) + 1 FROM plan WHERE experiment = e.id) FROM experiment AS e ORDER BY id"
@@ -427,12 +427,11 @@ class Store(HtmlDisplay):
         documents: Mapping[str, str],
         skipped: Iterable[tuple[str, str]] = (),
     ) -> Planned:
-        """Plan these tasks in this order; a kill or an exception on the way leaves the plan there was.
+        """Plan these tasks in this order; after a kill or an exception the previous plan is unchanged.
 
-        `definition` is what the tasks were made from: if it is the one planned before, `tasks` is not even begun, and
-        only the limits are set. If it is another one, this plan replaces the old; results stay, planned or not.
-        `documents` (digest to text) is read after `tasks`, so that making the tasks may fill it. `skipped` are systems
-        that are left out, and why.
+        `definition` determines the tasks: if it equals the one planned before, `tasks` is not read, and only the limits
+        are updated. Otherwise this plan replaces the old one, and all results are kept. `documents` (digest to text) is
+        read after `tasks`, so that the iterator may fill it. `skipped` lists omitted systems with reasons.
         """
         with self._transaction():
             sql = "SELECT digest, total, tasks FROM experiment WHERE name = ?"
@@ -462,7 +461,7 @@ class Store(HtmlDisplay):
     def _replace_plan(
         self, experiment: str, definition: str, limits: TaskLimits, tasks: Iterable[tuple[str, str]]
     ) -> Planned:
-        """Plan the tasks with these keys and texts; forget those that neither a plan nor a result needs any more."""
+        """Plan the tasks with these keys and texts; delete old tasks that neither a plan nor a result refers to."""
         values = (experiment, definition, digest(definition), canonical(asdict(limits)))
         self._execute(
             "INSERT INTO experiment (name, definition, digest, limits, total, tasks) VALUES (?, ?, ?, ?, 0, 0) ON "
@@ -495,10 +494,10 @@ class Store(HtmlDisplay):
         return Planned(total, different - new, new, dropped)
 
     def _add_tasks(self, tasks: Sequence[tuple[str, str]]) -> int:
-        """How many were not there."""
+        """Add tasks, given by keys and texts, and return the number of new ones."""
         return self._opened().executemany("INSERT OR IGNORE INTO task (key, text) VALUES (?, ?)", tasks).rowcount
 
-    # What there is to do
+    # Tasks to be run
 
     def pending(
         self,
@@ -507,10 +506,10 @@ class Store(HtmlDisplay):
         retry_failed: bool = False,
         shard: tuple[int, int] = (1, 1),
     ) -> Iterator[Job]:
-        """The tasks without a result in plan order, each once, while results may be added in between.
+        """Yield the tasks without a result in plan order, each once; results may be added during the iteration.
 
-        With `retry_failed` also those that failed: each is looked at once, so one that fails again does not come back.
-        `shard` (i, n) is the i-th part of n, counting rows of the plan of these experiments; no task is in two parts.
+        With `retry_failed` failed tasks are included, each once even if it fails again. `shard` (i, n) is the i-th of n
+        parts of the rows of the plans of these experiments; no task is in two parts.
         """
         sql, chosen = self._pending(experiments, retry_failed, shard)
         sql = sql.format("t.key, t.text", "JOIN task AS t ON t.id = p.task")
@@ -522,21 +521,21 @@ class Store(HtmlDisplay):
         )
 
     def count_pending(self, experiments: Sequence[str] | None = None, **options: Any) -> int:
-        """How many jobs `pending` has with these arguments."""
+        """Return the number of jobs that `pending` yields with these arguments."""
         sql, chosen = self._pending(experiments, **options)
         sql = sql.format("count(*)", "")
-        return sum(self._fetch(sql, (one.id, 0, one.total, *values))[0][0] for one, *values in chosen)
+        return sum(self._fetch(sql, (e.id, 0, e.total, *values))[0][0] for e, *values in chosen)
 
     def _pending(
         self, experiments: Sequence[str] | None, retry_failed: bool = False, shard: tuple[int, int] = (1, 1)
     ) -> tuple[str, list[tuple[StoredExperiment, int, int, int]]]:
-        """A query for the tasks without a result in a stretch of the plan, and its values for each experiment."""
+        """Return a query for the tasks without a result in a chunk of the plan, and its values for each experiment."""
         part, parts = shard
         if not 1 <= part <= parts:
             raise StoreError(f"there is no part {part} of {parts}: parts are counted 1/{parts} to {parts}/{parts}")
         chosen = self.experiments(experiments)
-        # A task planned twice belongs to its first row among the chosen ones: so it comes once, without a memory of
-        # what has come, and lies in one shard.
+        # A task planned twice belongs to its first row among the chosen experiments. Hence it is yielded once, without
+        # storing what was yielded, and is in one shard.
         among = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
         sql = f"""
             SELECT {{}} FROM plan AS p {{}}
@@ -548,18 +547,18 @@ class Store(HtmlDisplay):
                 WHERE q.task = p.task AND (q.experiment, q.number) < (p.experiment, p.number) {among}
             )
             ORDER BY p.number"""
-        return sql, [(one, one.offset, parts, part - 1) for one in chosen]
+        return sql, [(experiment, experiment.offset, parts, part - 1) for experiment in chosen]
 
     # Results
 
     def add(self, records: Sequence[Record]) -> None:
-        """Store these records, all or none. A failure does not replace a result, otherwise the later one counts.
+        """Store these records, all or none. A record replaces the earlier one, but a failure never replaces a result.
 
-        What is lost is no result, and leaves the task as it was.
+        Records with the outcome `lost` are ignored.
         """
         records = [record for record in records if record.outcome is not Outcome.LOST]
         rows = []
-        for record in records:  # what JSON cannot hold is refused here
+        for record in records:  # values that JSON cannot represent raise an error here
             if not math.isfinite(record.seconds):
                 raise ValueError(f"a record cannot have taken {record.seconds} seconds")
             kept = {name: getattr(record, name) for name in _COLUMNS}  # not asdict, which copies results
@@ -569,18 +568,18 @@ class Store(HtmlDisplay):
             rows.append([*{**kept, "outcome": str(record.outcome), "seconds": float(record.seconds)}.values()])
         with self._transaction():
             for record, row in zip(records, rows, strict=True):
-                found = self._find_result(record.key)
-                if found is None:
+                stored = self._find_result(record.key)
+                if stored is None:
                     raise StoreError(f"{self.name} has no task {record.key}: plan it before its result is added")
-                task, *before, attempts = found
+                task, *before, attempts = stored
                 is_kept = before[0] == Outcome.OK and not record.is_ok
                 self._put_result(task, before if is_kept else row, (attempts or 0) + 1)
 
     def _find_result(self, key: str) -> Sequence[Any] | None:
-        """The id of the task and its result with the attempts, all None if it has none; None for an unknown task."""
+        """Return the id of a task, the columns of its result (None if missing) and attempts; None if unknown."""
         sql = f"SELECT t.id, {_SELECTED} FROM task AS t LEFT JOIN result AS r ON r.task = t.id WHERE t.key = ?"
-        found: Sequence[Any] | None = self._execute(sql, (key,)).fetchone()
-        return found
+        row: Sequence[Any] | None = self._execute(sql, (key,)).fetchone()
+        return row
 
     def _put_result(self, task: int, row: Sequence[Any], attempts: int) -> None:
         columns, places = ", ".join(_COLUMNS), ", ".join("?" * (len(_COLUMNS) + 2))
@@ -588,7 +587,7 @@ class Store(HtmlDisplay):
         self._execute(sql, (task, *row, attempts))
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
-        """The tasks with their records in plan order; with `missing` also those that have none."""
+        """Yield the tasks with their records in plan order; with `missing` also those without a record."""
         chosen = self.experiments(experiments)  # now, not when the first row is read
         sql = f"""
             SELECT p.number, t.key, t.text, {_SELECTED}
@@ -603,10 +602,10 @@ class Store(HtmlDisplay):
         )
 
     def merge(self, other: str | os.PathLike[str]) -> Merged:
-        """Take over what another database has, all or nothing; doing it again changes nothing.
+        """Add the experiments and results of another database, all or nothing; merging again changes nothing.
 
-        Experiments that this one lacks come with their plans. Of two results of a task the one that is ok is kept, and
-        this one's if both are or neither is. Of two experiments with one name the definitions must agree.
+        New experiments are added with their plans. Of two results of a task the successful one is kept, and that of
+        this database if both or neither are. Two experiments of the same name must have the same definition.
         """
         new = results = replaced = conflicts = 0
         conflicting: list[str] = []
@@ -648,10 +647,10 @@ class Store(HtmlDisplay):
                         conflicting += [key] if conflicts <= CONFLICTS_SHOWN else []
         return Merged(new, results, replaced, conflicts, tuple(conflicting))
 
-    # Looking
+    # Queries
 
     def status(self) -> list[ExperimentStatus]:
-        """How far each experiment has come."""
+        """Return the progress of each experiment."""
         experiments = {experiment.id: experiment for experiment in self.experiments()}
         outcomes: dict[int, Counter[Outcome]] = {id: Counter() for id in experiments}
         verdicts: dict[int, Counter[str]] = {id: Counter() for id in experiments}
@@ -669,16 +668,16 @@ class Store(HtmlDisplay):
                     verdicts[id][verdict] += count
         return [
             ExperimentStatus(
-                one.name,
-                one.total,
-                one.tasks,
-                one.tasks - outcomes[id].total(),
+                experiment.name,
+                experiment.total,
+                experiment.tasks,
+                experiment.tasks - outcomes[id].total(),
                 dict(outcomes[id]),
                 dict(verdicts[id]),
                 seconds[id],
-                self._skipped(one),
+                self._skipped(experiment),
             )
-            for id, one in experiments.items()
+            for id, experiment in experiments.items()
         ]
 
     def _skipped(self, experiment: StoredExperiment) -> list[tuple[str, str]]:
@@ -686,14 +685,14 @@ class Store(HtmlDisplay):
         return self._fetch(sql, (experiment.id,))
 
     def unplanned(self) -> int:
-        """How many results no plan asks for."""
+        """Return the number of results whose task is in no plan."""
         sql = """
             SELECT count(*) FROM result AS r INDEXED BY result_summary
             WHERE NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)"""
         return int(self._fetch(sql)[0][0])
 
     def find(self, prefix: str) -> list[StoredTask]:
-        """The tasks whose key begins like this, at most 20; the first 4 digits at least."""
+        """Return at most 20 tasks whose key begins with this prefix of at least 4 digits."""
         prefix = prefix.lower()
         if not re.fullmatch(f"[0-9a-f]{{4,{KEY_LENGTH}}}", prefix):
             raise StoreError(
@@ -715,7 +714,7 @@ class Store(HtmlDisplay):
         ]
 
     def document(self, digest: str) -> str:
-        """The text of the document with this digest."""
+        """Return the text of the document with this digest."""
         rows = self._fetch("SELECT text FROM document WHERE digest = ?", (digest,))
         if not rows:
             raise StoreError(f"{self.name} has no document {digest}: plan the experiment that needs it again")
@@ -723,7 +722,7 @@ class Store(HtmlDisplay):
 
 
 def _table(text: str) -> dict[str, Any]:
-    """The dict that a text in the file spells. Raises ValueError or TypeError for any other text."""
+    """Return the dict encoded in JSON. Raises ValueError or TypeError for any other text."""
     table = json.loads(text)
     if not isinstance(table, dict):
         raise TypeError("found no table in JSON")

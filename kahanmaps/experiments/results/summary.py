@@ -1,8 +1,8 @@
-"""Many results in a few lines: grouped, counted, with the quantiles of their numbers.
+"""Summaries of results: groups of tasks with counts and quantiles of numbers.
 
-Groups are exact: "1/3" is not 0.333. Numbers are summed up as the nearest doubles. Quantiles are order statistics by
-nearest rank, so values that occur: the p-quantile of n values is the one with rank ceil(p n) from below, and the median
-of an even number of values is the lower of the two in the middle.
+Groups are exact: "1/3" is not 0.333. Numbers are summarised as the nearest doubles. Quantiles are order statistics by
+nearest rank, so that they are values of the data: the p-quantile of n values is the ceil(p n)-th smallest, and the
+median of an even number of values is the lower of the two in the middle.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "
 _SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # in tables, and their headings
 OF_THE_RUN = ("seconds", "peak_memory")
 
-# Names whose values are words, also when they look like numbers: an experiment may be called 007, a digest be 12e34567.
+# Names whose values are text even if they look like numbers: an experiment may be called 007, a digest be 12e34567.
 _WORDS = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
 _RELATED = 3  # names suggested for a mistaken one
 _LISTED = 60
-_MAX_WIDTH = 160  # characters of a cell for the eye: what failures say, what systems are
+_MAX_WIDTH = 160  # characters of a printed cell: messages of failures and names of systems may be long
 
 
 class SummaryTable(NamedTuple):
-    """A table of texts. The first `words` columns are words, the others numbers, to be aligned on the right."""
+    """A table of texts. The first `words` columns are text, the others numbers, to be aligned on the right."""
 
     title: str
     columns: tuple[str, ...]
@@ -43,10 +43,10 @@ class SummaryTable(NamedTuple):
 
 @dataclass(frozen=True)
 class Group:
-    """The tasks with the same `values` of what was grouped by; `outcomes` and `verdicts` count records.
+    """A group of tasks with the same `values`; `outcomes` and `verdicts` count records.
 
-    `numbers`: how many of each there are (`n`), whether all are the `same` double, and their `QUANTILES`. `flags`: how
-    often an entry is true and false.
+    `numbers` has for each entry the count `n`, whether all values are the `same` double, and their `QUANTILES`. `flags`
+    has the counts of true and false.
     """
 
     values: tuple[Any, ...]
@@ -60,13 +60,13 @@ class Group:
 
 @dataclass(frozen=True)
 class Summary(HtmlDisplay):
-    """Groups in the order of their values, numbers as numbers before texts, and None (not known) at the end."""
+    """Groups sorted by their values: numbers before texts, and None (unknown) last."""
 
     by: tuple[str, ...]
     groups: tuple[Group, ...]
 
     def to_json(self) -> dict[str, Any]:
-        """The summary as plain data; a quantile beyond the range of doubles is null."""
+        """Return the summary as plain data; quantiles that overflow doubles are null."""
         groups = []
         for group in self.groups:
             data = {"group": dict(zip(self.by, group.values, strict=True)), **asdict(group)}
@@ -77,9 +77,9 @@ class Summary(HtmlDisplay):
         return {"by": list(self.by), "groups": groups}
 
     def tables(self, digits: int = 6) -> list[SummaryTable]:
-        """Counts, numbers and flags as texts, without tables that have no rows and counts of what never happened.
+        """Return tables of counts, numbers and flags as text; empty tables and columns of zeros are omitted.
 
-        Numbers have so many significant digits, long texts are shortened.
+        Floats have `digits` significant digits, and long text is shortened.
         """
         counts = [{"tasks": g.tasks, "missing": g.missing, **g.outcomes, **g.verdicts} for g in self.groups]
         names = [name for name in dict.fromkeys(name for c in counts for name in c) if any(c.get(name) for c in counts)]
@@ -104,16 +104,16 @@ class Summary(HtmlDisplay):
         ]
 
     def lines(self) -> Iterator[str]:
-        """The tables, tabs between the cells and an empty line between the tables."""
-        for place, table in enumerate(self.tables()):
-            if place:
+        """Yield the lines of the tables, with tabs between cells and an empty line between tables."""
+        for number, table in enumerate(self.tables()):
+            if number:
                 yield ""
             for row in (table.columns, *table.rows):
                 yield "\t".join(" ".join(cell.split()) for cell in row)
 
 
-class _Gathering:
-    """A group while rows come in; doubles take eight bytes each."""
+class _GroupBuilder:
+    """The counts and numbers of a group while rows are read; a number takes eight bytes."""
 
     def __init__(self, values: tuple[Any, ...]) -> None:
         self.values = values
@@ -139,17 +139,17 @@ class _Gathering:
 def summarise(
     rows: Iterable[Row], by: Sequence[str] = (), values: Sequence[str] | None = None, *, stable: bool = False
 ) -> Summary:
-    """Group rows by the values of what `by` names, count, and take the quantiles of the numbers.
+    """Group rows by the entries named in `by`, and return counts and quantiles for each group.
 
-    A name in `by` is one of task, experiment, system, document, outcome, verdict, message; an option; a part of the
-    recipe (m, parameters.a); an entry of the result (dimension, heights.max): the first of these that the row has.
-    option.seed, family.seed and result.seed say which. Rows without it make a group of their own, with the value None.
+    A name in `by` is one of task, experiment, system, document, outcome, verdict, message; an option; an entry of the
+    system spec (m, parameters.a); an entry of the result (dimension, heights.max): the first of these that the row has.
+    option.seed, family.seed and result.seed are unambiguous. Rows without the entry form a group with the value None.
 
     Numbers are the integers, floats and texts such as "7/3" or "21.2031" of the results, and seconds and peak_memory of
-    all records unless `stable`; not those that `by` names, which are the same throughout a group. `values` names those
-    to be kept. An entry of a result with a name of these two is result.seconds.
+    all records unless `stable`, except those in `by`, which are constant in a group. `values` restricts them to these
+    names. An entry of a result named seconds is called result.seconds.
 
-    Rows are read once; of each, eight bytes are kept for each number. Raises InputError for names that no row has.
+    Rows are read once, and only their numbers are stored. Raises InputError for names that no row has.
 
     >>> from kahanmaps.experiments.results.records import Outcome, Record, Task
     >>> def row(number, m, height):
@@ -166,7 +166,7 @@ def summarise(
     10      height  2       no      2.5     2.5     2.5     3.5     3.5
     """
     by = tuple(dict.fromkeys(by))
-    groups: dict[tuple[Any, ...], _Gathering] = {}  # by what they are recognized and sorted by
+    groups: dict[tuple[Any, ...], _GroupBuilder] = {}  # the keys identify and sort the groups
     seen, numeric = set[Entry](), set(() if stable else OF_THE_RUN)
     has_results = False
     for row in rows:
@@ -177,15 +177,15 @@ def summarise(
             short, full = names_of(entry)
             for name in (short, full):
                 if name in by:
-                    keys.setdefault(name, value)  # the first to have a name keeps it
+                    keys.setdefault(name, value)  # the first entry with a name has it
             if entry[0] == "result":
                 has_results = True
                 measured[full if short in OF_THE_RUN else short] = value
-        places = [_place(row, name, keys.get(name)) for name in by]
-        identity = tuple(key for key, _ in places)
+        grouped_by = [_sort_key_and_value(row, name, keys.get(name)) for name in by]
+        identity = tuple(key for key, _ in grouped_by)
         group = groups.get(identity)
         if group is None:
-            group = groups[identity] = _Gathering(tuple(value for _, value in places))
+            group = groups[identity] = _GroupBuilder(tuple(value for _, value in grouped_by))
         group.counts["missing" if row.record is None else row.record.outcome] += 1
         if row.record is not None and row.record.verdict is not None:
             group.verdicts[row.record.verdict] += 1
@@ -198,7 +198,7 @@ def summarise(
                     group.flags[name][plain(value)] += 1
                 else:
                     group.numbers[name].append(nearest(value))
-    if groups:  # without rows no name can be known as mistaken
+    if groups:  # without rows no name can be recognized as unknown
         short_names, full_names = ({names_of(entry)[k] for entry in seen} for k in (0, 1))
         for name in by:
             if name not in full_names:
@@ -209,8 +209,8 @@ def summarise(
     return Summary(by, tuple(groups[identity].group() for identity in sorted(groups)))
 
 
-def _place(row: Row, name: str, value: Any) -> tuple[Any, Any]:
-    """What the row is sorted and recognized by, and its value, for a name to group by; `value` is that of an entry."""
+def _sort_key_and_value(row: Row, name: str, value: Any) -> tuple[Any, Any]:
+    """Return the sort key and the value of a row for a name in `by`; `value` is that of an entry with this name."""
     if name == "system":
         word: str | None = system_words(row.task.system)
         return (2, word, canonical(row.task.system)), word  # other files may have the same name
@@ -221,7 +221,7 @@ def _place(row: Row, name: str, value: Any) -> tuple[Any, Any]:
 
 
 def _order(value: Any) -> tuple[Any, ...]:
-    """A key by which values are sorted, the same for equal values only: numbers, false and true, texts, None.
+    """Return a sort key, equal for equal values only: numbers, then false and true, texts, None.
 
     >>> sorted([None, "x", 10, "1/7", True, "0.5", 2, "1/10"], key=_order)
     ['1/10', '1/7', '0.5', 2, 10, True, 'x', None]

@@ -1,11 +1,12 @@
-"""How a task comes by its system: a recipe of plain data, and the system that is made of it.
+"""The spec of the system of a task, as plain data, and the system constructed from it.
 
-    {"family": {"draw": "eigenvalues", "m": 3, "seed": 7}}           a random member, made anew wherever it is needed
+    {"family": {"draw": "eigenvalues", "m": 3, "seed": 7}}           a random member, constructed again where needed
     {"document": DIGEST, "name": "top", "parameters": {"a": "2"}}    a system file or a system of the catalogue
 
-A document is a system file as plain data; recipes name it by its digest, so that a task is the same wherever the file
-lies, and another one when the file says something else. What a system is called belongs to it: reports print it. A
-recipe is complete, with all parameters and all that a member is drawn with, so that the same question has one recipe.
+A document is a system file as plain data. Specs refer to it by its digest, so that the task does not depend on where
+the file is, and changes when its content changes. The name of a system is part of its spec, since reports print it. A
+spec is complete: it contains all parameters, or all arguments of the random construction, so that equal systems have
+equal specs.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ from kahanmaps.family.random_members import (
     random_member_with_eigenvalues,
 )
 
-_KEPT = 16  # systems that a child keeps: tasks that differ in eps only come one after the other
+_KEPT = 16  # systems cached by a worker: consecutive tasks often differ only in eps
 
 
 def document_text(file: SystemFile) -> str:
-    """What a system file says of its system, as canonical text; what the catalogue adds about it is left out."""
+    """Return the content of a system file as canonical text, without the entries for the catalogue."""
     return canonical({key: value for key, value in file.document.items() if key != "catalog"})
 
 
@@ -45,17 +46,17 @@ ENDINGS = (".toml", ".ode")  # of system files
 
 
 def find_file(reference: str, folder: Path) -> SystemFile:
-    """The system of a name of the catalogue or of a path ending in .toml or .ode, which is relative to `folder`."""
+    """Return the system for a name of the catalogue, or for a path ending in .toml or .ode, relative to `folder`."""
     if reference.endswith(ENDINGS):
         return load(folder / reference)
-    # Any other path would give its system a name with folders in it, and another one on every machine.
+    # Any other path would give its system a name with folders in it, different on every machine.
     if reference not in names() and ("/" in reference or os.path.exists(reference)):
         raise InputError(f"found {show(reference)}, expected a name of the catalogue or a path that ends in .toml")
     return load(reference)
 
 
 def spec_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
-    """The recipe of a system file, with its own parameters; its document joins `documents`."""
+    """Return the spec of a system file with its own parameters, and add its document to `documents`."""
     text = document_text(file)
     key = digest(text)
     documents[key] = text
@@ -64,7 +65,7 @@ def spec_of(file: SystemFile, documents: dict[str, str]) -> dict[str, Any]:
 
 
 def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The recipe of a random member drawn with these values of `FAMILY` and this seed.
+    """Return the spec of a random member with these values of the options in `FAMILY` and this seed.
 
     >>> family_spec({"m": 3, "seed": 7, "eps": "1/10"})
     {'family': {'draw': 'eigenvalues', 'size': 2, 'm': 3, 'seed': 7}}
@@ -75,15 +76,15 @@ def family_spec(values: Mapping[str, Any]) -> dict[str, Any]:
     return {"family": {"draw": draw, "size": size, **given, "seed": values.get("seed", 0)}}
 
 
-def system_from(recipe: Mapping[str, Any], document: Callable[[str], str]) -> SystemFile:
-    """The system of a recipe. `document` gives the text of a document by its digest.
+def system_from(spec: Mapping[str, Any], document: Callable[[str], str]) -> SystemFile:
+    """Return the system of a spec; `document` returns the text of a document from its digest.
 
     >>> system_from({"family": {"draw": "generic", "m": 2, "seed": 1}}, {}.__getitem__).name
     'random member, generic, m = 2, seed 1'
     """
-    if "family" in recipe:
-        return _drawn(canonical(recipe["family"]))
-    return _read(document(recipe["document"]), canonical(recipe["parameters"]))
+    if "family" in spec:
+        return _random_system(canonical(spec["family"]))
+    return _read(document(spec["document"]), canonical(spec["parameters"]))
 
 
 @lru_cache(_KEPT)
@@ -92,20 +93,20 @@ def _read(text: str, parameters: str) -> SystemFile:
 
 
 @lru_cache(_KEPT)
-def _drawn(text: str) -> SystemFile:
-    recipe = json.loads(text)
-    seed, m, size = recipe["seed"], recipe.get("m"), recipe.get("size")
-    if recipe.get("chi"):
-        member = random_member_with_chi(parse_chi(recipe["chi"]), seed, size or 1)
-    elif recipe.get("eigenvalues"):
-        member = random_member_with_eigenvalues(FAMILY["eigenvalues"].make(recipe["eigenvalues"]), seed, size or 2)
+def _random_system(text: str) -> SystemFile:
+    spec = json.loads(text)
+    seed, m, size = spec["seed"], spec.get("m"), spec.get("size")
+    if spec.get("chi"):
+        member = random_member_with_chi(parse_chi(spec["chi"]), seed, size or 1)
+    elif spec.get("eigenvalues"):
+        member = random_member_with_eigenvalues(FAMILY["eigenvalues"].make(spec["eigenvalues"]), seed, size or 2)
     elif m is None:
         raise InputError("a random member of the family needs m, eigenvalues or chi")
-    elif recipe["draw"] == "generic":
+    elif spec["draw"] == "generic":
         member = random_member(m, seed, size or 1)
     else:
         member = random_member_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
-    if recipe.get("signs"):
-        member = FamilyMember(member.A, member.H, FAMILY["signs"].make(recipe["signs"]))
-    how = f", {recipe['draw']}" if recipe["draw"] != "eigenvalues" else ""
+    if spec.get("signs"):
+        member = FamilyMember(member.A, member.H, FAMILY["signs"].make(spec["signs"]))
+    how = f", {spec['draw']}" if spec["draw"] != "eigenvalues" else ""
     return SystemFile.from_member(member, f"random member{how}, m = {member.m}, seed {seed}")

@@ -1,14 +1,14 @@
-"""Tasks on a dask cluster that is running already: groups of them go out, records come back.
+"""Tasks on an existing dask cluster, to which they are sent in groups.
 
     python -m kahanmaps.experiments.running.cluster < group.json
 
-is what a worker of dask runs for a group, by the standard library's `subprocess.run`: nothing of ours is needed on the
-scheduler or inside the workers, and a task that dies takes nothing with it. The input is {"documents": {DIGEST: TEXT},
-"jobs": [{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]}; every job gives one line, its record, as soon as
-it is there, and the exit status is 0 whatever the tasks did. A group is a few seconds of work, since the scheduler
-needs about as long for a millisecond as for an hour.
+is the command that a dask worker runs for a group by `subprocess.run`. So neither the scheduler nor the worker
+processes import kahanmaps, and a crashing task does not affect them. The input is {"documents": {DIGEST: TEXT}, "jobs":
+[{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]}; the record of every job is printed on a line as soon as
+it is finished, and the exit status is 0 whatever the outcomes. A group takes a few seconds, since the scheduler has a
+constant overhead for each group.
 
-Nothing here touches the database: a record is handed back by `wait`, once, and is safe when the caller has stored it.
+This module does not access the database: `wait` returns each record once, and the caller stores it.
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ from kahanmaps.experiments.running.local import GROUP_SECONDS, TAIL, TRIES, Loca
 from kahanmaps.processes import end_with_parent
 
 MODULE = "kahanmaps.experiments.running.cluster"
-PASSED_ON = ("KAHANMAPS_TASKS", "PYTHONPATH")  # variables that mean the same to the workers as to us
+PASSED_ON = ("KAHANMAPS_TASKS", "PYTHONPATH")  # environment variables that are passed on to the workers
 
-START_UP = 60.0  # seconds a group may take beyond the limits of its jobs, on a cold and busy worker,
+START_UP = 60.0  # seconds that a group may take in addition to the limits of its jobs, on a busy worker,
 START_UP_OF_A_JOB = 5.0  # and for each job in it
 LARGEST_GROUP = 200  # jobs
-UNFIT_AFTER = 3  # groups that ended by themselves without a record, when there has never been one
+UNFIT_AFTER = 3  # groups that ended by themselves without a record, while no group has printed one
 FETCH = 30.0  # seconds to fetch the output of a group that has ended
-LOOK_EVERY = 2.0  # seconds between two looks at who the workers are
+LOOK_EVERY = 2.0  # seconds between two counts of the workers
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
 
 
 class ClusterLost(KahanmapsError):
-    """The scheduler is gone, or has dropped what was asked of it. What was recorded before is safe."""
+    """Raised when the scheduler is gone or has dropped groups. Records that were stored are safe."""
 
 
 class WorkersUnfit(ClusterLost):
-    """Raised when the set-up is wrong: the workers cannot run tasks at all, whichever these are."""
+    """Raised when the workers cannot run any task, since their installation is wrong."""
 
 
 class ClusterWorkers(Executor):
@@ -66,12 +66,12 @@ class ClusterWorkers(Executor):
     certificates are those of dask's own configuration. dask's parties unpickle what they are sent, so each of them can
     run code on all others: scheduler and workers have to be trusted, and closed to everybody else.
 
-    `command` is what a worker runs for a group, by default this module with the interpreter `python`, which the workers
-    have to find at the same path as we do. A group takes about `group_seconds`, by what the last tasks of the same kind
-    took, and has at most 200 jobs. `on_message` gets messages about what is being waited for.
+    `command` is the command that a worker runs for a group, by default this module with the interpreter `python`, which
+    must have the same path on the workers. A group takes about `group_seconds`, estimated from the last tasks of the
+    same kind, and has at most 200 jobs. `on_message` is called with messages about waiting.
 
-    At most two groups for each thread of the workers are under way, so that memory here does not depend on the number
-    of tasks. What a group leaves undone is tried a few times more, each job alone, before it is lost.
+    At most two groups for each thread of the workers are in flight, so that the memory used here does not depend on the
+    number of tasks. A job without a record is run again a few times, in a group of its own, before it is lost.
     """
 
     def __init__(
@@ -89,15 +89,15 @@ class ClusterWorkers(Executor):
         self._documents = documents
         self._group_seconds = group_seconds
         self._talk = on_message or (lambda text: None)
-        # `env=` of subprocess.run would replace all that the worker has instead.
+        # `env=` of subprocess.run would replace the whole environment of the worker.
         passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
         self._command = ["/usr/bin/env", *passed, *(command or [python or sys.executable, "-m", MODULE])]
-        self._tries: dict[str, int] = {}  # of the jobs in flight, by key: how often each alone has failed
+        self._tries: dict[str, int] = {}  # of the jobs in flight, by key: failed attempts of the job alone
         self._open: list[Job] = []
-        self._again: deque[Job] = deque()  # to be tried alone
+        self._again: deque[Job] = deque()  # to be run alone
         self._groups: dict[Any, list[Job]] = {}  # futures at the scheduler
-        self._means: dict[str, float] = {}  # seconds of a task, by kind, over the last ones
-        self._unfit: set[str] | None = set()  # jobs of groups that ended by themselves; None: a record has come
+        self._means: dict[str, float] = {}  # mean seconds of recent tasks by kind
+        self._unfit: set[str] | None = set()  # jobs of groups that ended by themselves; None: some record was printed
         self._unfit_groups = 0
         self._client = connect(address, connect_seconds)
         self._results = import_module("distributed").as_completed(loop=self._client.loop)
@@ -112,38 +112,38 @@ class ClusterWorkers(Executor):
 
     @property
     def in_flight(self) -> int:
-        """How many jobs have been submitted and not yet handed back."""
+        """The number of jobs submitted whose records have not been returned."""
         return len(self._tries)
 
     def submit(self, job: Job) -> None:
-        """Take a job into the open group, which is sent when it is full, or by `wait` when a worker might idle."""
+        """Add a job to the open group, which is sent when it is full, or by `wait` when a worker might be idle."""
         if job.task.key in self._tries:
             raise InputError(f"task {job.task.key} is in flight already: submit it again when its record is back")
         self._tries[job.task.key] = 0
         self._open.append(job)
-        # A kind of task of which nothing is known takes a whole group's time.
+        # A task of unknown duration fills a group.
         seconds = sum(self._means.get(job.task.kind, self._group_seconds) for job in self._open)
         if len(self._open) >= LARGEST_GROUP or seconds >= self._group_seconds:
             self._send_open()
 
     def wait(self, timeout: float) -> list[Record]:
-        """Records that are ready, as soon as there is one, or none after `timeout` seconds.
+        """Return the finished records as soon as there is one, or none after `timeout` seconds.
 
-        Raises ClusterLost when the scheduler is gone, and WorkersUnfit when groups end by themselves one after the
-        other, those of every job in flight among them, and none has ever printed a record.
+        Raises ClusterLost when the scheduler is gone, and WorkersUnfit when several groups have ended by themselves,
+        including those of all jobs in flight, and none has printed a record.
         """
         deadline = time.monotonic() + timeout
         while True:
             while self._again and len(self._groups) < self._window:
                 self._send([self._again.popleft()])
-            # If every thread has a group waiting for it, there is time to fill the open one.
+            # While every thread has a waiting group, the open group can be filled further.
             if len(self._groups) < self._window:
                 self._send_open()
             while not (is_ready := self._results.has_ready()) and time.monotonic() < deadline and self._is_connected:
                 time.sleep(0.01)
             futures = self._results.next_batch(block=False) if is_ready else []
             self._look()
-            records = [record for future in futures if self._is_connected for record in self._taken(future)]
+            records = [record for future in futures if self._is_connected for record in self._collect(future)]
             if records or (self._is_connected and time.monotonic() >= deadline):
                 return records
             if not self._is_connected:
@@ -153,12 +153,12 @@ class ClusterWorkers(Executor):
                 )
 
     def close(self) -> None:
-        """End at once, whether or not the scheduler is still there; it and its workers stay. May be called twice.
+        """Close the connection; the scheduler and its workers keep running. May be called twice.
 
-        What is in flight is forgotten. Groups that a worker has begun are not killed, since a running call cannot be
-        taken back: they go on to their end, and their results are dropped.
+        Jobs in flight are dropped. Groups that a worker has begun cannot be stopped: they run to their end, and their
+        results are ignored.
         """
-        # A scheduler that is gone must not hold us up, and there is nothing to be done about its last words.
+        # A lost scheduler must not block us, and its errors do not matter any more.
         with suppress(Exception), warnings.catch_warnings(action="ignore"):
             self._client.close(timeout=2)
         self._tries.clear()
@@ -166,7 +166,7 @@ class ClusterWorkers(Executor):
 
     @property
     def _window(self) -> int:
-        """How many groups may be at the scheduler: one that runs and one that waits for each thread."""
+        """The number of groups allowed at the scheduler: a running and a waiting one for each thread."""
         return max(2, 2 * self._threads)
 
     @property
@@ -174,11 +174,11 @@ class ClusterWorkers(Executor):
         return self._lost is None and self._client.status == "running"
 
     def _look(self) -> None:
-        """Count the workers' threads now and then, and say once when there are none."""
+        """Count the threads of the workers from time to time, and report once that there are none."""
         if not self._is_connected or time.monotonic() - self._looked < LOOK_EVERY / (1 if self._threads else 4):
             return
         self._looked = time.monotonic()
-        with suppress(Exception):  # a scheduler that is lost meanwhile
+        with suppress(Exception):  # the scheduler may be lost meanwhile
             self._threads = sum(self._client.nthreads().values())
             if not self._threads and not self._is_reported:
                 self._talk(f"waiting for workers: the scheduler at {self.address} has none")
@@ -190,11 +190,11 @@ class ClusterWorkers(Executor):
             self._send(jobs)
 
     def _send(self, jobs: list[Job]) -> None:
-        """Hand a group to the scheduler. A lost scheduler is reported by `wait`."""
+        """Submit a group to the scheduler. A lost scheduler is reported by `wait`."""
         documents = {name: self._documents(name) for job in jobs for name in job.task.documents}
         group = {"documents": documents, "jobs": [{"task": j.task.text, "limits": asdict(j.limits)} for j in jobs]}
         times = [job.limits.time for job in jobs]
-        # The limits of a task are kept by the command: this is for a command that hangs.
+        # The command enforces the limits of tasks: this timeout is for a command that hangs.
         timeout = None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
         # distributed warns of arguments beyond 10 MB: a single document may be as large.
         with warnings.catch_warnings(action="ignore"):
@@ -214,24 +214,24 @@ class ClusterWorkers(Executor):
         self._groups[future] = jobs
         self._results.add(future)
 
-    def _taken(self, future: Any) -> list[Record]:
-        """The records that a group has printed; jobs without one are put up for another try, alone, or lost."""
-        left = {job.task.key: job for job in self._groups[future]}
-        is_alone = len(left) == 1
+    def _collect(self, future: Any) -> list[Record]:
+        """Return the records that a group has printed; its other jobs will be run again alone, or are lost."""
+        unfinished = {job.task.key: job for job in self._groups[future]}
+        is_alone = len(unfinished) == 1
         output: Any
         try:
             output = future.result(timeout=FETCH)
             message = f"the worker's command {ending(output.returncode)}"
             message += " and no record" if output.returncode == 0 else ""
             is_unfit = output.returncode >= 0
-        except TimeoutError:  # the worker has died with the output, and the scheduler has the command run again
+        except TimeoutError:  # the worker has died with the output, and the scheduler runs the command again
             self._results.add(future)
             return []
         except subprocess.TimeoutExpired as error:
             output, is_unfit = error, False
             message = f"the worker's command did not end within {error.timeout:g} s"
         except Exception as error:
-            if future.status != "error":  # no error of the command's, but of the way to it
+            if future.status != "error":  # the error is not one of the command, but of the connection
                 self._lost = self._lost or on_one_line(error)
                 return []
             output, is_unfit = None, "KilledWorker" not in type(error).__name__
@@ -243,9 +243,9 @@ class ClusterWorkers(Executor):
         failures: list[tuple[Job, Record]] = []
         for line in (getattr(output, "stdout", None) or b"").split(b"\n"):
             record = record_on(line)
-            if record is None or record.key not in left:  # a record that is printed twice is handed back once
+            if record is None or record.key not in unfinished:  # a record that is printed twice is returned once
                 continue
-            job = left.pop(record.key)
+            job = unfinished.pop(record.key)
             self._unfit = None
             if record.outcome is Outcome.LOST:
                 self._tries[record.key] += 1
@@ -255,12 +255,13 @@ class ClusterWorkers(Executor):
             self._means[job.task.kind] += (record.seconds - mean) / 10
             records.append(record)
         stderr = (getattr(output, "stderr", None) or b"").decode(errors="replace")[-TAIL:]
-        for key, job in left.items():
+        for key, job in unfinished.items():
             self._tries[key] += is_alone
             failures.append((job, Record(key, Outcome.LOST, message=message, stderr=stderr)))
-        if left and is_unfit and self._unfit is not None:
-            # A missing installation must not be told as thousands of lost tasks, nor one deadly task as the former.
-            self._unfit |= left.keys()
+        if unfinished and is_unfit and self._unfit is not None:
+            # A missing installation must not be reported as thousands of lost tasks, nor a crashing task as a
+            # missing installation.
+            self._unfit |= unfinished.keys()
             self._unfit_groups += 1
             if self._unfit_groups >= UNFIT_AFTER and self._tries.keys() <= self._unfit:
                 command = " ".join(self._command)
@@ -278,7 +279,7 @@ class ClusterWorkers(Executor):
 
 
 def record_on(line: bytes) -> Record | None:
-    """The record on a line; None if it is something else, such as the half of one."""
+    """Return the record on a line of output; None if the line is something else, such as an incomplete record."""
     if not line.startswith(b"{"):
         return None
     try:
@@ -288,13 +289,13 @@ def record_on(line: bytes) -> Record | None:
 
 
 def on_one_line(error: BaseException | None) -> str:
-    """An exception on one line."""
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+    """Return the type and the message of an exception on one line."""
+    message = " ".join(str(error).split())
+    return f"{type(error).__name__}: {message}" if message else type(error).__name__
 
 
 def connect(address: str, timeout: float) -> Any:
-    """A client of the scheduler, whose log is silent; or InputError with a sentence."""
+    """Return a client of the scheduler, without log output. Raises InputError if it does not answer."""
     try:
         client = import_module("distributed").Client  # which takes a second to import
     except ModuleNotFoundError as error:
@@ -303,7 +304,7 @@ def connect(address: str, timeout: float) -> Any:
         ) from None
     path, chosen = Path(address), address
     if "://" not in address and (path.is_file() or address.endswith(".json")):
-        # distributed would wait for the file for ever.
+        # distributed would wait forever for a missing file.
         try:
             chosen = str(json.loads(path.read_text(encoding="utf-8"))["address"])
         except OSError as error:
@@ -314,20 +315,20 @@ def connect(address: str, timeout: float) -> Any:
         raise InputError(
             f"{address!r} is not the address of a scheduler: write tcp://host:port, or the path of a scheduler file"
         )
-    for name in list(logging.Logger.manager.loggerDict):  # each of them has a handler of its own
+    for name in list(logging.Logger.manager.loggerDict):  # each logger has its own handler
         if name.split(".")[0] in ("distributed", "tornado"):
             logging.getLogger(name).disabled = True
     made: Future[Any] = Future()
 
     def make() -> None:
         try:
-            # Of other versions of some package: our tasks are the standard library's, whose version may differ.
+            # It warns of different versions of packages, which do not matter: workers only run a command.
             with warnings.catch_warnings(action="ignore"):
                 made.set_result(client(chosen, timeout=timeout, set_as_default=False, name="kahanmaps"))
         except BaseException as error:
             made.set_exception(error)
 
-    # In a thread: distributed itself waits for ever where something listens that is no scheduler.
+    # In a thread: distributed waits forever if another service listens at the address.
     Thread(target=make, daemon=True).start()
     try:
         return made.result(timeout + 1)
@@ -342,9 +343,9 @@ def connect(address: str, timeout: float) -> Any:
 
 
 def do_group(source: IO[str], target: IO[str]) -> None:
-    """Do the jobs that `source` describes, one after the other.
+    """Run the jobs in the JSON text of `source` one after the other, and write their records to `target`.
 
-    A job whose process is killed from outside is lost at once: whoever has sent it tries it again, elsewhere maybe.
+    A job whose process is killed from outside is lost at once: the sender runs it again, perhaps on another worker.
     """
     group = json.load(source)
     workers = LocalWorkers(1, group["documents"].__getitem__, tries=1)
@@ -362,7 +363,7 @@ def do_group(source: IO[str], target: IO[str]) -> None:
 if __name__ == "__main__":
     end_with_parent(os.getppid())
     if hasattr(select, "poll"):
-        # The parent may have died before it could be known who that is: then nobody reads.
+        # The parent may have died before getppid was called: then the pipe has no reader.
         reader = select.poll()
         reader.register(sys.stdout.fileno(), 0)
         if any(events & select.POLLERR for _, events in reader.poll(0)):

@@ -1,7 +1,7 @@
-"""Running tasks: jobs in, records out. What becomes of the records is not decided here.
+"""The loop that runs jobs and yields their records.
 
-    for record in run("study.toml", jobs=2): ...                 nothing is kept
-    for record in run("study.toml", "results.db", jobs=2): ...   a record is in the database before it is yielded
+    for record in run("study.toml", jobs=2): ...                 nothing is stored
+    for record in run("study.toml", "results.db", jobs=2): ...   each record is stored before it is yielded
 
 `Batch` is the loop itself, for any jobs and any executor.
 """
@@ -18,16 +18,17 @@ from kahanmaps.experiments.results.store import Planned, Store
 from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
-_TICK = 0.1  # seconds after which an interrupt is noticed, and it is said that nothing has come
-_SHARED = 4  # times as long as the last list took to be written, records go to the same list
+_TICK = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
+_SHARED = 4  # records are collected for so many times the time that the last list took to be written
 GRACE = 10.0  # seconds that tasks in flight have after an interrupt
 
 
 class Batch:
-    """Iterate over it for lists of records as they come in; at least ten a second, some of them empty.
+    """An iterable of lists of records as they arrive: at least ten lists a second, some of them empty.
 
-    Writing waits for the disk. So short tasks share a list for four times as long as writing the last one took, which
-    is milliseconds. Whoever writes a list down before asking for the next one loses at most that and what is in flight.
+    Since writing waits for the disk, records of short tasks are collected in one list for four times as long as the
+    last list took to be written. A caller that stores each list before the next loses at most one list and the tasks in
+    flight.
     """
 
     def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE) -> None:
@@ -39,17 +40,17 @@ class Batch:
 
     @property
     def was_interrupted(self) -> bool:
-        """Whether the end was requested."""
+        """Whether `interrupt` was called."""
         return self._until is not None
 
     def interrupt(self) -> None:
-        """Hand out nothing more, and give up what is not done within the grace (safe in a signal handler)."""
+        """Submit no further jobs, and abandon those that need more than `grace` seconds (safe in a signal handler)."""
         self._until = time.monotonic() + self._grace
 
     def __iter__(self) -> Iterator[list[Record]]:
         executor, took = self._executor, 0.0
         try:
-            self._hand_out()
+            self._submit_jobs()
             while executor.in_flight:
                 if self._until is not None and time.monotonic() > self._until:
                     self.abandoned = executor.in_flight
@@ -57,9 +58,9 @@ class Batch:
                 records = executor.wait(_TICK)
                 end = time.monotonic() + _SHARED * took
                 while records and executor.in_flight and time.monotonic() < end:
-                    self._hand_out()
+                    self._submit_jobs()
                     records += executor.wait(max(0.0, end - time.monotonic()))
-                self._hand_out()
+                self._submit_jobs()
                 began = time.monotonic()
                 yield records
                 if records:
@@ -67,7 +68,7 @@ class Batch:
         finally:
             executor.close()
 
-    def _hand_out(self) -> None:
+    def _submit_jobs(self) -> None:
         while self._until is None and self._executor.is_free:
             job = next(self._jobs, None)
             if job is None:
@@ -76,7 +77,7 @@ class Batch:
 
 
 def plan(spec: Spec, store: Store) -> dict[str, Planned]:
-    """Plan every experiment of a spec in a store; what was done before stays done."""
+    """Plan all experiments of a spec in a store; earlier results are kept."""
     return {
         experiment.name: store.plan(
             experiment.name,
@@ -98,10 +99,11 @@ def executor_for(
     group_seconds: float = GROUP_SECONDS,
     on_message: Callable[[str], None] | None = None,
 ) -> Executor:
-    """`jobs` child processes here, or the workers of a dask scheduler ("tcp://host:port" or its scheduler file).
+    """Return an executor: `jobs` local worker processes, or the workers of a dask `scheduler`.
 
-    Short tasks are done in groups of about `group_seconds`. `python` is the interpreter on the workers, if it is
-    another one; `on_message` gets messages about what the cluster is waiting for.
+    The scheduler is given as "tcp://host:port" or by its scheduler file. Short tasks are run in groups of about
+    `group_seconds`. `python` is the interpreter on the workers, if it differs from this one; `on_message` gets messages
+    about what the cluster is waiting for.
     """
     if scheduler is None:
         return LocalWorkers(jobs, documents, group_seconds=group_seconds)
@@ -120,13 +122,13 @@ def run(
     shard: tuple[int, int] = (1, 1),
     retry_failed: bool = False,
 ) -> Iterator[Record]:
-    """Do the tasks of a spec and yield their records as they come in.
+    """Run the tasks of a spec and yield their records as they finish.
 
     `spec` is a path, the text of a spec (anything with a line break), or a Spec. With `db`, a path, tasks that have
-    a record there are not done again, and every record is in the database before it is yielded; without, nothing is
-    kept. `jobs` children work at a time, or those of a dask `scheduler`. `only` names experiments, `shard` = (i, n) is
-    the i-th of n parts, `retry_failed` does failed tasks again. A task that is killed from outside at every try is
-    yielded as lost, and stays without a record in `db`. Closing the generator kills what is in flight.
+    a record there are not run again, and every record is stored before it is yielded; without it, nothing is stored.
+    `jobs` worker processes run at a time, or those of a dask `scheduler`. `only` names experiments, `shard` = (i, n) is
+    the i-th of n parts, and `retry_failed` runs failed tasks again. A task that is killed from outside at every attempt
+    is yielded as lost, and has no record in `db`. Closing the generator kills the tasks in flight.
 
     Raises SpecError, StoreError.
 
@@ -151,7 +153,7 @@ def run(
 
 
 def _jobs(spec: Spec, names: Sequence[str], shard: tuple[int, int]) -> Iterator[Job]:
-    """The tasks of a spec, each once, in order; the keys of those that have come are kept."""
+    """Yield the jobs of a spec in order, each task once."""
     seen = set()
     part, parts = shard
     chosen = [experiment for experiment in spec.experiments if experiment.name in names]

@@ -11,7 +11,7 @@ from flint import fmpq
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.maps.convention import eps_told
+from kahanmaps.maps.convention import eps_suffix
 from kahanmaps.maps.implicit import MapFamily
 
 _CLOSES_WITHIN = 64  # points of an orbit, about as many as the search for relations of a low degree uses
@@ -42,7 +42,7 @@ class Search(PrintableResult):
         """The comment of a system file that formulas hold at one eps only; empty where the formulas contain eps."""
         if self.eps is None:
             return []
-        step = eps_told(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
+        step = eps_suffix(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
         return [f"# for eps = {self.eps} only{step}: check with --eps {self.eps}"]
 
 

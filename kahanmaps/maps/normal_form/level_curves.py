@@ -121,17 +121,19 @@ class LevelCubic:
     """
 
     def __init__(self, block: PlanarBlock, numerator: Any, denominator: Any, zero: Triple) -> None:
-        self.block, self.above, self.below, self.zero = block, numerator, denominator, zero
+        self.block, self.numerator, self.denominator, self.zero = block, numerator, denominator, zero
         self._opposite = self.third(zero, zero)
 
     def gradient(self, P: Triple) -> Triple:
         """The three derivatives at P of F = below h - above W (W^2 + D)."""
         (U, V, W), (p, q, r), block = P, self.block.D, self.block
-        along = self.above * W
+        along = self.numerator * W
         return (
-            self.below * ((3 * block.a * U + 2 * block.b * V) * U + block.c * V * V) - along * (2 * p * U + q * V),
-            self.below * (block.b * U * U + (2 * block.c * U + 3 * block.d * V) * V) - along * (q * U + 2 * r * V),
-            -self.above * (3 * W * W + p * U * U + q * U * V + r * V * V),
+            self.denominator * ((3 * block.a * U + 2 * block.b * V) * U + block.c * V * V)
+            - along * (2 * p * U + q * V),
+            self.denominator * (block.b * U * U + (2 * block.c * U + 3 * block.d * V) * V)
+            - along * (q * U + 2 * r * V),
+            -self.numerator * (3 * W * W + p * U * U + q * U * V + r * V * V),
         )
 
     def third(self, P: Triple, Q: Triple) -> Triple:

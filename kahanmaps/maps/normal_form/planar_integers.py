@@ -26,7 +26,7 @@ IntegerTriple = tuple[fmpz, fmpz, fmpz]
 
 
 class LevelBlock(ABC):
-    """One plane with a start in it: what its level is, and whether that is special."""
+    """A plane with an initial point: its level, and whether that is special."""
 
     block: PlanarBlock
     start: Triple
@@ -55,7 +55,7 @@ class LevelBlock(ABC):
         return bool(self.delta == 0 or self.delta == 1)
 
     def triples(self) -> Iterator[Triple]:
-        """P_0, P_1, ... in the shortest form, as long as there is a value."""
+        """Yield P_0, P_1, ... as primitive triples, up to the first indeterminacy point."""
         point = self.start
         while True:
             yield point
@@ -68,7 +68,7 @@ class LevelBlock(ABC):
     @staticmethod
     @abstractmethod
     def shortest(triple: Triple) -> Triple:
-        """The triple of the same point that is kept."""
+        """Return the normalized triple of the same point."""
 
 
 class IntegerBlock(LevelBlock):
@@ -93,7 +93,7 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer with exactly the primes for which the content rule does not speak (not for disc(h) = 0)."""
+        """An integer whose prime factors are the primes to which the content rule does not apply (disc(h) != 0)."""
         assert self.level is not None
         return radical(6 * self.block.discriminant, self.level.q)
 
@@ -120,7 +120,7 @@ class IntegerBlock(LevelBlock):
 
     @property
     def primes(self) -> list[fmpz]:
-        """Numbers with primes at which a sum of coordinates may cancel that does not elsewhere."""
+        """Numbers that contain the primes at which a sum of coordinates may cancel."""
         assert self.level is not None
         return [self.level.q]
 
@@ -131,7 +131,7 @@ class IntegerBlock(LevelBlock):
 
     @staticmethod
     def fraction(triple: IntegerTriple) -> tuple[list[fmpz], fmpz, fmpz]:
-        """Numerators of U/W and V/W, the denominator, and 1: other planes may have more to say."""
+        """Return the numerators of U/W and V/W, the denominator, and 1."""
         return [triple[0], triple[1]], triple[2], fmpz(1)
 
     def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
@@ -162,10 +162,10 @@ class IntegerBlock(LevelBlock):
 
 
 class PlaneIntegers(Integers):
-    """Terms of tau functions over Q, and how points are put together from them."""
+    """Terms of tau functions over Q, and the construction of points from them."""
 
     def lifts(self, points: Sequence[Triple]) -> list[IntegerTriple]:
-        """Triples of rational numbers, times one integer."""
+        """Return triples of rational numbers multiplied by a common denominator."""
         return _cleared(points)
 
     def combined(

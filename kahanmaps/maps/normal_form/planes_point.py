@@ -36,11 +36,11 @@ _POWER = 3
 
 @dataclass(frozen=True)
 class _Row:
-    """A coordinate: the sum of (alpha_i U_i + beta_i V_i) / (below W_i) over the planes of `support`, with integers."""
+    """A coordinate: the sum of (alpha_i U_i + beta_i V_i)/(denominator W_i) over the planes of `support`."""
 
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
-    below: fmpz
+    denominator: fmpz
     fixed: fmpz
     dividing: tuple[int, ...]  # the planes whose h the form divides
 
@@ -82,21 +82,21 @@ class Assembly:
             numbers = [k for k, row in enumerate(self.rows) if row.support == support]
             table = [list(chain(*self.rows[k].forms)) for k in numbers]
             self.by_support[support] = numbers, fmpz_mat(len(table), len(table[0]), list(chain(*table)))
-        self.below = reduce(fmpz.lcm, (row.below for row in self.rows), fmpz(1))
+        self.denominator = reduce(fmpz.lcm, (row.denominator for row in self.rows), fmpz(1))
         zeros = [[fmpz(0)] * len(matrix[0]) for matrix in matrices]
         table_rows = []
         for row in self.rows:
-            forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.below // row.below
+            forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.denominator // row.denominator
             table_rows += [entry * factor for i, zero in enumerate(zeros) for entry in forms_by_plane.get(i, zero)]
         self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, over one denominator
         # By so many bits numerators may be longer than the products of the triples they are made of.
         largest = max(map(abs, table_rows))
-        self.excess = int(max(self.below.bit_length(), (self.dim * largest).bit_length()))
+        self.excess = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
         self.excess += sum(block.slack for block in blocks)
 
 
 class PlanesPoint:
-    """The point of R^{2m} with these primitive triples in the planes of an assembly."""
+    """A point of R^{2m}, given by primitive triples in the planes of an assembly."""
 
     def __init__(self, assembly: Assembly, triples: Sequence[Triple]) -> None:
         self._assembly = assembly
@@ -113,7 +113,7 @@ class PlanesPoint:
 
     @cached_property
     def _fractions(self) -> list[tuple[list[fmpz], fmpz, fmpz]]:
-        """In every plane numerators of the coordinates, their denominator, and primes that may cancel."""
+        """Return for each plane numerators of the coordinates, their denominator, and primes that may cancel."""
         return [block.fraction(triple) for block, triple in zip(self._assembly.blocks, self.triples, strict=True)]
 
     @property
@@ -129,7 +129,7 @@ class PlanesPoint:
         return self._height
 
     def exceeding(self, limit: int) -> int:
-        """The height if it is more than the limit, otherwise 0; a gcd is run only where that is needed to tell."""
+        """Return the height if it exceeds the limit, otherwise 0; a gcd is computed only if it is needed to decide."""
         if self.bits + self._assembly.excess <= limit:
             return 0
         return self.height if self.height > limit else 0
@@ -145,12 +145,12 @@ class PlanesPoint:
         return hash(tuple(abs(W) for _, _, W in self.triples if isinstance(W, fmpz)))
 
     def common(self) -> tuple[list[fmpz], fmpz]:
-        """Numerators of all coordinates over one denominator; what the W_i have in common is left in both."""
+        """Return numerators of all coordinates and a common denominator; common factors of the W_i remain."""
         column, product = _scaled([(numerators, W) for numerators, W, _ in self._fractions])
-        return (self._assembly.forms * column).entries(), self._assembly.below * product
+        return (self._assembly.forms * column).entries(), self._assembly.denominator * product
 
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
-        """Numerator and denominator of each coordinate, reduced, denominators positive."""
+        """Return numerator and denominator of each coordinate in lowest terms, denominators positive."""
         planes = [(numerator, W) for numerator, W, _ in self._fractions]
         suspects = fmpz(1)  # with all primes that divide two of the W
         *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest is only reduced
@@ -200,7 +200,9 @@ class PlanesPoint:
         for support, (numbers, forms) in self._assembly.by_support.items():
             column, product = _scaled([planes[i] for i in support])
             numerators = (forms * column).entries()
-            fractions |= {k: (entry, rows[k].below * product) for k, entry in zip(numbers, numerators, strict=True)}
+            fractions |= {
+                k: (entry, rows[k].denominator * product) for k, entry in zip(numbers, numerators, strict=True)
+            }
         return [fractions[k] for k in range(len(rows))]
 
     def rationals(self) -> tuple[fmpq, ...]:
@@ -241,7 +243,7 @@ class NormalSteps:
         self._eps = eps
 
     def blocks(self, start: Sequence[Any]) -> tuple[list[Block], Assembly]:
-        """The planes with the triples of the start, and the way back to x."""
+        """Return the planes, the triples of the initial point, and the conversion to x."""
         planes, scale = self.splitting.planes, 2 * self._eps
         blocks: list[Block] = []
         triples = self.splitting.triples([QQ.convert(entry) for entry in start])

@@ -48,7 +48,7 @@ class OverBudget(Exception):
 
 
 class OrbitInPlanes:
-    """The orbit of a start over Q, any iterate of it directly; no pole on the way goes unnoticed.
+    """The orbit of an initial point over Q, with direct access to its iterates; poles at earlier steps are detected.
 
     Every plane has triples of integers or short elements of Z[t], and points from tables of psi and chi.
     """
@@ -129,14 +129,14 @@ class OrbitInPlanes:
             target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
 
     def _point(self, n: int) -> PlanesPoint:
-        """Phi^n(start), poles on the way passed over. Raises SingularStep at a pole."""
+        """Return Phi^n(start), ignoring poles at earlier steps. Raises SingularStep if step n is a pole."""
         triples = [_reached(block, plane.reduced(n)) for block, plane in zip(self._blocks, self._planes, strict=True)]
         if any(W == 0 for _, _, W in triples):
             raise _no_value(n - 1)
         return PlanesPoint(self._assembly, triples)
 
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
-        """The first step up to n without a value; `value` is the n-th, to be compared modulo a prime."""
+        """Return the first undefined step up to n; `value` is the n-th point, to be compared modulo a prime."""
         known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
         busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
         generator = random.Random()
@@ -200,7 +200,7 @@ class _Plane:
                 self.pole = pole.step
 
     def reduced(self, n: int) -> int:
-        """A step with the same point."""
+        """Return a smaller step with the same point."""
         return n if self.period is None else n % self.period
 
 
@@ -213,7 +213,7 @@ class _Pole(SingularStep):
 
 
 def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
-    """P_n over a field, one step after the other. Raises _Pole."""
+    """Return P_n over a field, computed step by step. Raises _Pole."""
     point = start
     for k in range(n):
         U, V, W = block.image(point)
@@ -224,7 +224,7 @@ def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
 
 
 def _reached(block: Block, n: int) -> Triple:
-    """P_n; poles on the way are passed over, unless it has to be stepped. Raises SingularStep then."""
+    """Return P_n, ignoring poles at earlier steps; where steps are needed, a pole raises SingularStep."""
     if n <= _SINGLE_STEPS or block.is_constant or block.level is None:
         points = list(islice(tau.triples(block), n + 1))
         if len(points) <= n:
@@ -243,7 +243,7 @@ def _reached(block: Block, n: int) -> Triple:
 
 
 def _steps_modulo(block: Block, n: int, residue: Callable[[Any], nmod]) -> tuple[int | None, Triple]:
-    """P_n modulo a prime, or the first step at which W vanishes there."""
+    """Return P_n modulo a prime, or the first step at which W vanishes modulo the prime."""
     cubic = block.block
     modulo = PlanarBlock(*map(residue, (cubic.a, cubic.b, cubic.c, cubic.d)))
     point: Triple = tuple(map(residue, block.start))  # type: ignore[assignment]  # of three

@@ -18,7 +18,7 @@ Point = tuple[Poly, Poly] | None
 
 
 class _Divisor(Exception):
-    """A proper divisor of the modulus. Attribute: `divisor`."""
+    """Raised with a proper divisor of the modulus. Attribute: `divisor`."""
 
     def __init__(self, divisor: Poly) -> None:
         self.divisor = divisor
@@ -32,14 +32,14 @@ class _Torsion:
         self.f, self.c, self.A = f, c % f, A
 
     def inverse(self, value: Poly) -> Poly:
-        """1/value. Raises _Divisor."""
+        """Return 1/value. Raises _Divisor."""
         common, inverse, _ = value.xgcd(self.f)
         if common.degree() > 0:
             raise _Divisor(common)
         return inverse % self.f
 
     def add(self, P: Point, Q: Point) -> Point:
-        """P + Q. Raises _Divisor."""
+        """Return P + Q. Raises _Divisor."""
         if P is None or Q is None:
             return Q if P is None else P
         (X, Y), (Z, T), f = P, Q, self.f
@@ -56,7 +56,7 @@ class _Torsion:
 
 
 def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> Any:
-    """n P for n >= 0 in the group with this sum and zero."""
+    """Return n P for n >= 0 in the group with this sum and zero."""
     total = zero
     for bit in bin(n)[2:]:
         total = add(total, total)
@@ -112,7 +112,7 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
 
 
 class _DivisionPolynomials:
-    """psi_n for odd n, psi_n / (2y) for even n, as polynomials in x."""
+    """Return psi_n for odd n, psi_n / (2y) for even n, as polynomials in x."""
 
     def __init__(self, x: Poly, c: Poly, A: Any, B: Any) -> None:
         xx = x * x

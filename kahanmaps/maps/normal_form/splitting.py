@@ -1,4 +1,4 @@
-"""The planes into which the normal form splits over a field, and the way from a point to its planes and back.
+"""The planes into which the normal form splits over a field, and the conversion of points to planes and back.
 
 Over Q there is one plane for each irreducible factor g of chi, with coordinates in Q[t]/g; over GF(p) one for each
 factor of chi modulo p, with coordinates in GF(p^deg g); over real balls one for each real root and one, with complex
@@ -87,7 +87,7 @@ class Splitting:
         return [list(row) for row in zip(*self._matrices[plane], strict=True)]
 
     def triples(self, x: Sequence[Any]) -> list[Triple]:
-        """The homogeneous coordinates (2 eps u : 2 eps v : 1) of a point in every plane."""
+        """Return the homogeneous coordinates (2 eps u : 2 eps v : 1) of a point in every plane."""
         n, m = self.dim, self.form.m
         if len(x) != n:
             raise InputError(f"found a point with {len(x)} coordinates, expected {n}")
@@ -101,7 +101,7 @@ class Splitting:
             return triples
 
     def point(self, triples: Sequence[Triple]) -> tuple[Any, ...]:
-        """The point with these homogeneous coordinates. Raises SingularStep where one of them is at infinity."""
+        """Return the point with these homogeneous coordinates. Raises SingularStep if one of them is at infinity."""
         with self.field.working():
             total = [self.field.zero] * self.dim
             for plane, (U, V, W), columns in zip(self.planes, triples, self._matrices, strict=True):
@@ -114,7 +114,7 @@ class Splitting:
 
 
 def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
-    """The planes over Q or GF(p), one for each irreducible factor of chi."""
+    """Return the planes over Q or GF(p), one for each irreducible factor of chi."""
     p = field.characteristic
     chi: Any
     elements: Any
@@ -134,7 +134,7 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
         return ring([fmpz(int(c)) for c in coefficients]) if p else fmpq_poly(list(coefficients))
 
     def planes_of(factor: Any) -> tuple[Plane, list[list[Any]]]:
-        """The plane of a factor, and the coefficients in K of its basis: what is that there and 0 in the others."""
+        """Return the plane of a factor, and the coefficients in K of its basis, which is 0 in the other planes."""
         degree, generator = int(factor.degree()), polynomial([0, 1])
         context: Any = None
         residue: Any
@@ -185,7 +185,7 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
 
 
 def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
-    """The monic irreducible factors over Q: linear ones by increasing root, then by degree and coefficients."""
+    """Return the monic irreducible factors over Q: linear ones by increasing root, then by degree and coefficients."""
     factors = [factor / factor.leading_coefficient() for factor, _ in chi.factor()[1]]
     return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
 

@@ -49,7 +49,7 @@ def triples(block: Any) -> Iterator[Triple]:
 
 
 def iterate(block: Any, n: int) -> Triple | None:
-    """P_n, primitive, up to sign, for n >= 0; None where the sequences do not apply, so that one has to step.
+    """Return the primitive triple P_n up to sign, n >= 0; None if the sequences do not apply and steps are needed.
 
     That is where the cubic is singular, T has small order, or n is small. Poles on the way are passed over.
     """
@@ -66,7 +66,7 @@ def iterate(block: Any, n: int) -> Triple | None:
 
 
 def table_near(block: Any) -> TauTable | None:
-    """The table for a base point P_0, P_1 or P_2 around which no value is zero; None where there is none.
+    """Return the table for a base point P_0, P_1 or P_2 around which no value is zero; None if there is none.
 
     chi_n can vanish for one n only, unless T is a torsion point. Near a pole there are no natural lifts.
     """
@@ -95,7 +95,7 @@ def _over(triple: Triple, denominator: Any) -> Triple:
 
 
 def first_chi(P: Mapping[int, Triple], indices: Iterable[int]) -> dict[int, Any]:
-    """chi_n for some n from -2 to 4, from natural lifts of the points around P_0."""
+    """Return chi_n for some n from -2 to 4, from natural lifts of the points around P_0."""
     rows = {-2: (-2, -1, 1), -1: (-2, 0, 1), 0: (-1, 0, 1), 1: (-1, 0, 2), 2: (-1, 1, 2), 3: (0, 1, 2), 4: (0, 1, 3)}
     values = {n: determinant(*(P[k] for k in rows[n])) for n in indices}
     return {n: value if n % 3 else 3 * value for n, value in values.items()}

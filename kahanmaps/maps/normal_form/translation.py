@@ -30,7 +30,7 @@ _STEPPED = 16  # up to this n one steps
 
 
 class NoTranslation(Exception):
-    """Doublings do not apply to this orbit: it must be computed step by step."""
+    """Raised if doublings do not apply to an orbit, which must be computed step by step."""
 
 
 def iterate(
@@ -110,7 +110,7 @@ def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
 
 
 def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
-    """P_0, P_1, ..., P_last: natural lifts as soon as there are two. Raises SingularStep at a pole."""
+    """Return P_0, P_1, ..., P_last, natural lifts from the second point on. Raises SingularStep at a pole."""
     points = list(points)
     for k in range(len(points) - 1, last):
         U, V, W = block.image(points[k])
@@ -124,7 +124,7 @@ def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: 
 
 
 def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]) -> Triple:
-    """The n-th point of an orbit on a line, from its first four, for a projective map of the line."""
+    """Return the n-th point of an orbit of a projective map of a line, from its first four points."""
     P, Q = points[0], points[1]
     if same_point(P, Q):
         return P
@@ -157,7 +157,7 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
 
 
 def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> Triple | None:
-    """P_n relative to the third of five consecutive points, n > 0; None where a value vanishes that should not."""
+    """Return P_n relative to the third of five consecutive points, n > 0; None if a divisor vanishes."""
     P = dict(zip(range(-2, 3), points, strict=False))
     chi = first_chi(P, range(-1, 3))
     if any(is_zero(value) for value in chi.values()):
@@ -179,7 +179,7 @@ def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[A
 
 
 def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[Any, Any] | None:
-    """(x, Y) of n T, n > 0; None for zero. The digits of n are odd ones from -3 to 3, with zeros between."""
+    """Return (x, Y) of n T, n > 0, None for zero, by an expansion of n with odd digits from -3 to 3 and zeros."""
     # With x + shift for x the curve is Y^2 = x^3 + c x + ...
     one, shift, c = gamma / gamma, 3 + gamma, -3 * (gamma - 1) * (gamma - 9)
     table = {1: (shift, 8 * gamma), 3: (shift - 32 * one / 9, 224 * one / 27 - 8 * gamma)}
@@ -204,7 +204,7 @@ def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[
 
 
 def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
-    """2^count times the point (x, y), None for zero. Sums instead of multiples: for FLINT's numbers they are faster."""
+    """Return 2^count times the point (x, y), None for zero. It uses sums: FLINT is slower with multiples."""
     try:
         for _ in range(count):
             square = x * x
@@ -236,7 +236,7 @@ def _digits(n: int) -> list[tuple[int, int]]:
 def _doubled(
     block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
 ) -> Triple | None:
-    """P_n relative to the fourth of seven consecutive points, n >= 8; None where a value is zero that divides."""
+    """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor vanishes."""
     # Lifts that are natural around this base point: the first two of them decide the rest.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):

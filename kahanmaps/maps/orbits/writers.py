@@ -18,7 +18,7 @@ from typing import IO, Any
 from kahanmaps.algebra.printing import csv_line, guarded
 from kahanmaps.atomic_files import atomic_write, open_append, write_atomically
 from kahanmaps.errors import InputError
-from kahanmaps.maps.convention import eps_words
+from kahanmaps.maps.convention import eps_record_suffix
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.version import __version__
 
@@ -243,7 +243,7 @@ def title(header: Mapping[str, Any]) -> str:
     """Return the title line of an orbit: system, eps, arithmetic, algebraic numbers, direction."""
     t = "t = " if header["arithmetic"] == "exact" else ""
     return (
-        f"# {header['system']}{eps_words(header)}, {header['arithmetic']} arithmetic"
+        f"# {header['system']}{eps_record_suffix(header)}, {header['arithmetic']} arithmetic"
         + "".join(f", {t if name != 't' else ''}{name} = {root}" for name, root in header.get("algebraic", {}).items())
         + (f" ({header['kernel']})" if "kernel" in header else "")
         + (", backward" if header["direction"] == "backward" else "")

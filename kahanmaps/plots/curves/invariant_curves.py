@@ -1,13 +1,13 @@
-"""A Kahan map of the family as a product: in each plane of its normal form the orbit, and the cubic that carries it.
+"""The orbits of a Kahan map of the family in the planes of its normal form, and the invariant cubics that contain them.
 
-What is drawn is computed here, `plot_invariant_curves.py` draws it. At a real root of chi the plane is real, and its
+The data are computed here, and plotted by `plot_invariant_curves.py`. At a real root of chi the plane is real, and its
 coordinates (u, v) are symplectic: those in which h = kappa (u^3 - 3 u v^2), if h has three real lines, or h =
 kappa (u^3 + 3 u v^2), if it has one; if h has a repeated factor they are those of `family show --normal-form`. A pair
 of complex roots has one plane with complex coordinates, those of the normal form at the root with positive imaginary
 part.
 
-The steps are taken in floating point of 256 bits, so that all digits that can be drawn are right. What comes
-closer to infinity than 2^96 counts as a pole, and ends the orbit.
+Steps are computed in floating-point numbers of 256 bits, so that all plotted digits are correct. A point closer to
+infinity than 2^-96 counts as a pole, and ends the orbit.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.plots.curves.plane_cubics import COMPLEX, Matrix, PlaneCubic, symmetric_coordinates, transformed
 
 MAX_POINTS = 1_000_000
-MAX_STARTS = 7  # as many colors as there are
+MAX_STARTS = 7  # the number of colors
 BITS = 256
 _POLE_BITS = 96
 _PROGRESS_EVERY = 2_000  # steps
@@ -53,11 +53,11 @@ class PlaneOrbit:
 
 @dataclass(frozen=True, eq=False)
 class InvariantPlane:
-    """One plane of the normal form: its root of chi, as a number and as text, and one orbit for each start.
+    """One plane of the normal form: its root of chi, as a number and as text, and one orbit for each initial point.
 
-    `h` are the coefficients of the cubic in the coordinates (u, v), complex where the root is; `shape` says what h is:
+    `h` are the coefficients of the cubic in the coordinates (u, v), complex if the root is; `shape` is the form of h,
     one of the constants of `plane_cubics`. `index` is the number of the plane in its splitting, `block` its map in
-    the coordinates (u, v), and `matrix` leads to them from those of the splitting.
+    the coordinates (u, v), and `matrix` the matrix that transforms coordinates of the splitting to (u, v).
     """
 
     index: int
@@ -71,16 +71,16 @@ class InvariantPlane:
 
     @property
     def is_real(self) -> bool:
-        """Whether the root is real, so that there is a curve to be drawn."""
+        """Whether the root is real, so that the plane has a curve to plot."""
         return self.root.imag == 0
 
 
 @dataclass(frozen=True, eq=False)
 class InvariantCurves:
-    """The planes of a member, real ones by increasing root; the orbits of all starts in them.
+    """The planes of a member, real ones by increasing root, with the orbits of all initial points.
 
-    `poles[k]` is the step at which the orbit of the k-th start has no value, None if all of `steps` were taken.
-    `originals[k]` holds the orbit in the variables, a row for each step.
+    `poles[k]` is the step at which the k-th orbit reaches a pole, None if all `steps` were taken. `originals[k]` is the
+    orbit in the original variables, with a row for each step.
     """
 
     variables: tuple[str, ...]
@@ -99,17 +99,17 @@ def find_invariant_curves(
     steps: int,
     progress: Callable[[str], None] = lambda _: None,
 ) -> InvariantCurves:
-    """The orbits of some starts, plane by plane, and the cubics on which they move.
+    """Compute the orbits of some initial points in all planes, and the cubics that contain them.
 
-    `starts` are exact points of the system, `eps` is exact, half the time step. A system that is not declared as a
-    member of the family is taken where an A is found for its Hamiltonian. Raises HypothesisError where there is no
-    normal form: no member, or chi has a repeated root; InputError for wrong sizes.
+    `starts` are exact points of the system, `eps` is half the time step (exact). A system that is not declared as a
+    member of the family is accepted if it is recognised as one. Raises HypothesisError if there is no normal form,
+    since the system is not a member or chi has a repeated root; InputError for invalid sizes.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = find_invariant_curves(load("paper_m2"), [[1, 0, "1/2", 0]], "1/20", 100)
-    >>> [plane.root_text for plane in found.planes], found.poles
+    >>> curves = find_invariant_curves(load("paper_m2"), [[1, 0, "1/2", 0]], "1/20", 100)
+    >>> [plane.root_text for plane in curves.planes], curves.poles
     (['1', '2'], (None,))
-    >>> orbit = found.planes[0].orbits[0]
+    >>> orbit = curves.planes[0].orbits[0]
     >>> bool(abs(orbit.cubic.value(np.array([orbit.u[9], orbit.v[9]]))) < 1e-12)
     True
     """
@@ -151,9 +151,8 @@ def find_invariant_curves(
                 curves.append(_cubic(frame, first, epsilon) if frame.is_real else None)
             orbits = [(u[:length], v[:length]) for u, v in orbits]
             runs.append([PlaneOrbit(u, v, cubic) for (u, v), cubic in zip(orbits, curves, strict=True)])
-            original = np.zeros(
-                (length, splitting.dim)
-            )  # the orbit in the variables of the system, a row for each step
+            # The orbit in the variables of the system, with a row for each step.
+            original = np.zeros((length, splitting.dim))
             for frame, (u, v) in zip(frames, orbits, strict=True):
                 a, b, c, d = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
                 old = [a * u + b * v, c * u + d * v]
@@ -162,14 +161,16 @@ def find_invariant_curves(
                 original += np.stack(parts, axis=1) @ columns.T
             originals.append(original)
             poles.append(pole)
-    planes = tuple(replace(frame, orbits=found) for frame, found in zip(frames, zip(*runs, strict=True), strict=True))
+    planes = tuple(
+        replace(frame, orbits=of_frame) for frame, of_frame in zip(frames, zip(*runs, strict=True), strict=True)
+    )
     return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), normal_form.text)
 
 
 def _frames(splitting: Splitting) -> list[InvariantPlane]:
-    """The planes, real ones by increasing root."""
+    """Return the planes without orbits, real ones by increasing root."""
     rational_roots = [-factor[0] / factor[1] for factor, _ in splitting.form.chi.factor()[1] if factor.degree() == 1]
-    found = []
+    frames = []
     for index, plane in enumerate(splitting.planes):
         root = plane.residue([arb(0), arb(1)])
         if isinstance(root, arb):
@@ -177,7 +178,7 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
             text = format_number(exact[0]) if exact else f"{float(root.mid()):.5g}"
             shape, matrix = symmetric_coordinates(plane.block)
         else:
-            # A ball around 0 is the only way in which 0 comes as the real part of a root that is not rational.
+            # If the ball contains 0, the real part is 0.
             real = 0.0 if root.real.contains(arb(0)) else float(root.real.mid())
             text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
             shape, matrix = COMPLEX, acb_mat([[1, 0], [0, 1]])
@@ -187,14 +188,16 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
             raise InputError(
                 "the normal form leaves the range of floating-point numbers: its coefficients are too large to draw"
             )
-        found.append(InvariantPlane(index, complex(_machine(root)), text, shape, h, PlanarBlock(*coefficients), matrix))
-    return sorted(found, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
+        frames.append(
+            InvariantPlane(index, complex(_machine(root)), text, shape, h, PlanarBlock(*coefficients), matrix)
+        )
+    return sorted(frames, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
 
 
 def _orbit(
     block: PlanarBlock, first: Triple, eps: fmpq, length: int, name: str, progress: Callable[[str], None]
 ) -> tuple[Numbers, Numbers]:
-    """u and v of `length` points, fewer of them where the map has a pole."""
+    """Return u and v of `length` points of an orbit, fewer if it reaches a pole."""
     P = first
     us, vs = [], []
     step = 2 * arb(eps)
@@ -207,7 +210,7 @@ def _orbit(
         vs.append(_machine(V / W / step))
         P = block.image(P)
         size = max(abs(entry) for entry in P)
-        # Where there is no value, even in projective space, the next step ends the orbit as a pole does.
+        # At an indeterminacy point the next step ends the orbit, as at a pole.
         P = (U, V, W * 0) if size == 0 else tuple((entry / size).mid() for entry in P)
         if k % _PROGRESS_EVERY == 0:
             progress(f"{name}, step {k}")
@@ -215,7 +218,7 @@ def _orbit(
 
 
 def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
-    """The curve through the start, its level given as a fraction of numbers of moderate size."""
+    """Return the curve through the initial point, with its level as a fraction of numbers of moderate size."""
     U, V, W = first
     step = 2 * arb(eps)
     u, v = U / W / step, V / W / step
@@ -238,5 +241,5 @@ def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
 
 
 def _machine(value: Any) -> Any:
-    """A ball as a floating-point number."""
+    """Convert a ball to a floating-point number."""
     return complex(float(value.real.mid()), float(value.imag.mid())) if isinstance(value, acb) else float(value.mid())

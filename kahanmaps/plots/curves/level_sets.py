@@ -1,7 +1,7 @@
-"""Level curves of a rational function in the plane, as accurate as points of orbits are.
+"""Level curves of a rational function in the plane, accurate to rounding errors.
 
-The level F = c of F = N/D is drawn as the zeros of N - c D, which has no poles: on a grid, then each vertex is moved to
-the curve by Newton's method.
+The level F = c of F = N/D is the zero set of N - c D, which has no poles. It is computed on a grid, and then each
+vertex is moved to the curve by Newton's method.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Levels = tuple[tuple[FloatArray, ...], ...]  # for each level the pieces of its 
 
 
 def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, ...]:
-    """The values at starts (n, dim), each once (equal up to rounding is equal), in order; poles are passed over."""
+    """Return the distinct finite values at initial points (n, dim) in increasing order, up to rounding errors."""
     values = np.sort(function(starts))
     kept: list[float] = []
     for value in values[np.isfinite(values)].tolist():
@@ -37,9 +37,9 @@ def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, 
 def level_curves(
     function: PointFunction, plane: Sequence[int], dim: int, levels: Sequence[float], window: Window
 ) -> Levels:
-    """The curves F = level in a window of the plane of two variables, given by their indices; none is no piece.
+    """Compute the curves F = level in a window of the plane of two variables, given by their indices.
 
-    Raises InputError where F depends on other variables than these two, and for more than 200 levels.
+    Raises InputError if F depends on other variables, and for more than 200 levels.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> circle = level_curves(point_function("x^2 + y^2", "xy"), (0, 1), 2, [1.0], ((-2, 2), (-2, 2)))
@@ -65,7 +65,7 @@ def level_curves(
         return function.parts(full)
 
     on_grid = parts(_grid(window)[-1])
-    found = []
+    curves = []
     for level in levels:
 
         def value(points: FloatArray, level: float = level) -> FloatArray:
@@ -73,16 +73,17 @@ def level_curves(
             return numerator - level * denominator
 
         with np.errstate(all="ignore"):
-            found.append(zero_curves(value, window, on_grid[0] - level * on_grid[1]))
-    return tuple(found)
+            curves.append(zero_curves(value, window, on_grid[0] - level * on_grid[1]))
+    return tuple(curves)
 
 
 def zero_curves(
     value: Callable[[FloatArray], FloatArray], window: Window, on_grid: FloatArray | None = None
 ) -> tuple[FloatArray, ...]:
-    """The curves in a window on which a function of points (..., 2) is 0: pieces, arrays (n, 2) of vertices.
+    """Compute the zero set of a function of points (..., 2) in a window: pieces of curves, arrays (n, 2) of vertices.
 
-    They are found on a grid, `on_grid` the values there if they are known, and each vertex is moved onto the curve.
+    The pieces are computed on a grid, and each vertex is moved onto the curve. `on_grid` are the values on the grid, if
+    they are known.
 
     >>> (circle,) = zero_curves(lambda x: (x**2).sum(axis=-1) - 1, ((-2, 2), (-2, 2)))
     >>> bool(np.allclose((circle**2).sum(axis=1), 1, rtol=1e-12))
@@ -110,7 +111,7 @@ def zero_curves(
                     ],
                     axis=-1,
                 )
-                scaled = gradient * mesh  # in units of the mesh, so that both axes count alike
+                scaled = gradient * mesh  # in units of the mesh, so that both axes have equal weight
                 moved = moved - (value(moved) / (scaled**2).sum(axis=-1))[:, None] * scaled * mesh
             good = np.isfinite(moved).all(axis=-1) & (np.abs(moved - line) <= mesh).all(axis=-1)
             good &= np.abs(value(moved)) <= np.abs(value(line))

@@ -1,11 +1,11 @@
-"""The level curves of a planar Kahan map, which are plane cubics, in coordinates in which these are symmetric.
+"""Level curves of a planar Kahan map, which are plane cubics, in coordinates in which they are symmetric.
 
 The Kahan map of u' = h_v, v' = -h_u, h = a u^3 + b u^2 v + c u v^2 + d v^3, conserves h/(1 + eps^2 D) with the Hessian
 determinant D = h_uu h_vv - h_uv^2, so an orbit stays on a cubic denominator * h = numerator * (1 + eps^2 D).
 
 A real binary cubic without repeated factor is, after a linear change of determinant 1, kappa (u^3 - 3 u v^2), which has
 three real lines at angles of 60 degrees, or kappa (u^3 + 3 u v^2), with one; kappa > 0. Its Hessian determinant is then
--36 kappa^2 (u^2 + v^2) or 36 kappa^2 (u^2 - v^2). So the Kahan maps of all such planes are, up to scale, just two.
+-36 kappa^2 (u^2 + v^2) or 36 kappa^2 (u^2 - v^2). Hence there are only two such Kahan maps up to scaling.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ Floats = NDArray[np.float64]
 class PlaneCubic:
     """The curve denominator * h = numerator * (1 + eps^2 D) in the plane.
 
-    `h` are the coefficients of the cubic, `eps` is half the time step. `numerator` = 0 is h = 0, lines through the
-    origin; `denominator` = 0 is the conic 1 + eps^2 D = 0 of the points that the map sends to infinity; both zero: no
-    level, as for a point where all the curves meet.
+    `h` are the coefficients of the cubic, `eps` is half the time step. `numerator` = 0 gives h = 0, lines
+    through the origin; `denominator` = 0 gives the conic 1 + eps^2 D = 0, which the map sends to infinity. Both are 0
+    at a base point, which lies on all curves.
 
     >>> circle = PlaneCubic((1.0, 0.0, -3.0, 0.0), 0.5, 1.0, 0.0)
     >>> round(circle.length, 12), bool(abs(circle.value(np.array([0, circle.length]))) < 1e-12)
@@ -47,32 +47,32 @@ class PlaneCubic:
         return 4 * p, 4 * q, 4 * r
 
     def h_at(self, u: Any, v: Any) -> Any:
-        """The value of h."""
+        """Return the value of h."""
         return PlanarBlock(*self.h).h(u, v)
 
     def D_at(self, u: Any, v: Any) -> Any:
-        """The value of D."""
+        """Return the value of D."""
         p, q, r = self.D
         return p * u * u + q * u * v + r * v * v
 
     @property
     def length(self) -> float:
-        """The distance from the origin at which the map changes its ways: that of 1 + eps^2 D = 0, where it is real."""
+        """The smallest distance from the origin to the conic 1 + eps^2 D = 0; 1 if the conic is empty."""
         t = np.linspace(0, np.pi, 721)
         largest = self.eps * self.eps * float(np.abs(self.D_at(np.cos(t), np.sin(t))).max())
         return float(1 / np.sqrt(largest)) if largest > 0 else 1.0
 
     def value(self, points: Floats) -> Floats:
-        """What is 0 on the curve, at points (..., 2)."""
+        """Return the values at points (..., 2) of the polynomial that vanishes on the curve."""
         u, v = np.moveaxis(points, -1, 0)
         return np.asarray(self.denominator * self.h_at(u, v) - self.numerator * (1 + self.eps**2 * self.D_at(u, v)))
 
     def value_in_space(self, angles: Floats, length: float) -> Floats:
-        """The same at points (..., 2) of half a sphere, which stand for lines through the origin of space.
+        """Return values at points (..., 2) of a half sphere, which represents the projective plane.
 
-        The first angle is the direction in the plane, the second that from the axis, a quarter of a turn at infinity:
-        (u, v) = length tan(second) (cos(first), sin(first)). Where the curve is only lines through the origin, or only
-        a conic, the origin and the line at infinity are left out.
+        The first angle is the direction in the plane, the second the angle from the axis, pi/2 at infinity:
+        (u, v) = length tan(second) (cos(first), sin(first)). If the curve consists of lines through the origin, or is a
+        conic, the factors that vanish at the origin and at infinity are omitted.
         """
         first, second = np.moveaxis(angles, -1, 0)
         x, y, w, r = np.cos(first), np.sin(first), np.cos(second), np.sin(second)
@@ -84,11 +84,11 @@ class PlaneCubic:
         return np.asarray(self.denominator * (length * r) ** 3 * self.h_at(x, y) - self.numerator * w * conic)
 
     def flow_through(self, u: float, v: float) -> PlaneCubic:
-        """The level curve of h itself through a point, on which the differential equation moves."""
+        """Return the level curve of h through a point, which is an orbit of the differential equation."""
         return PlaneCubic(self.h, 0.0, self.h_at(u, v), 1.0)
 
     def gradient(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """The derivatives of denominator h - numerator (1 + eps^2 D) along u and v."""
+        """Return the derivatives of denominator h - numerator (1 + eps^2 D) by u and v."""
         a, b, c, d = self.h
         p, q, r = (self.numerator * self.eps * self.eps * entry for entry in self.D)
         along_u = self.denominator * (3 * a * u * u + 2 * b * u * v + c * v * v) - 2 * p * u - q * v
@@ -103,32 +103,32 @@ THREE_LINES, ONE_LINE, REPEATED, ZERO = "kappa (u^3 - 3 u v^2)", "kappa (u^3 + 3
 
 
 def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
-    """The shape of the cubic, and the matrix of determinant 1 that takes (u, v) to the symmetric coordinates.
+    """Return the shape of the cubic and the matrix of determinant 1 from (u, v) to the symmetric coordinates.
 
-    The coefficients of the block are real balls; a discriminant that may be 0 counts as 0, where the matrix is I.
+    The coefficients of the block are real balls. A discriminant that may be 0 counts as 0, and then the matrix is I.
 
     >>> block = PlanarBlock(arb(0), arb(1), arb(1), arb(0))
     >>> shape, matrix = symmetric_coordinates(block)
     >>> shape, [round(float(entry), 3) + 0 for entry in transformed(block, matrix)]
     ('kappa (u^3 - 3 u v^2)', [0.31, 0.0, -0.931, 0.0])
     """
-    one = arb_mat([[1, 0], [0, 1]])
+    identity = arb_mat([[1, 0], [0, 1]])
     if all(coefficient.contains(arb(0)) for coefficient in (block.a, block.b, block.c, block.d)):
-        return ZERO, one
+        return ZERO, identity
     if block.discriminant.contains(arb(0)):
-        return REPEATED, one
+        return REPEATED, identity
     if block.discriminant > 0:
-        # D is negative definite: it is made -(u^2 + v^2) times a number, and the plane is turned.
+        # D is negative definite: transform it to a multiple of -(u^2 + v^2), then rotate the plane.
         p, q, r = (-entry for entry in block.D)
         size = (p * r - q * q / 4).sqrt()
         stretch = (p / size).sqrt()
         upright = arb_mat([[stretch, stretch * q / (2 * p)], [0, 1 / stretch]])
         # Now h is the real part of (a - i b/3) (u + i v)^3.
         a, b, _, _ = transformed(block, upright)
-        # atan2 of a ball across its cut would be all of -pi ... pi, so it is turned away from there.
+        # atan2 of a ball across its branch cut would be all of [-pi, pi], so the ball is rotated away from the cut.
         angle = (arb.atan2(-b / 3, -a) + arb.pi() if a < 0 else arb.atan2(b / 3, a)) / 3
         return THREE_LINES, arb_mat([[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]]) * upright
-    # D is a product of two real forms L and M, and h = s L^3 + t M^3, which are scaled alike and turned.
+    # D is a product of two real forms L and M, and h = s L^3 + t M^3; scale L and M so that s = t, then rotate.
     p, q, r = block.D
     root = (q * q - 4 * p * r).sqrt()
     slope = -(q + root) / 2 if not q < 0 else -(q - root) / 2
@@ -147,7 +147,7 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
 
 
 def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
-    """The coefficients of the cubic in new coordinates, the matrix (of determinant 1) times the old ones."""
+    """Return the coefficients of the cubic in the new coordinates: the matrix, of determinant 1, times the old ones."""
     f, g, k, l = matrix.entries()
     # u = l u' - g v', v = -k u' + f v'
     a, b, c, d = block.a, block.b, block.c, block.d

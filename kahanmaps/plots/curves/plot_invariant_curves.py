@@ -1,8 +1,7 @@
-"""Draws the planes of a member: in each the cubic and the orbit on it, every step in one color in all of them.
+"""Plots of the planes of a member: in each plane the orbit and its invariant cubic, colored by step.
 
-Dots of one color are the planar parts of one point. That each of them runs along its own curve, at its own pace, while
-the point itself wanders through a cloud, is the product structure. Shown is a window around most of the dots, or all of
-the projective plane as a disc.
+Dots of the same color are the projections of the same point to the planes. Each projection moves along its own curve,
+which shows that the map is a product. The window contains most of the dots, or the disc the whole projective plane.
 """
 
 from __future__ import annotations
@@ -27,34 +26,34 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _CURVE, _FLOW = "#9a9a9a", "#444444"
-_CROWDED = 0.06  # of the width of a panel: a number would cover the one before
-_NUMBERED = 4  # steps whose dots have their number beside them
+_CROWDED = 0.06  # of the width of a panel: a closer number would cover the previous one
+_NUMBERED = 4  # steps whose dots are numbered
 
 
 def plot_invariant_curves(
-    found: InvariantCurves,
+    curves: InvariantCurves,
     style: Style,
     projective: bool = False,
     flow: bool = False,
     original: tuple[int, int] | None = None,
     labels: Sequence[str] = (),
 ) -> Figure:
-    """One panel for each real plane, two for a complex one: the cubics and, on them, the orbits.
+    """Plot the cubics and the orbits on them, with one panel for each real plane and two for a complex one.
 
-    With `projective` a panel shows the whole projective plane as a disc, opposite points of whose rim are the same
-    point at infinity. `flow` adds the level curve of the differential equation through each start, dashed. `original`
-    are the numbers of two variables: a first panel shows the orbit in them, before it is taken apart. `labels` name the
-    starts where there are several. Raises InputError for numbers that are none of variables.
+    With `projective` a panel shows the whole projective plane as a disc; opposite points of its rim are the same point
+    at infinity. `flow` adds the level curve of the differential equation through each initial point, dashed. `original`
+    are the numbers of two variables: the first panel then shows the orbit in them. `labels` are the names of several
+    initial points. Raises InputError for invalid numbers of variables.
     """
-    if original is not None and not all(0 <= k < len(found.variables) for k in original):
-        raise InputError(f"found the variables {original}, expected two numbers from 0 to {len(found.variables) - 1}")
-    panels = panels_of(found)
+    if original is not None and not all(0 <= k < len(curves.variables) for k in original):
+        raise InputError(f"found the variables {original}, expected two numbers from 0 to {len(curves.variables) - 1}")
+    panels = panels_of(curves)
     count = len(panels) + (original is not None)
     columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 9 else 4
     letter = style.font_size * CENTIMETRES_PER_INCH / 72  # in centimetres
-    columns = min(columns, max(1, int(style.width / (12 * letter))))  # or letters fill the panels
+    columns = min(columns, max(1, int(style.width / (12 * letter))))  # narrower panels have no space for letters
     rows = ceil(count / columns)
-    # The panels are squares, with room for letters and a color bar.
+    # The panels are squares, with space for letters and a color bar.
     side = max(1.0, style.width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
     height = rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter
     with drawing(style):
@@ -64,25 +63,25 @@ def plot_invariant_curves(
         from matplotlib.ticker import MaxNLocator
 
         figure = new_figure(style, height / style.width)
-        steps = max(len(x) for x in found.originals) - 1
+        steps = max(len(x) for x in curves.originals) - 1
         # One orbit is colored by step, several have a color and a mark each.
-        pen = _Pen(Normalize(0, max(1, steps)) if len(found.originals) == 1 else None, style)
+        pen = _Pen(Normalize(0, max(1, steps)) if len(curves.originals) == 1 else None, style)
         grid = iter(figure.subplots(rows, columns, squeeze=False).flat)
         if original is not None:
             axes = next(grid)
-            clouds = [(x[:, original[0]], x[:, original[1]]) for x in found.originals]
-            x, y = (label_of(found.variables[k]) for k in original)
+            clouds = [(x[:, original[0]], x[:, original[1]]) for x in curves.originals]
+            x, y = (label_of(curves.variables[k]) for k in original)
             Rectangle.around(clouds).prepare(axes, (x, y))
             axes.set_title("orbit")
             for number, cloud in enumerate(clouds):
                 pen.orbit(axes, *cloud, number, None)
-        for place, plane, column in panels:
-            _draw_plane(next(grid), plane, column, place, projective, flow, pen)
+        for number_of_root, plane, column in panels:
+            _draw_plane(next(grid), plane, column, number_of_root, projective, flow, pen)
         for axes in grid:
             axes.remove()
         if pen.scale is None:
-            names = [labels[k] if k < len(labels) else f"start {k + 1}" for k in range(len(found.poles))]
-            ends = ["" if pole is None else f" (a pole at step {pole})" for pole in found.poles]
+            names = [labels[k] if k < len(labels) else f"start {k + 1}" for k in range(len(curves.poles))]
+            ends = ["" if pole is None else f" (a pole at step {pole})" for pole in curves.poles]
             handles = [
                 Line2D([], [], linestyle="none", marker=MARKS[k], color=COLORS[k], label=plain(name) + end)
                 for k, (name, end) in enumerate(zip(names, ends, strict=True))
@@ -91,7 +90,7 @@ def plot_invariant_curves(
         elif steps:
             how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
             bar = figure.colorbar(ScalarMappable(pen.scale, COLOR_MAP), ax=figure.axes, **how)
-            pole = found.poles[0]
+            pole = curves.poles[0]
             ending = "" if pole is None else f"; a pole at step {pole} ends the orbit"
             bar.set_label(f"step $n$ (rings mark steps 0 to {min(_NUMBERED - 1, steps)}{ending})")
             bar.outline.set_linewidth(0.4)
@@ -99,10 +98,10 @@ def plot_invariant_curves(
     return figure
 
 
-def panels_of(found: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
-    """The panels: the number of the root, the plane, and "uv" or, where it is complex, "u" and "v"."""
+def panels_of(curves: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
+    """Return the panels: the number of the root, the plane, and "uv", or "u" and "v" for a complex plane."""
     panels, number = [], 0
-    for plane in found.planes:
+    for plane in curves.planes:
         number += 1
         if plane.is_real:
             panels.append((str(number), plane, "uv"))
@@ -113,7 +112,7 @@ def panels_of(found: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
 
 
 class _Pen:
-    """How dots are drawn: by step with a `scale` of colors, where there is one orbit, otherwise by orbit."""
+    """The style of dots: colored by step with a `scale` for a single orbit, otherwise by orbit."""
 
     def __init__(self, scale: Any, style: Style) -> None:
         self.scale, self.style = scale, style
@@ -135,24 +134,24 @@ class _Pen:
             if np.any(np.hypot(*(places[:k] - places[k]).T) < _CROWDED):
                 continue
             aside = np.array([0.7, 0.7]) if normals is None else normals[k]
-            if np.any(np.abs(places[k] + 2 * _CROWDED * aside - 0.5) > 0.5):  # there is the edge of the panel
+            if np.any(np.abs(places[k] + 2 * _CROWDED * aside - 0.5) > 0.5):  # outside the panel
                 aside = -aside
             how = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
             write_beside(axes, str(k), (x[k], y[k]), tuple(8 * aside), 1.5, zorder=4, **how)
 
 
 def _draw_plane(
-    axes: Axes, plane: InvariantPlane, column: str, place: str, projective: bool, flow: bool, pen: _Pen
+    axes: Axes, plane: InvariantPlane, column: str, number_of_root: str, projective: bool, flow: bool, pen: _Pen
 ) -> None:
     view: Disc | Rectangle = Disc.of(plane, column) if projective else view_of(plane, column)
     if plane.is_real:
-        names = f"$u_{{{place}}}$", f"$v_{{{place}}}$"
-        axes.set_title(rf"$\lambda_{{{place}}} = {plane.root_text}$")
+        names = f"$u_{{{number_of_root}}}$", f"$v_{{{number_of_root}}}$"
+        axes.set_title(rf"$\lambda_{{{number_of_root}}} = {plane.root_text}$")
     else:
-        name = f"{column}_{{{place}}}"
+        name = f"{column}_{{{number_of_root}}}"
         names = rf"$\mathrm{{Re}}\,{name}$", rf"$\mathrm{{Im}}\,{name}$"
         root = f"{plane.root.real:.3g}" * (plane.root.real != 0) + rf" \pm {plane.root.imag:.3g}\,\mathrm{{i}}"
-        axes.set_title(rf"$\lambda_{{{place},{int(place) + 1}}} = {root}$")
+        axes.set_title(rf"$\lambda_{{{number_of_root},{int(number_of_root) + 1}}} = {root}$")
     view.prepare(axes, names)
     for orbit in plane.orbits:
         if orbit.cubic is None:
@@ -174,26 +173,26 @@ def _draw_plane(
 
 Cloud = tuple[Floats, Floats]
 
-_SHARE = 0.85  # of the dots: orbits come close to infinity again and again
-_CUT = 0.7390851  # a direction in which no nice form is zero
+_SHARE = 0.85  # of the dots: orbits repeatedly come close to infinity
+_CUT = 0.7390851  # a direction in which no form with simple coefficients vanishes
 _MARGIN = 0.08  # of the width, on either side, for the numbers beside the dots
 
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A window of the plane, and how many dots lie outside it."""
+    """A window of the plane, and the number of dots outside it."""
 
     window: Window
     outside: int
 
     @classmethod
     def of(cls, clouds: Sequence[Cloud], window: Window) -> Rectangle:
-        """This window, for these dots."""
+        """Return a window with the number of these dots outside it."""
         return cls(window, outside(np.concatenate([_rows(cloud) for cloud in clouds]), window))
 
     @classmethod
     def around(cls, clouds: Sequence[Cloud]) -> Rectangle:
-        """Where most dots are, all starts among them."""
+        """Return a window that contains most dots and all initial points."""
         points, starts = (
             np.concatenate(rows) for rows in zip(*((_rows(c), _rows(c)[:1]) for c in clouds), strict=True)
         )
@@ -203,35 +202,35 @@ class Rectangle:
 
     @property
     def stretch(self) -> float:
-        """How much longer a unit upwards appears than one to the right, inverted: what normals are scaled by."""
+        """The height of the window divided by its width, by which normals are scaled."""
         (left, right), (low, high) = self.window
         return (high - low) / (right - left)
 
     def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
-        """Limits and labels of the axes, which become a square."""
+        """Make the axes square, and set their limits and labels."""
         axes.set_box_aspect(1)
         axes.set(xlim=self.window[0], ylim=self.window[1], xlabel=names[0], ylabel=names[1])
         axes.locator_params(nbins=5)
 
     def place(self, x: Floats, y: Floats) -> Cloud:
-        """Where points are drawn."""
+        """Return the positions of points in the panel."""
         return x, y
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
-        """The pieces (n, 2) of a curve, as they are drawn."""
+        """Return the pieces (n, 2) of a curve in the panel."""
         return zero_curves(cubic.value, self.window)
 
 
 @dataclass(frozen=True)
 class Disc:
-    """The projective plane as half a sphere seen from above, infinity as its rim; `length` is that of 45 degrees."""
+    """The projective plane as a half sphere seen from above; its rim is at infinity; `length` is that of 45 degrees."""
 
     length: float
     stretch: float = 1.0
 
     @classmethod
     def of(cls, plane: InvariantPlane, column: str = "uv") -> Disc:
-        """The disc on whose circle of radius 1/sqrt(2) the map goes to infinity; by the dots, if there is none."""
+        """Return the disc scaled by the conic that the map sends to infinity, or by the dots if the conic is empty."""
         cubic = plane.orbits[0].cubic
         if cubic is not None and plane.shape != "0":
             return cls(cubic.length)
@@ -239,7 +238,7 @@ class Disc:
         return cls(float(np.median(sizes)) or 1.0)
 
     def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
-        """The rim, and no axes."""
+        """Draw the rim, and hide the axes."""
         from matplotlib.patches import Circle
 
         axes.set_aspect("equal")
@@ -248,13 +247,13 @@ class Disc:
         axes.add_patch(Circle((0, 0), 1, fill=False, linewidth=0.6, zorder=1))
 
     def place(self, x: Floats, y: Floats) -> Cloud:
-        """Where points are drawn."""
+        """Return the positions of points in the panel."""
         x, y = x / self.length, y / self.length
         radius = np.hypot(np.hypot(x, y), 1)
         return x / radius, y / radius
 
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
-        """The pieces (n, 2) of a curve, as they are drawn, from the rim to itself or closed."""
+        """Return the pieces (n, 2) of a curve in the panel, closed or from the rim to the rim."""
         turn = ((_CUT, _CUT + 2 * np.pi), (0.0, np.pi / 2))
         pieces = zero_curves(lambda angles: cubic.value_in_space(angles, self.length), turn)
         return tuple(
@@ -267,7 +266,7 @@ def _rows(cloud: Cloud) -> Floats:
 
 
 def clouds_of(plane: InvariantPlane, column: str = "uv") -> list[Cloud]:
-    """The dots of every orbit: (u, v), or in a complex plane the real and imaginary parts of the column "u" or "v"."""
+    """Return the dots of all orbits: (u, v), or in a complex plane the real and imaginary parts of u or v."""
     if plane.is_real:
         return [(orbit.u, orbit.v) for orbit in plane.orbits]
     values = [orbit.u if column == "u" else orbit.v for orbit in plane.orbits]
@@ -275,9 +274,9 @@ def clouds_of(plane: InvariantPlane, column: str = "uv") -> list[Cloud]:
 
 
 def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
-    """What is shown of a plane: where most dots are and, unless it is far away, the origin.
+    """Return the window of a plane: it contains most dots and, unless it is far away, the origin.
 
-    The origin is in the middle, and scales are equal along u and v, where the cubic has its threefold symmetry.
+    If the cubic has a threefold symmetry, the origin is in the middle, and scales are equal along u and v.
     """
     clouds = clouds_of(plane, column)
     ranges = []

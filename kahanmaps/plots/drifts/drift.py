@@ -1,6 +1,6 @@
-"""How far functions drift along float orbits of the Kahan map, and of other methods with the same time step.
+"""The drift of functions along float orbits of the Kahan map and of other methods with the same time step.
 
-The survey, and its picture: a panel for each function, a line for each method.
+The survey and its plot, with a panel for each function and a line for each method.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ _PROBE_STEPS = 1000
 
 @dataclass(frozen=True, eq=False)
 class DriftCurve:
-    """The error of one function along the orbit of one method: the largest in each bin of steps, and where it was.
+    """The error of a function along the orbit of a method: the maximum in each bin of steps, and its step.
 
-    An exact 0 is 0: all values of the bin were equal to that at the start. Bins without a value are left out;
-    `undefined` counts points of the orbit where the function has none.
+    The error is exactly 0 if all values in the bin are equal to the initial value. Bins without values are omitted;
+    `undefined` counts points of the orbit where the function is undefined.
     """
 
     method: str
@@ -71,10 +71,11 @@ class DriftCurve:
 
 @dataclass(frozen=True, eq=False)
 class DriftSurvey:
-    """The curves of all methods and functions; `relative` says for each function whether errors are relative to I(x_0).
+    """The curves of all methods and functions.
 
-    They are absolute where I(x_0) = 0. `labels` are what a picture calls the functions; `ends` says how the orbit of
-    each method ended; `eps` is exact, half the time step.
+    `relative` is true for functions whose errors are relative to I(x_0); they are absolute where I(x_0) = 0. `labels`
+    are the names of the functions in plots, `ends` has the end of the orbit of each method; `eps` is half the time step
+    (exact).
     """
 
     eps: fmpq
@@ -98,18 +99,17 @@ def survey_drift(
     linear_bins: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DriftSurvey:
-    """Errors |I(x_n) - I(x_0)|/|I(x_0)| of functions along the orbits of several methods, `steps` steps each.
+    """Compute errors |I(x_n) - I(x_0)|/|I(x_0)| of functions along the orbits of several methods, `steps` steps each.
 
-    Kept is the maximum over each of about 200 bins of steps, which are equally long or (by default) grow with n, so
-    memory does not grow with `steps`. `eps` (half the time step) and `start` are exact;
-    `methods` are names of METHODS, and "normal-form" needs `form`. Raises InputError for wrong values, and where a
-    function has no value at the start.
+    Only the maximum over each of about 200 bins of steps is stored; bins are equally long or (by default) grow with n.
+    `eps` (half the time step) and `start` are exact; `methods` are names of METHODS, and "normal-form" needs `form`.
+    Raises InputError for invalid values, and if a function is undefined at the initial point.
 
     >>> from kahanmaps.plots.drifts.drift_functions import known_functions
     >>> from kahanmaps.documents.catalog import load
     >>> top = load("euler_top")
-    >>> found = survey_drift(top.system, "1/10", [1, "1/2", "1/3"], 1000, known_functions(top, fmpq(1, 10)))
-    >>> [f"{curve.errors.max():.0e}" for curve in found.curves if curve.function == "(-F1 + 1)/eps^2"][1:]
+    >>> survey = survey_drift(top.system, "1/10", [1, "1/2", "1/3"], 1000, known_functions(top, fmpq(1, 10)))
+    >>> [f"{curve.errors.max():.0e}" for curve in survey.curves if curve.function == "(-F1 + 1)/eps^2"][1:]
     ['1e-02', '2e-03']
     """
     eps = rational(eps)
@@ -125,7 +125,7 @@ def survey_drift(
             f"found a start with {counted(len(point), 'coordinate')}, expected {system.dim}: "
             f"{', '.join(system.variables)}"
         )
-    origins: list[tuple[float, float]] = []  # the value at the start, and what errors are divided by
+    origins: list[tuple[float, float]] = []  # the initial value, and the divisor of errors
     relative: dict[str, bool] = {}
     for function in functions:
         exact, value = function.at(point), float(function(to_floats(point)[None])[0])
@@ -148,22 +148,22 @@ def survey_drift(
             orbit = ClassicalOrbit(system, eps, point, steps, method)
         bins = [_Bins(edges) for _ in functions]
         for step, points in orbit.portions():
-            if step:  # the start is where errors are 0 by definition
-                for function, (at_start, scale), held in zip(functions, origins, bins, strict=True):
+            if step:  # at step 0 errors are 0 by definition
+                for function, (at_start, scale), function_bins in zip(functions, origins, bins, strict=True):
                     with np.errstate(all="ignore"):
-                        held.add(step - len(points) + 1, np.abs(function(points) - at_start) / scale)
+                        function_bins.add(step - len(points) + 1, np.abs(function(points) - at_start) / scale)
             progress(f"{METHODS[method]}: step {step} of {steps}")
         ends[method] = orbit.end
-        curves += [held.curve(method, function.name) for function, held in zip(functions, bins, strict=True)]
+        curves += [b.curve(method, function.name) for function, b in zip(functions, bins, strict=True)]
     labels = {function.name: function.label for function in functions}
     return DriftSurvey(eps, point, steps, labels, relative, tuple(curves), ends)
 
 
 def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq, ...]:
-    """A random start with small rational coordinates, the same one for the same seed.
+    """Return a random initial point with small rational coordinates, determined by the seed.
 
-    The first of up to 40, smaller and smaller ones, from which RK4 gets through a thousand steps, if there is one:
-    elsewhere there is nothing to compare with. `eps` is half the time step.
+    It is the first of 40 candidates, decreasing in size, from which RK4 completes a thousand steps, so that methods can
+    be compared; the first candidate if there is none. `eps` is half the time step.
 
     >>> small_start(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]), "1/10")
     (1/2, 2/3)
@@ -183,15 +183,15 @@ def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq,
 
 
 def _edges(steps: int, linear: bool) -> NDArray[np.int64]:
-    """Where bins end: 0 = e_0 < e_1 < ... = steps; bin k holds the steps e_(k-1) < n <= e_k."""
+    """Return the ends of the bins: 0 = e_0 < e_1 < ... = steps; bin k holds the steps e_(k-1) < n <= e_k."""
     if steps <= BINS:
         return np.arange(steps + 1)
-    made = np.linspace(0, steps, BINS + 1) if linear else np.geomspace(1, steps, BINS)
-    return np.unique(np.concatenate(([0], np.rint(made).astype(np.int64), [steps])))
+    ends = np.linspace(0, steps, BINS + 1) if linear else np.geomspace(1, steps, BINS)
+    return np.unique(np.concatenate(([0], np.rint(ends).astype(np.int64), [steps])))
 
 
 class _Bins:
-    """The largest error in each bin so far."""
+    """The largest error so far in each bin."""
 
     def __init__(self, edges: NDArray[np.int64]) -> None:
         self._edges = edges
@@ -200,7 +200,7 @@ class _Bins:
         self._undefined = 0
 
     def add(self, first: int, errors: FloatArray) -> None:
-        """Errors at the steps first, first + 1, ...; NaN where there is none."""
+        """Add errors at the steps first, first + 1, ...; NaN if undefined."""
         missing = ~np.isfinite(errors)
         self._undefined += int(missing.sum())
         errors = np.where(missing, -1.0, errors)
@@ -211,23 +211,23 @@ class _Bins:
                 self._largest[bins[best]], self._where[bins[best]] = errors[best], first + best
 
     def curve(self, method: str, function: str) -> DriftCurve:
-        """What was found, bins without a value left out."""
+        """Return the curve of the largest errors, without empty bins."""
         kept = self._largest >= 0
         return DriftCurve(method, function, self._where[kept], self._largest[kept], self._undefined)
 
 
 SCALES = ("loglog", "semilog")
-_PANEL = 5.5  # centimetres that a panel needs beside another
+_PANEL = 5.5  # minimal width of a panel beside another, in centimetres
 _LOST = 1e3
-_NO_VALUES = (1e-17, 1e-15)  # the axis where everything is 0
+_NO_VALUES = (1e-17, 1e-15)  # limits of the axis if all errors are 0
 
 
 def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = "loglog") -> Figure:
-    """The errors of a survey against the step, logarithmic: a panel for each function, a line for each method.
+    """Plot the errors of a survey against the step, with a panel for each function and a line for each method.
 
-    `scale` is "loglog", or "semilog" with a linear axis of steps. An error of exactly 0 lies in a band marked 0 at the
-    bottom, an arrow at the top stands for errors beyond `clipped_from`. A cross ends the line of an orbit that ended
-    early, and the legend says where. Raises InputError for a scale of another name.
+    `scale` is "loglog", or "semilog" with a linear axis of steps. An error of exactly 0 is in a band marked 0 at the
+    bottom; an arrow at the top stands for errors above `clipped_from`. A cross ends the line of an orbit that ended
+    early, at the step given in the legend. Raises InputError for an unknown scale.
     """
     if scale not in SCALES:
         raise InputError(f"found the scale {scale[:40]!r}, expected {' or '.join(SCALES)}")
@@ -241,7 +241,7 @@ def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
         from matplotlib.lines import Line2D
 
         ended = {method: "" if end.is_whole else f" (ended at step {end.steps})" for method, end in survey.ends.items()}
-        labels = [METHODS[method] + word for method, word in ended.items()]
+        labels = [METHODS[method] + ending for method, ending in ended.items()]
         panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
         aspect = panel * rows + legend_height(labels, style, title=True)
         figure = new_figure(style, aspect)
@@ -291,12 +291,15 @@ def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
 
 
 def clipped_from(survey: DriftSurvey, name: str) -> float:
-    """The error of a function beyond which a picture shows no more: an arrow at the top stands for what is larger.
+    """Return the error of a function above which errors are not plotted, but shown as an arrow at the top.
 
-    A thousand, or ten times the largest error of methods that got through: what blows up would flatten all others.
+    It is a thousand, or ten times the largest error of the completed orbits if that is larger: a diverging orbit would
+    flatten all other curves.
     """
-    whole = [curve.errors for curve in survey.curves if curve.function == name and survey.ends[curve.method].is_whole]
-    return max([_LOST, *(10 * float(errors.max()) for errors in whole if len(errors))])
+    completed = [
+        curve.errors for curve in survey.curves if curve.function == name and survey.ends[curve.method].is_whole
+    ]
+    return max([_LOST, *(10 * float(errors.max()) for errors in completed if len(errors))])
 
 
 def _look(method: str) -> dict[str, Any]:

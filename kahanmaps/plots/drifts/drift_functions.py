@@ -1,4 +1,4 @@
-"""Functions whose drift is shown: integrals of the Kahan map with eps in them, and H of the differential equation."""
+"""Functions whose drift is plotted: integrals of the Kahan map, which depend on eps, and H of the vector field."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_NAME = 30  # characters
 
 
 class OfTheImage:
-    """An integral in which the image of the point under the Kahan map occurs: modified H, or one of the commutant."""
+    """An integral that depends on x and its image x~ under the Kahan map: the modified H, or one of the commutant."""
 
     def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
         self.name, self.label = function.name, label
@@ -41,7 +41,7 @@ class OfTheImage:
             self._values = lambda x, image: ((x @ matrix) * image).sum(axis=1) / to_float(eps)
 
     def at(self, start: Sequence[fmpq]) -> fmpq | None:
-        """The exact value, None where the Kahan map has none."""
+        """Return the exact value; None at an indeterminacy point of the Kahan map."""
         try:
             value: fmpq | None = self._function.value(QQ, self._eps, start)
         except SingularStep:
@@ -49,7 +49,7 @@ class OfTheImage:
         return value
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """The values, from one step of the Kahan map for all points together."""
+        """Return the values, computed with one step of the Kahan map for all points at once."""
         values = np.full(len(points), np.nan)
         good = np.isfinite(points).all(axis=1)
         if good.any():
@@ -58,8 +58,8 @@ class OfTheImage:
             ensemble.advance(1)
             image = np.where((ensemble.failed_at >= 0)[:, None], np.nan, ensemble.x)
             with np.errstate(all="ignore"):
-                found = self._values(x, image)
-            values[good] = np.where(np.isfinite(found), found, np.nan)
+                computed = self._values(x, image)
+            values[good] = np.where(np.isfinite(computed), computed, np.nan)
         return values
 
 
@@ -67,86 +67,92 @@ WatchedFunction = PointFunction | OfTheImage
 
 
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
-    """What the Kahan map of a system is known to conserve, by name, and H of the differential equation.
+    """Return the known integrals of the Kahan map of a system by name, and H of the differential equation.
 
-    The integrals that the file claims; the modified H of a cubic Hamiltonian; for a member of the family the integrals
-    of the commutant; and last the plain H, which the Kahan map does not conserve. `eps` is exact, half the time step.
+    These are the integrals claimed in the file; the modified H of a cubic Hamiltonian; for a member of the family the
+    integrals of the commutant; and last the plain H, which the Kahan map does not conserve. `eps` is half the time step
+    (exact).
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
     ['I1', 'I2', 'modified H', 'H~_1', 'H']
     """
-    found: dict[str, WatchedFunction] = {
+    functions: dict[str, WatchedFunction] = {
         name: PointFunction(name, function, eps) for name, function in file.integrals.items()
     }
     hamiltonian = file.hamiltonian
     if hamiltonian is not None and eps != 0:
-        found["modified H"] = OfTheImage(ModifiedHamiltonian(hamiltonian), eps, "modified $H$")
+        functions["modified H"] = OfTheImage(ModifiedHamiltonian(hamiltonian), eps, "modified $H$")
         if file.member is not None and hamiltonian.is_homogeneous and hamiltonian.is_standard:
             letter = "H" if all(sign > 0 for sign in file.member.signs) else "K"  # as in check-integrals
             for power in range(1, hamiltonian.dim // 2):
                 integral = CommutantIntegral(hamiltonian, file.member.A, power, letter)
-                found[integral.name] = OfTheImage(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
-    if hamiltonian is not None and "H" not in found:
-        found["H"] = PointFunction("H", _as_function(hamiltonian, hamiltonian.H), eps)
-    return found
+                functions[integral.name] = OfTheImage(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
+    if hamiltonian is not None and "H" not in functions:
+        functions["H"] = PointFunction("H", _as_function(hamiltonian, hamiltonian.H), eps)
+    return functions
 
 
 def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
-    """A choice of these without repetition: the claims of the file, or where there are none what follows; and H.
+    """Return the integrals claimed in the file, or if there are none those that follow from theorems; and H.
 
-    The claims are those of `measured_integrals`: a constant limit eps -> 0 would make their drift small by itself.
-    Raises InputError where nothing is known.
+    Claims are normalized by `measured_integrals`, since an integral with a constant limit as eps -> 0 has a small drift
+    in any case. Raises InputError if no integral is known.
     """
-    every = functions_of(file, eps)
-    every |= {
-        name: PointFunction(name, one, eps) for name, one in measured_integrals(file).items() if name not in every
+    functions = functions_of(file, eps)
+    functions |= {
+        name: PointFunction(name, integral, eps)
+        for name, integral in measured_integrals(file).items()
+        if name not in functions
     }
-    chosen = list(measured_integrals(file)) or [name for name in every if name != "H"]
-    if "H" in every:
+    chosen = list(measured_integrals(file)) or [name for name in functions if name != "H"]
+    if "H" in functions:
         chosen.append("H")
     if not chosen:
-        found = f"found no known integral of {file.name}, expected one"
+        problem = f"found no known integral of {file.name}, expected one"
         if file.integrals_in_iterates:
             names = ", ".join(file.integrals_in_iterates)
-            found = f"found only known integrals of {file.name} that contain x~ ({names}), expected others"
-        raise InputError(f"{found}: give --integral NAME=EXPR, an expression in the variables and eps")
-    return [every[name] for name in dict.fromkeys(chosen)]
+            problem = f"found only known integrals of {file.name} that contain x~ ({names}), expected others"
+        raise InputError(f"{problem}: give --integral NAME=EXPR, an expression in the variables and eps")
+    return [functions[name] for name in dict.fromkeys(chosen)]
 
 
 def requested_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
-    """The functions that (name, text) pairs ask for: "known", one of `functions_of` by name, or an expression.
+    """Return the functions requested by pairs (name, text): "known", a name in `functions_of`, or an expression.
 
-    Expressions may contain eps. Raises InputError for text that cannot be read, for a name that comes twice, and where
-    nothing is known.
+    Expressions may contain eps. Raises InputError for invalid text, for a repeated name, and if no integral is known.
     """
-    every = functions_of(file, eps)
-    found: list[WatchedFunction] = []
+    available = functions_of(file, eps)
+    functions: list[WatchedFunction] = []
     for name, text in requests:
         if text == "known" and not name:
-            found += known_functions(file, eps)
-        elif text in every and name in ("", text):
-            found.append(every[text])
+            functions += known_functions(file, eps)
+        elif text in available and name in ("", text):
+            functions.append(available[text])
         else:
             function = parse_rational_function(text, (*file.variables, "eps"), file.parameters)
-            found.append(PointFunction(name or text[:_MAX_NAME], function, eps))
-    names = [function.name for function in found]
+            functions.append(PointFunction(name or text[:_MAX_NAME], function, eps))
+    names = [function.name for function in functions]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"found two functions of the name {name}: write --integral NAME=EXPR")
-    return found
+    return functions
 
 
 def requested_function(file: SystemFile, eps: fmpq | None, text: str) -> WatchedFunction:
-    """One of `functions_of` by its name, or an expression; without `eps` none that contains it."""
+    """Return one of `functions_of` by its name, or an expression; without `eps` it must not contain eps."""
     known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps).get(text.strip())
     return requested_axis(file, eps, text) if known is None else known
 
 
 def requested_axis(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """The same, but for integrals in which the image of the point occurs: they are no rational functions in doubles."""
+    """Return a function as `requested_function`, but refuse integrals that depend on the image x~ of the point."""
     known = functions_of(file.real_approximation, fmpq(0) if eps is None else eps)
-    named = {name: one.function for name, one in known.items() if isinstance(one, PointFunction)}
+    named = {
+        name: known_function.function
+        for name, known_function in known.items()
+        if isinstance(known_function, PointFunction)
+    }
     return point_function(text.strip(), file.variables, eps, file.real_approximation.parameters, named)
 
 
