@@ -234,11 +234,15 @@ def rocq_certificate(
         claims: what is proved, each in a section of its own.
         header: lines of the comment on top.
     """
-    lines = ["(*", *(f"   {_comment(line)}" for line in header), "   Check: coqc FILE", "*)"]
+    # Nothing in a comment may end it, or begin another one or a string.
+    safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
+    lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
     theorems = []
     for k, claim in enumerate(claims, 1):
-        theorem = f"{_identifier(claim.name)}_{'conserved' if isinstance(claim, ConservedFunction) else 'invariant'}"
+        theorem = f"{re.sub(r'[^A-Za-z0-9_]', '_', claim.name)}_"
+        theorem = theorem if re.match("[A-Za-z]", theorem) else f"v_{theorem}"
+        theorem += "conserved" if isinstance(claim, ConservedFunction) else "invariant"
         theorem = theorem if theorem not in theorems else f"{theorem}_{k}"
         theorems.append(theorem)
         script = _Script(data)
@@ -295,13 +299,3 @@ def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int) -> str:
         factors += [] if any(exponents[dim : 2 * dim]) else ["det"]
         pieces.append(" * ".join([f"({coefficient})", *factors]))
     return " + ".join(pieces) or "0"
-
-
-def _identifier(name: str) -> str:
-    text = re.sub(r"\W", "_", name)
-    return text if re.match(r"[A-Za-z]", text) else f"v_{text}"
-
-
-def _comment(line: str) -> str:
-    """A line of a comment: nothing in it may end the comment, or begin another, or a string."""
-    return line.replace("(*", "( *").replace("*)", "* )").replace('"', "'")

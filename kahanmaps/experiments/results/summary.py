@@ -93,11 +93,15 @@ class Summary(HtmlDisplay):
         pieces += [("numbers", ["number", "n", "same", *_SHOWN.values()], lines)] if lines else []
         lines = [(*g.values, name, *cells.values()) for g in self.groups for name, cells in g.flags.items()]
         pieces += [("true or false", ["flag", "true", "false"], lines)] if lines else []
+
+        def cell(value: Any) -> str:
+            return f"{value:.{digits}g}" if isinstance(value, float) else shorten(plain(value), _MAX_WIDTH)
+
         return [
             SummaryTable(
                 title,
                 (*self.by, *columns),
-                tuple(tuple(_text(value, digits) for value in line) for line in lines),
+                tuple(tuple(cell(value) for value in line) for line in lines),
                 len(self.by) + (title != "tasks"),
             )
             for title, columns, lines in pieces
@@ -241,7 +245,3 @@ def _must_exist(name: str, known: set[str], what: str) -> None:
     listed = sorted(known)
     more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
     raise InputError(f"found the unknown name {quoted(name)}{meant} names {what}: {', '.join(listed[:_LISTED])}{more}")
-
-
-def _text(value: Any, digits: int) -> str:
-    return f"{value:.{digits}g}" if isinstance(value, float) else shorten(plain(value), _MAX_WIDTH)
