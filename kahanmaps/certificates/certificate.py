@@ -90,15 +90,17 @@ def certificate(
         except InputError as error:  # of all known claims those that are short enough
             if claims is not None:
                 raise
-            skipped.append(f"Not in this certificate: {name}: {error}")
+            skipped.append(f"{name}: {error}")
     if skipped and not proved:
-        raise InputError(skipped[0])
+        raise InputError(f"no certificate of {file.name} can be written: {skipped[0]}")
     if not proved:
         raise InputError(
             f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
             f"or search with kahanmaps find-integrals {file.name} --toml"
         )
-    return CHECKERS[checker](data, proved, [*formulas.header(command), *skipped])
+    return CHECKERS[checker](
+        data, proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
+    )
 
 
 def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, RationalFunction]]:

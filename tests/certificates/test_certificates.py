@@ -151,6 +151,7 @@ def test_a_density_that_is_not_invariant_has_no_certificate():
         ("lorenz", {"checker": "gp"}, "no integral or invariant volume form of lorenz is known: give --integral"),
         ("euler_top", {"checker": "coq"}, "expected the checker rocq, gp, sympy, got 'coq'"),
         ("euler_top", {"checker": "gp", "claims": ["F9"]}, "expected one of F1, F2, volume"),
+        ("paper_m3", {"checker": "gp"}, "no certificate of paper_m3 can be written: I1: the identities"),
         ("zander_120", {"checker": "gp", "claims": ["F"]}, "no claim 'F' of zander_120"),
     ],
 )
