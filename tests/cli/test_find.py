@@ -30,7 +30,7 @@ def without_claims(name):
         ("find-integrals euler_top --eps 1/3", "check-integrals --eps 1/3", 2),
         ("find-integrals volterra_periodic_4", "check-integrals", 3),
         pytest.param("find-integrals henon_heiles", "check-integrals", 1, marks=pytest.mark.slow),
-        pytest.param("find-integrals three_wave", "check-integrals --steps 2", 5, marks=pytest.mark.slow),
+        pytest.param("find-integrals three_wave", "check-integrals --steps 2", 3, marks=pytest.mark.slow),
         ("find-density dressing_chain_3 --symbolic b1,b2,b3", "check-measure -p b1=7", 1),
         ("find-density euler_top --eps 1/3", "check-measure --eps 1/3", 1),
         ("find-density henon_heiles", "check-measure --steps 3", 1),

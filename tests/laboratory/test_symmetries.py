@@ -153,7 +153,7 @@ def test_scalings_change_eps():
 def test_too_large_is_undecided_with_a_reason():
     many = linear_symmetries(QuadraticSystem.from_text([*"abcdefg"], [f"{v}^2" for v in "abcdefg"]))
     assert (many.order, many.complete) == (None, False)
-    assert "not all were tried" in many.undecided[0]
+    assert "not all signed permutations were tried" in many.undecided[0]
     names = [f"x{i}" for i in range(17)]
     large = linear_symmetries(QuadraticSystem.from_text(names, [f"{v}^2" for v in names]))
     assert [text.split(" are ")[0] for text in large.undecided] == ["infinitesimal symmetries", "signed permutations"]
