@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -17,14 +17,18 @@ from kahanmaps.certificates.identities import (
     map_data,
 )
 from kahanmaps.certificates.rocq import rocq_certificate
-from kahanmaps.certificates.scripts import pari_certificate, sympy_certificate
+from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
 from kahanmaps.checks.settings import claimed_functions
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.kahan import SystemLike
 
-CHECKERS = {"rocq": rocq_certificate, "gp": pari_certificate, "sympy": sympy_certificate}
+CHECKERS: dict[str, Callable[..., str]] = {
+    "rocq": rocq_certificate,
+    "gp": partial(script_certificate, GP),
+    "sympy": partial(script_certificate, PYTHON),
+}
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
 
 
@@ -117,8 +121,8 @@ def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Rati
                 term *= letter ** int(exponent)
             (image,) = [data.numerators[k] for k in range(n) if exponents[n + k]] or [data.determinant]
             total += term * image
-        below = function.denominator.compose(*letters[:n], *letters, ctx=context)
-        yield label.removeprefix("integral "), RationalFunction.reduced(total, below * data.determinant)
+        denominator = function.denominator.compose(*letters[:n], *letters, ctx=context)
+        yield label.removeprefix("integral "), RationalFunction.reduced(total, denominator * data.determinant)
     if formulas.density is not None:
         yield VOLUME, formulas.density
     elif formulas.H is not None:

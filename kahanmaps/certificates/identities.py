@@ -15,6 +15,7 @@ P(x~) Q(x) det M = P(x) Q(x~) det L.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,6 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, degree_in, ring
-from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.errors import InputError
 
 MAX_DIMENSION = 6
@@ -65,11 +65,6 @@ class ConservedFunction:
     degree: int
     cofactor: fmpq_mpoly
 
-    @property
-    def formula(self) -> str:
-        """F as text."""
-        return format_rational_function(RationalFunction(self.numerator, self.denominator))
-
 
 @dataclass(frozen=True)
 class InvariantVolume:
@@ -84,11 +79,6 @@ class InvariantVolume:
     degree: int
     derivative: tuple[tuple[fmpq_mpoly, ...], ...]
     is_free: bool
-
-    @property
-    def formula(self) -> str:
-        """phi as text."""
-        return format_rational_function(RationalFunction(self.numerator, self.denominator))
 
 
 def map_data(
@@ -134,7 +124,7 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
     k = max(degree_in(P, data.dim), degree_in(Q, data.dim))
     moved = [homogeneous_value(polynomial, k, data) for polynomial in (P, Q)]
     cofactors = [_quotient(image, polynomial) for image, polynomial in zip(moved, (P, Q), strict=True)]
-    if cofactors[0] is None or cofactors[0] != cofactors[1]:
+    if not cofactors[0] or cofactors[0] != cofactors[1]:  # 0: the image of the map lies in Q = 0
         raise FalseClaim(f"{name} is not conserved: no certificate can be written")
     return ConservedFunction(name, P, Q, k, cofactors[0])
 
@@ -175,6 +165,21 @@ def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
     *_, last = kernel_minors([[*row, row[0] * 0] for row in matrix], _times)
     signed: fmpq_mpoly = -last if len(matrix) % 2 else last  # the last of the signed minors
     return signed
+
+
+def letters_of(data: MapData, taken: str) -> dict[str, str]:
+    """Return names for the letters of a map in a script: x, x1, x1_new and eps stay as they are, others become v_NAME.
+
+    `taken` is a regular expression for the names that the script itself defines.
+    """
+    letters: dict[str, str] = {}
+    for name in (*data.names, *data.new):
+        is_plain = re.fullmatch(r"eps|[a-z]\d*(_new)?", name) and not re.fullmatch(taken, name)
+        text = name if is_plain else "v_" + re.sub(r"[^A-Za-z0-9_]", "_", name)
+        while text in letters.values():
+            text += "_"
+        letters[name] = text
+    return letters
 
 
 def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmpq_mpoly:

@@ -12,48 +12,14 @@ from collections.abc import Sequence
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
-from kahanmaps.certificates.identities import ConservedFunction, InvariantVolume, MapData, homogeneous_value
-
-# Words that a variable of a system may be called, and a variable of Coq may not, or that the script itself defines.
-_RESERVED = frozenset(
-    [
-        "as",
-        "at",
-        "cofix",
-        "det",
-        "else",
-        "end",
-        "exists",
-        "fix",
-        "for",
-        "forall",
-        "fun",
-        "if",
-        "in",
-        "let",
-        "match",
-        "mod",
-        "num",
-        "den",
-        "cofactor",
-        "of",
-        "return",
-        "then",
-        "using",
-        "where",
-        "with",
-        "phi_num",
-        "phi_den",
-        "volume",
-        "pow",
-        "sin",
-        "cos",
-        "exp",
-        "tan",
-        "sqrt",
-        "Rabs",
-    ]
+from kahanmaps.certificates.identities import (
+    ConservedFunction,
+    InvariantVolume,
+    MapData,
+    homogeneous_value,
+    letters_of,
 )
+
 _LEMMA = """\
 Lemma equal_fractions : forall a b c d : R, b <> 0 -> d <> 0 -> a * d = c * b -> a / b = c / d.
 Proof.
@@ -70,15 +36,7 @@ class _Script:
 
     def __init__(self, data: MapData) -> None:
         self.data = data
-        self.letters: dict[str, str] = {}
-        for name in (*data.names, *data.new):
-            text = re.sub(r"\W", "_", name)
-            # A lower-case letter first: m11, a11, n1, r1 are the script's own.
-            if not re.match(r"[a-z]", text) or text in _RESERVED or re.fullmatch(r"[amnrl]\d+", text):
-                text = f"v_{text}"
-            while text in self.letters.values():
-                text += "_"
-            self.letters[name] = text
+        self.letters = letters_of(data, r"[amnrl]\d+")  # m11, a11, n1, r1, l11 are the script's own
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
         n = data.dim
@@ -156,7 +114,7 @@ class _Script:
         """The theorem that the function has the same value at x and x~."""
         old, new = " ".join(self.old), " ".join(self.new)
         lines = [
-            f"(* {claim.name} = num / den is an integral; cofactor is that of num and den as Darboux polynomials. *)",
+            "(* num / den is an integral; cofactor is that of num and den as Darboux polynomials. *)",
             f"Definition num ({old} : R) : R := {self.text(claim.numerator)}.",
             f"Definition den ({old} : R) : R := {self.text(claim.denominator)}.",
             f"Definition cofactor : R := {self.text(claim.cofactor)}.",
@@ -227,7 +185,7 @@ class _Script:
 def rocq_certificate(
     data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
 ) -> str:
-    """A script that Coq accepts if, and only if, it can prove the claims about the map.
+    """Write a script that Coq accepts only if it proves the claims about the map.
 
     Args:
         data: the map.
@@ -243,7 +201,6 @@ def rocq_certificate(
         theorem = f"{re.sub(r'[^A-Za-z0-9_]', '_', claim.name)}_"
         theorem = theorem if re.match("[A-Za-z]", theorem) else f"v_{theorem}"
         theorem += "conserved" if isinstance(claim, ConservedFunction) else "invariant"
-        theorem = theorem if theorem not in theorems else f"{theorem}_{k}"
         theorems.append(theorem)
         script = _Script(data)
         prove = script.conserved if isinstance(claim, ConservedFunction) else script.invariant

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
-from kahanmaps.certificates.identities import ConservedFunction, InvariantVolume, MapData
+from kahanmaps.certificates.identities import ConservedFunction, InvariantVolume, MapData, letters_of
 from kahanmaps.certificates.rocq import polynomial_text
 
 _PARI = """\
@@ -79,7 +79,7 @@ check("M N = D r", D != 0 and all(sum(M[i][j] * N[j] for j in range(n)) == D * r
 
 
 @dataclass(frozen=True)
-class _Language:
+class Language:
     """How a program writes powers, definitions, matrices, the value at h = 1, and comments."""
 
     start: str
@@ -91,48 +91,28 @@ class _Language:
     matrix: str
     next_row: str
     at_one: str
-    conjunction: str
-    quote: str = "{}"
 
 
-_GP = _Language(_PARI, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "; ", "subst({}, h, 1)", "&&")
-_PYTHON = _Language(
+GP = Language(_PARI, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "; ", "subst({}, h, 1)")
+PYTHON = Language(
     _SYMPY, "sys.exit(not all(results))", "python FILE (needs SymPy)", "**", "# ", "{} = {} * one", "[[{}]]", "], [",
-    "{}.subs(h, 1)", "and",
+    "{}.subs(h, 1)",
 )  # fmt: skip
 
 
-def pari_certificate(
-    data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
+def script_certificate(
+    to: Language, data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
 ) -> str:
-    """A script for `gp -q FILE` that multiplies out the identities of the claims about the map.
+    """Write a script that multiplies out the identities of the claims about the map.
 
     Args:
+        to: GP, for `gp -q FILE`, or PYTHON, for SymPy.
         data: the map.
         claims: what is checked.
         header: lines of the comment on top.
     """
-    return _script(_GP, data, claims, header)
-
-
-def sympy_certificate(
-    data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
-) -> str:
-    """A script for `python FILE` with SymPy that multiplies out the identities of the claims about the map.
-
-    Args:
-        data: the map.
-        claims: what is checked.
-        header: lines of the comment on top.
-    """
-    return _script(_PYTHON, data, claims, header)
-
-
-def _script(
-    to: _Language, data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str]
-) -> str:
     n = data.dim
-    letters = _letters(data)
+    letters = letters_of(data, "[hijknpr]")
     old = [letters[name] for name in data.variables]
 
     def text(polynomial: fmpq_mpoly) -> str:
@@ -142,7 +122,7 @@ def _script(
         """A sum; of many terms in parts, as Python reads no expression that is nested a thousand times."""
         terms = re.split(r" (?=[+-] )", text)
         parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
-        if to is _GP or len(parts) == 1:
+        if to is GP or len(parts) == 1:
             return text
         return f"sum([{', '.join(parts)}])"
 
@@ -168,7 +148,7 @@ def _script(
         return " + ".join(pieces) or "0"
 
     def matrix(rows: Sequence[Sequence[str]]) -> str:
-        if n == 1 and to is _GP:  # [a] would be a vector
+        if n == 1 and to is GP:  # [a] would be a vector
             return f"Mat({rows[0][0]})"
         return to.matrix.format(to.next_row.join(", ".join(row) for row in rows))
 
@@ -197,6 +177,7 @@ def _script(
             lines.append(_check(to, f"{label}: {name}h = {name} at h = 1", f"{to.at_one.format(name + 'h')} == {name}"))
         if isinstance(claim, ConservedFunction):
             lines.append(to.definition.format("C", f"({text(claim.cofactor)})"))
+            lines.append(_check(to, f"{label}: C is not 0", "C != 0"))
             for name in "PQ":
                 lines.append(_check(to, f"{label}: D^k {name}(N/D) = C {name}", f"image({name}h) == C*{name}"))
         else:
@@ -208,27 +189,15 @@ def _script(
                     lines.append(to.definition.format(name, f"({polynomial_text(polynomial, at_new, '*', to.power)})"))
                 says, identity = "for any x and x~", "Py*Q*D == P*Qy*det(L)"
             else:
-                lines += [f"N{k} = N[{k if to is _PYTHON else k + 1}]" + ";" * (to is _GP) for k in range(n)]
+                lines += [f"N{k} = N[{k if to is PYTHON else k + 1}]" + ";" * (to is GP) for k in range(n)]
                 entries = [[at_numerators(entry) for entry in row] for row in claim.derivative]
                 says, identity = "at x~ = N/D", f"image(Ph)*Q*D{to.power}(n + 1) == P*image(Qh)*det(L)"
-            lines.append(f"L = {matrix(entries)}" + ";" * (to is _GP))
+            lines.append(f"L = {matrix(entries)}" + ";" * (to is GP))
             lines.append(_check(to, f"{label}: phi(x~) det M = phi(x) det L(x, x~) {says}", identity))
         lines.append("")
     lines.append(to.end)
     return "\n".join(lines) + "\n"
 
 
-def _check(to: _Language, label: str, identity: str) -> str:
-    return f'check("{label}", {identity})' + ";" * (to is _GP)
-
-
-def _letters(data: MapData) -> dict[str, str]:
-    """Names of the letters that neither program uses for anything else: v_NAME, but for x, x1, ... and eps."""
-    letters: dict[str, str] = {}
-    for name in (*data.names, *data.new):
-        is_plain = re.fullmatch(r"[a-gi-z]|[a-z]\d+|eps", name) and name not in ("i", "j", "k", "n", "p", "r")
-        text = name if is_plain else "v_" + re.sub(r"\W", "_", name)
-        while text in letters.values():
-            text += "_"
-        letters[name] = text
-    return letters
+def _check(to: Language, label: str, identity: str) -> str:
+    return f'check("{label}", {identity})' + ";" * (to is GP)
