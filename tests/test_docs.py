@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from kahanmaps.paper.verify import verify
+from kahanmaps_cli.commands.verify import markdown
+
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS / "_ext"))
@@ -96,3 +99,12 @@ def test_the_pages_are_built_without_a_warning_and_no_link_is_broken(tmp_path):
     assert (tmp_path / "html" / "_static" / "kahanmaps-math.woff").is_file()
     letters = (letters_of_formulas(page.read_text(encoding="utf-8")) for page in (tmp_path / "html").rglob("*.html"))
     assert set().union(*letters) - letters_of_the_font() == set()
+
+
+AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.thorough
+def test_the_table_of_the_audit_is_what_verify_prints():
+    assert AUDIT.split("<!-- table -->\n")[1].strip() == markdown(verify(m=3)).strip()

@@ -1,12 +1,19 @@
-"""The examples do what stands beside them: every script prints its .out file, and the demo runs through."""
+"""The examples do what stands beside them: every script prints its .out file, the notebook shows what it has stored
+(its pictures are only asked to be there), the study learns what it has committed, and the demo runs through.
+"""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import nbformat
 import pytest
+from notebook_runner import NOTEBOOK, executed
+
+import kahanmaps as km
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("*.py"))
@@ -40,3 +47,39 @@ def test_the_demo_proves_what_it_promises_and_leaves_files_to_play_with(tmp_path
     assert "verdict\tproved" in done.stdout
     assert "refuted (as expected)" in done.stdout
     assert {"pair.toml", "pair-ppp.toml", "pair-pmm.toml"} <= {path.name for path in (tmp_path / ".demo").iterdir()}
+
+
+STUDY = Path(__file__).parent.parent / "examples" / "members"
+
+
+@pytest.mark.slow
+def test_what_was_learned_comes_out_of_the_first_members_too(tmp_path: Path) -> None:
+    text, count = re.subn(r'"0\.\.\d+"', '"0..0"', (STUDY / "study.toml").read_text())
+    assert count == 5
+    assert {record.outcome for record in km.run(text, tmp_path / "study.db")} == {"ok"}
+    command = [sys.executable, STUDY / "learned.py", tmp_path / "study.db"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[:3] == [f"m = {m}: dimension {4 * m} of the space of cubics, for 2 of 2 members" for m in (2, 3, 4)]
+    committed = (STUDY / "learned.out").read_text().splitlines()
+    kinds = [re.sub(r"[-\d.e]+", "#", line) for line in lines if not line.startswith(" ")]
+    assert kinds[3:5] == [re.sub(r"[-\d.e]+", "#", line) for line in committed if not line.startswith(" ")][3:5]
+
+
+def shown(notebook):
+    """What the cells show: formulas and tables, or text where there is nothing better, or that there is a picture."""
+    pages = []
+    for cell in notebook.cells:
+        if cell.cell_type != "code":
+            continue
+        for output in cell.outputs:
+            data = output.get("data", {})
+            kind = next((kind for kind in ("text/html", "text/latex", "image/png", "text/plain") if kind in data), None)
+            content = "" if kind == "image/png" else data[kind] if kind else output.get("text", str(output))
+            pages.append((cell.id, kind or output.output_type, content))
+    return pages
+
+
+def test_a_fresh_run_shows_what_is_stored():
+    assert shown(executed()) == shown(nbformat.read(NOTEBOOK, as_version=4))

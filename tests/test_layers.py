@@ -1,12 +1,14 @@
 """The floors of the house: imports point down, never up and never in circles, and loading a file loads nothing heavy.
 
 `violations` reads one file without running it, so an import inside a function counts for the floors too. Heavy
-packages may be imported inside functions, where they cost only those who call them.
+packages may be imported inside functions, where they cost only those who call them. What commands take from the library
+is listed.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 from collections import deque
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
@@ -14,6 +16,9 @@ from pathlib import Path
 
 import pytest
 from helpers import parsed
+
+import kahanmaps_cli
+from kahanmaps import internals
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -216,3 +221,12 @@ RIGHT = [
 @pytest.mark.parametrize(("path", "source"), RIGHT)
 def test_a_file_that_keeps_the_rule_is_not_reported(path, source):
     assert violations(path, source) == []
+
+
+FOLDER = Path(kahanmaps_cli.__file__).parent
+
+
+def test_each_name_is_one_of_the_library_and_is_used():
+    used = re.findall(r"(?<![\w.])lib\.(\w+)", "\n".join(path.read_text() for path in FOLDER.rglob("*.py")))
+    assert sorted(internals.__all__) == sorted(set(used))
+    assert [name for name in used if getattr(internals, name) is None] == []

@@ -1,14 +1,15 @@
-"""The bound of an identity, against its two sides written out as rational functions of x and eps."""
+"""Bounds of identities and broken claims, against their two sides written out as rational functions of x and eps."""
 
 import random
 
 import pytest
-from bound_helpers import check, covers_polynomial, differences, true_size
+from bound_helpers import check, covers_polynomial, differences, lowest, true_size
 from check_helpers import claim, hamiltonians, system_of
 from flint import fmpq
-from helpers import HENON_HEILES, LOTKA_VOLTERRA, rationals, systems
+from helpers import HENON_HEILES, LOTKA_VOLTERRA, rationals, systems, together
 from hypothesis import given
 from hypothesis import strategies as st
+from paper.members import member, verifier_of
 
 from kahanmaps.algebra.bounds import CoefficientSize
 from kahanmaps.algebra.polynomials import monomials, ring
@@ -18,6 +19,10 @@ from kahanmaps.checks.preserve import density_identity, jacobi_identity, transfo
 from kahanmaps.invariants.phase_functions import ClaimedDensity, ClaimedIntegral, DeterminantDensity
 from kahanmaps.invariants.poisson import HamiltonianTensor
 from kahanmaps.maps.kahan import KahanFamily
+from kahanmaps.paper import specialize
+from kahanmaps.paper.controls import broken
+from kahanmaps.paper.registry import ClaimKind, claims
+from kahanmaps.paper.verify import ClaimAtPoints
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 some_eps = st.one_of(st.none(), rationals(6).filter(lambda eps: eps != 0))
@@ -108,3 +113,50 @@ def test_the_transformation_law_is_bounded(hamiltonian, eps):
 @given(hamiltonians(dims=(3,)), some_eps)
 def test_the_jacobi_identity_is_bounded(hamiltonian, eps):
     check(jacobi_identity(HamiltonianTensor(hamiltonian), eps))
+
+
+# Claims
+
+
+def is_short(claim):
+    """Whether it speaks of x and two more vectors at most: equations for systems of many letters are too long here."""
+    bounds = specialize.bound_objects(member("m=1"), None, 3)
+    for _ in claim.function(bounds):
+        pass
+    return len(bounds.used - {"roots"}) <= 3
+
+
+BROKEN = [
+    (claim, control)
+    for claim in claims()
+    if claim.kind is ClaimKind.EQUAL and claim.makes_sense(1) and is_short(claim)
+    for control in claim.breaks
+    if control in ("eps", "map", "B")
+]
+
+
+def difference_sizes(claim, o):
+    """The numerators and denominators in lowest terms of the differences of all pairs of a claim."""
+    found = []
+    for left, right in claim.function(o):
+        difference = left - right
+        entries = difference.entries() if hasattr(difference, "entries") else [difference]
+        found += [lowest(entry) for entry in entries if not entry.numerator.is_zero()]
+    return found
+
+
+@together("claim, control", BROKEN)
+def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, monkeypatch):
+    found = member("m=1")
+    examined = verifier_of(found)
+    bounds = broken(control, specialize.bound_objects(found, None, 3))
+    monkeypatch.setattr(examined, "bounds", lambda: bounds)
+    statement = ClaimAtPoints(examined, claim)
+    needs, (equation, poles) = statement.needs, statement.bound
+    functions = specialize.member_functions(found, sorted(needs - {"roots"}), None, 10**9, 3)
+    sizes = difference_sizes(claim, broken(control, functions))
+    for above, below in sizes:
+        assert true_size(above)[0] <= equation.degree
+        # A denominator that occurs to some power must not be zero once.
+        assert sum(true_size(factor)[0] for factor, _ in below.factor_squarefree()[1]) <= poles
+        assert true_size(above)[1] <= equation.bits

@@ -53,10 +53,7 @@ def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     chosen, generic = kahanmaps(*command).json, kahanmaps(*command, "--method generic").json
     assert (chosen["method"], chosen["kernel"]) == ("normal-form", "numpy normal form")
     assert (generic["method"], generic["kernel"]) == ("generic", "numpy generic")
-    assert [drift["name"] for drift in chosen["drift"]] == [
-        "h/(1 + eps^2 D) at t = -2",
-        "h/(1 + eps^2 D) at t = 1",
-    ]
+    assert [drift["name"] for drift in chosen["drift"]] == ["h/(1 + eps^2 D) at t = -2", "h/(1 + eps^2 D) at t = 1"]
     assert generic["drift"] == []
 
 

@@ -1,10 +1,15 @@
-"""One name for one thing: what an option refuses is refused by every command that has it."""
+"""One name for one thing: what an option refuses is refused by every command that has it; examples of help use those
+that there are.
+"""
 
 from collections import defaultdict
 
 import click
-from command_tree import all_commands, names_of, options_of
+import pytest
+from command_tree import all_commands, all_examples, names_of, options_of, words_of
 from helpers import together
+
+from kahanmaps_cli.main import cli
 
 REFUSED = [
     ("--seed", "-1", "'-1', expected an integer, 0 or more"),
@@ -40,3 +45,29 @@ def test_a_value_that_is_none_is_refused_by_every_command(kahanmaps, option, val
 def test_the_old_name_of_an_option_still_works(kahanmaps):
     new = kahanmaps("heights weierstrass --eps 1/10 --random 1 --steps 20")
     assert kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20") == new
+
+
+def parsed(words: list[str]) -> None:
+    """Let click read the options of an example, and run nothing."""
+    command: click.Command = cli
+    context = click.Context(cli)
+    name = "kahanmaps"
+    while isinstance(command, click.Group) and words:
+        found = command.get_command(context, words[0])
+        assert found is not None, words[0]
+        name, command, words = words[0], found, words[1:]
+    try:
+        command.make_context(name, list(words), parent=context)
+    except click.BadParameter as error:
+        if not error.message.endswith("does not exist."):  # a file that an example before this one makes
+            raise
+
+
+@together("example", all_examples())
+def test_the_options_of_an_example_are_understood(example):
+    parsed(words_of(example))
+
+
+def test_an_example_with_a_wrong_option_would_be_noticed():
+    with pytest.raises(click.UsageError):
+        parsed(words_of("kahanmaps orbit euler_top --strat 1,2,3  # no such option"))

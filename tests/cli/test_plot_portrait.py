@@ -1,6 +1,10 @@
-"""kahanmaps plot portrait: what is drawn from which words, and what is said."""
+"""kahanmaps plot portrait, degrees and heights: what is drawn from which words, and what is said."""
 
+import io
+import json
 import signal
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,3 +91,32 @@ def test_points_are_coloured_by_an_integral_that_a_theorem_gives(kahanmaps, draw
     kept, moved = (np.ptp(found.values) for found, _ in drawn)
     assert kept < 1e-13
     assert moved > 1e-4
+
+
+@pytest.fixture
+def piped(monkeypatch):
+    """Put text on standard input."""
+    return lambda text: monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
+
+
+def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
+    first, second = tmp_path / "a.png", tmp_path / "b.png"
+    record = kahanmaps("degrees euler_top --json").out
+    assert kahanmaps("plot degrees euler_top --size 4 -q -o", first).status == 0
+    (tmp_path / "record.json").write_text(record)
+    assert kahanmaps("plot degrees --size 4 -q --from", tmp_path / "record.json", "-o", second).status == 0
+    piped(record)
+    assert kahanmaps("plot degrees --from - --size 4 -q -o", tmp_path / "c.png").status == 0
+    # The metadata tell the two commands; the pixels are the same.
+    import matplotlib.image as image
+
+    assert (image.imread(first) == image.imread(second)).all()
+    assert (image.imread(first) == image.imread(tmp_path / "c.png")).all()
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_a_record_of_an_incomplete_survey_is_reported(kahanmaps, tmp_path):
+    record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").json
+    (tmp_path / "r.json").write_text(json.dumps({**record, "whole": False}))
+    done = kahanmaps("plot heights -o - --format svg --from", tmp_path / "r.json")
+    assert (done.status, "stopped early" in done.err) == (3, True)

@@ -2,7 +2,12 @@
 
 The table is tests/cli/said.txt: a command, behind a number where it does not end with 0, and behind each ` => ` words
 of standard output or standard error, blanks for tabs and line breaks; behind ` => not: ` words that are in neither.
-Behind ` <= ` stands what is in the file that the command names, with \\n for a new line.
+Behind ` <= ` stands what is in the file that the command names, with \\n for a new line. In tests/cli/wrong_use.txt all
+end with 2.
+
+Exit statuses: 0 the claim holds (proved or supported) or the work is done; 1 refuted, and nothing else; 2 wrong use or
+bad input, with what was found and what is expected, and nothing on standard output; 3 undecided or stopped early; 70 an
+internal error; 130 interrupted (test_main.py, test_orbit.py).
 """
 
 import re
@@ -10,7 +15,11 @@ from pathlib import Path
 
 import pytest
 from cli_helpers import with_its_file
-from helpers import table
+from helpers import table, together
+
+from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report
+from kahanmaps.checks.table import CHECKS
+from kahanmaps_cli.screen.render import exit_status
 
 TABLE = table(Path(__file__).with_name("said.txt"))
 CASES = [(section, *line.split(" => ")) for section, lines in TABLE.items() for line in lines]
@@ -33,3 +42,71 @@ def test_a_command_says_what_it_found(kahanmaps, pair, tmp_path, monkeypatch, re
     if "jsonl" in words or (" --json" in words and not words.startswith("orbit")):  # whose --json is one object
         assert outcome.records
     assert all(Path(name).exists() for name in re.findall(r" -o (\S+)", words))
+
+
+COMMANDS = table(Path(__file__).with_name("exit_statuses.txt"))
+TOP = "euler_top --start 1,2,3 --eps 1/10"
+
+
+def report(verdict: Certainty, ended_early: bool = False, control: Certainty = Certainty.REFUTED) -> Report:
+    """A report of one claim and one control."""
+    findings = [Finding("c", v, Evidence("m", "s"), control=c) for v, c in ((verdict, False), (control, True))]
+    return Report("commute", tuple(findings), ended_early=ended_early)
+
+
+STATUSES = {"proved": 0, "supported": 0, "refuted": 1, "undecided": 3}
+
+
+@pytest.mark.parametrize(("verdict", "status"), [(Certainty(word), status) for word, status in STATUSES.items()])
+def test_every_verdict_has_its_exit_status(verdict, status):
+    assert exit_status(report(verdict)) == status
+
+
+def test_an_undecided_check_gives_3(kahanmaps, monkeypatch):
+    context = {"system": "henon_heiles", "eps": "every", "time_step": "every"}
+    undecided = Report("poisson", report(Certainty.UNDECIDED).findings, context)
+    monkeypatch.setattr("kahanmaps.checks.preserve.check_poisson", lambda *_: undecided)
+    assert kahanmaps("check-poisson henon_heiles --json").status == 3
+
+
+# 3
+
+
+@pytest.mark.parametrize(("command", "status"), [line.split(" => ") for line in COMMANDS["orbits"]])
+def test_an_orbit_stopped_early_gives_3_and_a_sentence_on_standard_error(kahanmaps, command, status):
+    outcome = kahanmaps(command)
+    assert outcome.status == 3
+    assert outcome.err.startswith(f"{status}: ")
+    assert outcome.out.splitlines()[-1] == f"# {outcome.err.strip()}"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("form", ["text", "jsonl", "csv", "npz"])
+def test_a_full_disk_is_no_wrong_use_gives_3_and_names_the_file(kahanmaps, form):
+    outcome = kahanmaps(f"orbit {TOP} --steps 2 --format {form} -o /dev/full")
+    assert (outcome.status, outcome.err) == (3, "Error: No space left on device: /dev/full\n")
+
+
+# Wrong use
+
+
+WRONG = table(Path(__file__).with_name("wrong_use.txt"))
+WRONG["checks are listed"] = [f"check euler_top => Did you mean {' or '.join(CHECKS)}?"]
+
+
+@pytest.mark.parametrize("lines", WRONG.values(), ids=WRONG.keys())
+def test_wrong_use_gives_2_and_says_what_was_found_and_expected(kahanmaps, tmp_path, monkeypatch, lines):
+    @together("line", lines)
+    def each(line):
+        command, *expected = line.split(" => ")
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        outcome = kahanmaps(with_its_file(command))
+        assert (outcome.status, outcome.out, len(list(folder.iterdir()))) == (2, "", " <= " in command)
+        said = " ".join(outcome.err.split())
+        for words in expected:
+            assert (words.removeprefix("not: ") in said) is not words.startswith("not: ")
+        assert "Traceback" not in outcome.err
+
+    each()

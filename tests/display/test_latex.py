@@ -49,11 +49,7 @@ def test_a_rational_function_is_read_back_equal(numerator, denominator):
 
 @pytest.mark.parametrize(
     ("text", "latex"),
-    [
-        ("-1", "-1"),
-        ("-x/2", r"-\frac{1}{2} x"),
-        ("x^10*y - 3*x*y + 2/3", r"x^{10} y - 3 x y + \frac{2}{3}"),
-    ],
+    [("-1", "-1"), ("-x/2", r"-\frac{1}{2} x"), ("x^10*y - 3*x*y + 2/3", r"x^{10} y - 3 x y + \frac{2}{3}")],
 )
 def test_polynomials_are_written_as_people_write_them(text, latex):
     assert latex_polynomial(parse_polynomial(text, ["x", "y"])) == latex

@@ -128,10 +128,7 @@ HTML = {  # a value, and what its text contains
     ),
     "Darboux polynomials": (lambda: km.darboux_polynomials(km.load("lotka_volterra"), 1), ["cofactor"]),
     "a census": (lambda: km.cycle_census(km.load("lotka_volterra").system, "1/10", 31), ["GF(31)"]),
-    "a period": (
-        lambda: km.orbit_period(km.normal_form(MEMBER), "1/10", ["1/2", "-1/5", 0, 1], 10007),
-        ["period"],
-    ),
+    "a period": (lambda: km.orbit_period(km.normal_form(MEMBER), "1/10", ["1/2", "-1/5", 0, 1], 10007), ["period"]),
 }
 
 

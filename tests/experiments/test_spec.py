@@ -31,11 +31,7 @@ def test_zipped_axes_run_together():
 
 
 @pytest.mark.parametrize(
-    ("axes", "eps"),
-    [
-        ("time_step = 0.2", ["1/10"]),
-        ('time_step = [7, "1..2"]', ["7/2", "1/2", "1"]),
-    ],
+    ("axes", "eps"), [("time_step = 0.2", ["1/10"]), ('time_step = [7, "1..2"]', ["7/2", "1/2", "1"])]
 )
 def test_the_time_step_is_twice_eps(axes, eps):
     assert option(LORENZ + f"axes = {{{axes}}}", "eps") == eps

@@ -6,14 +6,7 @@ f. It is conserved, tends to H with a defect of order eps^2, and is -1/6 of the 
 
 import numpy as np
 import pytest
-from check_helpers import (
-    exact,
-    hamiltonian_of,
-    hamiltonians,
-    kahan_step,
-    modified_value,
-    rows_of,
-)
+from check_helpers import exact, hamiltonian_of, hamiltonians, kahan_step, modified_value, rows_of
 from flint import fmpq, fmpq_poly
 from helpers import fraction, over_exact_fields, points, rationals
 from hypothesis import assume, given

@@ -7,17 +7,7 @@ polynomials, the transformation law by dPhi from dual numbers.
 
 from itertools import combinations
 
-from check_helpers import (
-    exact,
-    hamiltonian_of,
-    hamiltonians,
-    kahan_jacobian,
-    kahan_step,
-    rows_of,
-    slope,
-    tensor,
-    unit,
-)
+from check_helpers import exact, hamiltonian_of, hamiltonians, kahan_jacobian, kahan_step, rows_of, slope, tensor, unit
 from flint import fmpq, fmpq_mat
 from helpers import fraction, points, random_point, rationals
 from hypothesis import assume, given

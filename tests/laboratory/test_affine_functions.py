@@ -27,10 +27,7 @@ def darboux(system: QuadraticSystem) -> dict[str, str]:
 def test_known_hyperplanes() -> None:
     assert darboux(load("lotka_volterra").system) == {"x": "-y + 1", "y": "x - 1"}
     # (x1 + x3)' = x2 (x1 + x3), since the coefficients of x1' and x3' are equal.
-    assert darboux(EULER_TOP) == {
-        "x1 + x3": "x2",
-        "x1 - x3": "-x2",
-    }
+    assert darboux(EULER_TOP) == {"x1 + x3": "x2", "x1 - x3": "-x2"}
     # H = y (3 x^2 - y^2)/3: the two other lines of the triangle have slopes of sqrt(3).
     assert darboux(load("nahm_tetrahedral").system) == {"y": "-2*x"}
     assert darboux(QuadraticSystem.from_text(["x"], ["x^2 - 1"])) == {"x + 1": "x - 1", "x - 1": "x + 1"}

@@ -121,10 +121,7 @@ def test_a_translation_has_one_cycle_of_p_points_and_a_multiplication_one_of_p_m
     assert dict(cycle_census(map_of("2*x"), 1, 101).lengths) == {1: 2, 100: 1}  # 2 is a primitive root modulo 101
 
 
-EXCHANGES_LEVELS = (
-    "(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x)",
-    "(x^2-y)/(x^2*y+1)",
-)
+EXCHANGES_LEVELS = ("(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x^3+x*y^2-x*y+x)", "(x^2-y)/(x^2*y+1)")
 
 
 def test_cycles_of_an_integrable_map_are_longer_than_the_bound_of_hasse_and_weil():

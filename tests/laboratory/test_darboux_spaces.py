@@ -1,16 +1,29 @@
-"""Spaces of polynomials with a common cofactor: their ratios are conserved, and nothing is found where nothing is."""
+"""Cofactors, and spaces of polynomials with a common one: their ratios are conserved, and nothing is found where
+nothing is.
+"""
 
 import random
 from math import comb
 
 import pytest
+from helpers import DIMENSION
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.modular_matrices import combine, rank
-from kahanmaps.documents.catalog import load
+from kahanmaps.documents.catalog import load, names
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to, monomial_values
+from kahanmaps.laboratory.preserve.darboux.cofactors import (
+    DETERMINANT,
+    Cofactor,
+    CofactorProduct,
+    Sample,
+    cofactor_space,
+    determinant_factors,
+    determinant_polynomial,
+    points_needed,
+)
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, darboux_spaces, gradient_rank
 
 SMALL = 101
@@ -77,3 +90,36 @@ def test_no_members_of_a_pencil_are_sparser(rng):
     found = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
     assert found == by_size[:2]
     assert rank([*basis, P, Q], p) == rank(basis, p) == 2
+
+
+# Cofactors
+
+
+SMALL_ONES = [name for name in names() if DIMENSION[name] <= 4]
+
+
+@pytest.mark.parametrize("name", SMALL_ONES[::4])
+def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
+    """det(I - eps f') is a product of the factors and of numbers that depend on eps alone, even in eps or not."""
+    laboratory = Laboratory(load(name))
+    map_ = laboratory.maps[0]
+    D = determinant_polynomial(laboratory.map)
+    whole = Cofactor("D", 1, D)
+    for x, image in map_.pairs(3):
+        assert whole.sides(map_, x, image) == DETERMINANT.sides(map_, x, image)
+    context = D.context()
+    rest = D
+    for one in determinant_factors(laboratory.map):
+        assert one.polynomial.subs({"eps": 0}) == context.constant(1)
+        while not (rest % one.polynomial):
+            rest = rest // one.polynomial
+    assert all(not any(monomial[: map_.dim]) for monomial in rest.monoms())
+
+
+def test_polynomials_with_a_given_cofactor():
+    map_ = Laboratory(load("lotka_volterra")).maps[0]
+    sample = Sample.of(map_, [DETERMINANT], points_needed(2, 3))
+    # x y has the cofactor det dPhi, constants have 1
+    assert cofactor_space(sample, CofactorProduct((1,), 1), 2).basis == [[0, 0, 0, 0, 1, 0]]
+    assert cofactor_space(sample, CofactorProduct((0,), 0), 2).basis == [[1, 0, 0, 0, 0, 0]]
+    assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []

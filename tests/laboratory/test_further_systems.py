@@ -14,15 +14,7 @@ from pathlib import Path
 
 import pytest
 from analysis_helpers import Answer, differences, residues_of, verdict_of
-from check_helpers import (
-    determinant,
-    function_value,
-    kahan_jacobian,
-    kahan_step,
-    modified_value,
-    slope,
-    unit,
-)
+from check_helpers import determinant, function_value, kahan_jacobian, kahan_step, modified_value, slope, unit
 from helpers import fraction, together
 from search_helpers import ranks
 

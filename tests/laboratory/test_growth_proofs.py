@@ -1,4 +1,4 @@
-"""Growth that is proved: monomial maps against measured degrees and published rates, and maps of finite order."""
+"""Growth that is proved: monomial maps against measured degrees and published rates, maps of finite order, formulas."""
 
 import random
 from dataclasses import replace
@@ -8,12 +8,15 @@ from degree_helpers import by_formulas
 from flint import fmpq, fmpz_mat, fmpz_poly
 
 from kahanmaps.checks.claims import Certainty
+from kahanmaps.documents.catalog import load
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.growth import degrees, proofs
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.proofs import exponent_matrix, linear_iterate, monomial_growth, spectral_radius
-from kahanmaps.laboratory.singular.singularities import Patterns
+from kahanmaps.laboratory.singular import written
+from kahanmaps.laboratory.singular.singularities import Patterns, singularities
 from kahanmaps.maps.composed import composed_map
+from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 OPEN = Patterns((), None, False, "not looked at")
@@ -133,3 +136,59 @@ def test_a_recurrence_that_does_not_fit_the_proof_is_not_given():
     assert found.recurrence.text.startswith("a(n) = 3*a(n-1)-a(n-2)")
     other = replace(found.proof, rate=replace(found.proof.rate, minimal_polynomial=fmpz_poly([-2, 1])))
     assert replace(found, proof=other).recurrence is None
+
+
+# Maps that are given by formulas
+
+
+DIMENSION_5 = "b; c; d; e; 3/(b*c*d*e) - a - b - c - d - e"
+
+
+@pytest.mark.parametrize(
+    ("variables", "image"),
+    [
+        ("x,y", "y; -x + 1/y^3"),
+        ("x,y", "y; (1 + y)/x"),
+        ("x,y", "y/1000; -1000*x + 7/(y^2 - 3)"),
+        ("x,y", "x*(1 - y)/(1 + x*y); y*(x + 1)^2/(x - y^2)"),
+        ("x,y,z", "y; z; (y + z^2)/(x*(1 + y*z))"),
+        ("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"),
+        ("x,y", "x + y^2; y"),  # contracts nothing but infinity
+    ],
+)
+def test_the_affine_jacobian_has_the_factors_of_the_homogeneous_one(variables, image, monkeypatch):
+    forms = homogeneous_map(by_formulas(variables, image).at(1))
+    expanded, degree = written.written(forms)
+    monkeypatch.setattr(written, "_is_short", lambda size, degree: False)
+    by_affine_map, same_degree = written.written(forms)
+    assert (sorted(map(repr, by_affine_map)), same_degree) == (sorted(map(repr, expanded)), degree)
+
+
+@pytest.mark.parametrize("name", ["lotka_volterra", "euler_top", "dressing_chain_3"])
+def test_the_affine_jacobian_of_kahan_maps(name):
+    forms = homogeneous_map(load(name).map.at(1)).forms
+    homogeneous = written._critical_factors(forms, len(forms) * (forms[0].total_degree() - 1))
+    finite = {str(factor.subs({"z": 1})): k for factor, k in homogeneous}
+    finite.pop("1", None)
+    assert {str(factor): k for factor, k in written.factors_at_finite_points(forms)} == finite
+
+
+def test_the_hypersurfaces_of_a_map_of_dimension_5_are_written():
+    run = singularities(by_formulas("a,b,c,d,e", "b; c; d; e; 1/(b*c*d*e) - a"), 1)
+    assert (str(run.verdict), run.critical_degree) == ("confined", 24)
+    assert [(h.polynomial, h.multiplicity) for h in run.hypersurfaces] == [(x, 6) for x in "edcb"]
+
+
+@pytest.mark.parametrize(
+    ("variables", "image"), [("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"), ("a,b,c,d,e", DIMENSION_5)]
+)
+def test_published_maps_of_dimension_4_and_5_have_derived_quadratic_growth(variables, image):
+    found = degree_growth(by_formulas(variables, image), max_terms=20)
+    assert (str(found.growth), found.derived is not None) == ("quadratic", True)
+
+
+@pytest.mark.parametrize(("k", "rate"), [(3, "3"), (5, "5"), (4, "t^2 - 4*t + 1"), (6, "t^2 - 6*t + 1")])
+def test_the_published_rates_of_a_planar_family(k, rate):
+    found = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), enclosed=False)
+    assert found.derived is not None
+    assert found.dynamical_degree.text.endswith(rate)

@@ -31,13 +31,7 @@ def lotka_volterra(n: int, k: int) -> SystemFile:
 DRIVEN = system("x y z", "x^2 + 2*x*y + 3*y + 1", "-2*x*y - y^2 + 4*x^2 + x + 7", "x*z + y^2 + z^2 - 5*x + 2")
 # f = J grad H with a J of rank 4 in dimension 6, and H of degree 3 in all variables
 DEGENERATE = system(
-    "q1 q2 p1 p2 z w",
-    "p1 + 2*q1*z",
-    "p2 + q1^2",
-    "-3*q1^2 - 2*p1*z - 2*q1*p2 + w",
-    "-q2*z + w^2",
-    "0",
-    "0",
+    "q1 q2 p1 p2 z w", "p1 + 2*q1*z", "p2 + q1^2", "-3*q1^2 - 2*p1*z - 2*q1*p2 + w", "-q2*z + w^2", "0", "0"
 )
 CASES = [
     (lotka_volterra(4, 1), 1, 1),

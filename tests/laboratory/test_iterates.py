@@ -71,10 +71,7 @@ def test_all_four_integrals_of_tops_and_spin_systems_have_formulas(file, numbers
 
 
 # kirchhoff_generic has no relations at all; those of the others belong to the one integral that they have.
-@pytest.mark.parametrize(
-    ("name", "numbers"),
-    [("lorenz", (0, 0)), ("zhukovski_volterra_2", (0, 1))],
-)
+@pytest.mark.parametrize(("name", "numbers"), [("lorenz", (0, 0)), ("zhukovski_volterra_2", (0, 1))])
 def test_a_map_that_is_not_integrable_gains_nothing(name, numbers):
     _, _, plain, ratios = searched(load(name))
     assert (len(plain), len(ratios)) == numbers

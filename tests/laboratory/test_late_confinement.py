@@ -56,13 +56,7 @@ SLOW_GROWTH = [
     (resonant(12), None, "bounded", "12 for n >= 11", 20),
     (resonant("41/2"), None, "linear", "n + 1", 60),
     (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 54),
-    (
-        QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "12*x*y", "y*z"]),
-        None,
-        "linear",
-        "12*n - 54 for n >= 10",
-        30,
-    ),
+    (QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "12*x*y", "y*z"]), None, "linear", "12*n - 54 for n >= 10", 30),
 ]
 # Systems whose first d_n are 2^n, and the first n with fewer.
 THREE_LINES = [((1, 3, 3), 8), ((1, 2, 6), 10), ((2, 5, 3), 3)]

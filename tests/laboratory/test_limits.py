@@ -108,8 +108,7 @@ def test_a_transcendental_integral_is_neither_seen_nor_lost():
 
 
 @pytest.mark.parametrize(
-    "second",
-    [f"{SUM}^2 + 3*{SUM} + eps^3*{PRODUCT}", f"5 + eps*{SUM} + eps^2*{SUM}^2 + eps^4*{PRODUCT}"],
+    "second", [f"{SUM}^2 + 3*{SUM} + eps^3*{PRODUCT}", f"5 + eps*{SUM} + eps^2*{SUM}^2 + eps^4*{PRODUCT}"]
 )
 def test_leading_terms_that_depend_on_each_other_are_combined(second):
     search = with_integrals(integrals_of("volterra_periodic_3"), f"1 + eps*{SUM}", second)

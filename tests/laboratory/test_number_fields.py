@@ -15,8 +15,7 @@ CUBIC = "root of t^3 - t - 1"
 
 
 @pytest.mark.parametrize(
-    ("equations", "a", "count"),
-    [(TOP, "root of t^2 + 1", 2), ("x' = y; y' = a*x^2 - 1", CUBIC, 1)],
+    ("equations", "a", "count"), [(TOP, "root of t^2 + 1", 2), ("x' = y; y' = a*x^2 - 1", CUBIC, 1)]
 )
 def test_integrals_and_densities_are_found_and_proved_over_the_number_field(equations, a, count):
     file = km.System(equations, a=a)

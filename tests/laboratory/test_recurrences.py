@@ -67,10 +67,7 @@ def test_one_wrong_term_is_noticed():
     assert find_recurrence(values) is None
 
 
-@given(
-    st.lists(st.integers(-5, 5), min_size=1, max_size=4),
-    st.data(),
-)
+@given(st.lists(st.integers(-5, 5), min_size=1, max_size=4), st.data())
 def test_the_recurrence_found_continues_the_sequence(below, data):
     start = data.draw(st.lists(st.integers(-9, 9), min_size=len(below), max_size=len(below)))
     size = 2 * len(below) + needed_checks(len(below))

@@ -31,11 +31,7 @@ FIELDS = {
     "predators": ["x*(1 - y)", "y*(x - 1)"],
     "weighted": ["y", "x^2"],
 }
-MAPS = {
-    "lyness": ["y", "(y + 5)/x"],
-    "todd": ["y", "z", "(3 + y + z)/x"],
-    "fibonacci": ["y", "x*y"],
-}
+MAPS = {"lyness": ["y", "(y + 5)/x"], "todd": ["y", "z", "(3 + y + z)/x"], "fibonacci": ["y", "x*y"]}
 D = [Fraction(100000), Fraction(1, 7), Fraction(3, 10**6), Fraction(1000, 999)]
 
 

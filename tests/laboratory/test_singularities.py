@@ -1,21 +1,29 @@
-"""Confinement: the integrable systems of the catalogue against those of maximal degree, and series against points."""
+"""Confinement: the integrable systems of the catalogue against those of maximal degree, and series against points.
+
+Contracted hypersurfaces are told apart over GF(p) by factors on surfaces, and named for every eps: over Q[eps], by
+polynomials that are those at the eps followed.
+"""
 
 import random
 from itertools import islice
 
 import pytest
-from flint import fmpq
+from flint import Ordering, fmpq, fmpq_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.work import Budget, counted
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
 from kahanmaps.hard_stop import TimeLimit
+from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import outcomes
+from kahanmaps.laboratory.singular.contracted import components
 from kahanmaps.laboratory.singular.jets import image_of, images_of_curve
 from kahanmaps.laboratory.singular.outcomes import BUDGET_SPENT, NOT_CONFINED, critical_points
 from kahanmaps.laboratory.singular.singularities import default_eps, singularities
+from kahanmaps.laboratory.singular.written import with_eps
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -180,3 +188,92 @@ def test_the_denominator_is_that_determinant_in_every_dimension(name):
     point = [fmpq(2 * k + 1, k + 2) for k in range(system.dim)]
     denominator = parse_polynomial(singularities(system, "1/7", steps=1).denominator, system.variables)
     assert evaluate(denominator, QQ, point) == KahanMap(system, "1/7").determinant(point)
+
+
+# Components of the zeros of forms over GF(p), told apart by factors on surfaces
+
+
+NAMES = ("x1", "x2", "x3", "z")
+X1, X2, X3, Z = fmpq_mpoly_ctx.get(NAMES, Ordering.degrevlex).gens()
+DIRECTION = (31, 41, 59, 26)
+
+
+def found(form, p, curve, direction=DIRECTION, at_image=False):
+    equation = load("euler_top").map.at(1, GF(p)).equations[0]
+    return components(equation, [(form, at_image)], [nmod_poly(list(entry), p) for entry in curve], direction)
+
+
+@pytest.mark.parametrize(("p", "degrees"), [(1000033, [1, 1, 2]), (1000003, [2, 2])])
+def test_a_form_splits_modulo_primes_with_a_root_of_minus_one(p, degrees):
+    curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
+    some = found((X1**2 + X2**2) * (X1 * X3 + Z**2) ** 3, p, curve)
+    assert sorted(one.degree for one in some) == degrees
+    assert sorted(one.exponents for one in some if one.degree == 1) == [(1,)] * degrees.count(1)
+    assert (3,) in [one.exponents for one in some]
+    assert all(one.order == 0 for one in some)
+
+
+def test_orders_along_a_curve_are_those_of_each_component():
+    """X1 = X2 t^0 + t^3 has the order 3 on X1 = X2, 1 on X1 + X2 - 2 Z, and 0 on X3."""
+    curve = [(1, 1, 0, 1), (1, 1), (5,), (1,)]
+    orders = {one.order for one in found((X1**2 - X2**2) * (X1 + X2 - 2 * Z) * X3, 1000033, curve)}
+    assert orders == {0, 1, 3}
+    assert [one.order for one in found(X1 - X2, 1000033, [(1, 1), (1, 1), (5,), (1,)])] == [None]  # it lies there
+
+
+def test_roots_are_points_of_the_component():
+    p = 1000033
+    curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
+    for one in found((X1**2 + X2**2) * X3, p, curve):
+        for t in range(5):
+            for u in one.roots(t):
+                x1, x2, x3, _ = ((a + b * t + u * w) % p for (a, b), w in zip(curve, DIRECTION, strict=True))
+                assert (x1**2 + x2**2) * x3 % p == 0
+    assert not any(one.roots(t) for one in found(X1**2 + X2**2, 1000003, curve) for t in range(5))
+
+
+# Names for every eps: over Q[eps], by polynomials that are those at the eps followed
+
+
+def conics(*signs):
+    """What the map of the Euler top contracts, with these signs; that of its inverse at -eps."""
+    return {
+        f"2*x1^2*eps^2 + x2^2*eps^2 {one} 4*x1*x3*eps^2 + 2*x3^2*eps^2 {other} 2*x2*eps + 1" for one, other in signs
+    }
+
+
+def contracted(map_, eps):
+    return [h for h in singularities(map_, eps).hypersurfaces if h.multiplicity]
+
+
+def test_names_by_hand():
+    """Weierstrass: 1 - 12 eps^2 x is det(I - eps f'); the two conics of the Euler top go over into each other."""
+    weierstrass = load("weierstrass").map
+    (pole,) = (h for h in with_eps(weierstrass, fmpq(1, 7), contracted(weierstrass, "1/7")) if h.is_pole)
+    assert pole.generic == "12*x*eps^2 - 1"
+    found = degree_growth(load("euler_top").map)
+    assert {h.generic for h in found.patterns.contracted} == conics("-+", "+-")
+    assert not any("at eps" in told for told in found.patterns.sentences)
+
+
+@pytest.mark.parametrize("name", ["zhukovski_volterra_2", "volterra_periodic_4"])
+def test_at_the_eps_they_are_what_was_followed(name):
+    map_, eps = load(name).map, fmpq(3, 13)
+    for h in with_eps(map_, eps, contracted(map_, eps)):
+        if h.polynomial == "Z":
+            assert h.generic == ""
+            continue
+        value = parse_polynomial(h.generic, (*map_.variables, "eps")).subs({"eps": eps})
+        wanted = parse_polynomial(h.polynomial, (*map_.variables, "eps"))
+        assert value * wanted.leading_coefficient() == wanted * value.leading_coefficient()
+
+
+def test_at_another_eps_nothing_is_named():
+    """Negative control: the polynomials of one eps are not those of another."""
+    map_ = load("euler_top").map
+    assert [h.generic for h in with_eps(map_, fmpq(1, 5), contracted(map_, "1/7"))] == ["", ""]
+
+
+def test_of_a_composition_of_powers_those_of_its_maps_are_named():
+    map_ = parse_system('[composition]\nof = [{ system = "euler_top", power = 2, inverse = true }]').map
+    assert {h.generic for h in degree_growth(map_, max_terms=1).patterns.contracted} == conics("--", "++")

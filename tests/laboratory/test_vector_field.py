@@ -102,10 +102,7 @@ def holds(file, found):
     return same and list(there) == moved(KahanMap(file.system, eps).step(x))
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["riccati", "lotka_volterra", "weierstrass", "volterra_periodic_3"],
-)
+@pytest.mark.parametrize("name", ["riccati", "lotka_volterra", "weierstrass", "volterra_periodic_3"])
 def test_a_system_is_known_again_after_any_affine_change(name):
     """In the plane, and where invariant hyperplanes are the axes of the catalogue."""
     rng = random.Random(name)

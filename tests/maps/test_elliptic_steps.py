@@ -1,18 +1,21 @@
 """Steps by Somos sequences along an orbit on elliptic curves, against single steps by linear systems.
 
 Specified here: every point is the one that single steps give, in lowest terms as well; sequences are found wherever
-orbits lie on elliptic curves, also on several in turn, and nowhere else; what is wrong in any number is refuted.
+orbits lie on elliptic curves, also on several in turn, and nowhere else; what is wrong in any number is refuted. On
+curves that are made up sections of every degree are found from coordinates that are some of them, and bases are bases.
 """
 
+import random
 from io import StringIO
 
 import pytest
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, nmod
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from orbit_helpers import START, begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
+import kahanmaps.maps.orbits.relations.elliptic_search as search
 import kahanmaps.maps.orbits.relations.elliptic_steps as elliptic_steps
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit
 from kahanmaps import Orbit, load, orbit
@@ -20,6 +23,8 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import lowest
+from kahanmaps.maps.orbits.relations.sections import _of_multiples, forms
+from kahanmaps.maps.somos import around, first_terms
 
 BITS = 10_000
 small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x: fmpq(x.numerator, x.denominator))
@@ -208,3 +213,52 @@ def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_
     expected = single_steps(map_over, begin(map_over), 50)
     at = [point.value for point in Orbit(map_over, START[:3], 50, is_requested={50}.__contains__)]
     assert at[-1] == expected[-1]
+
+
+P = 2**61 - 1
+WARD = tuple(first_terms(fmpq(2), fmpq(3), fmpq(5)))
+
+
+def modular(length):
+    first, others = first_terms(*(nmod(x, P) for x in (12345, 678910, 1112131415)))
+    return around(first, length), around(others, length, first)
+
+
+def points_on_a_curve(degree, size, length):
+    """Points whose coordinates are random combinations of the sections."""
+    W, U = modular(length + 4)
+    rng = random.Random(10 * degree + size)
+    rows = [[rng.randrange(P) for _ in range(degree)] for _ in range(size)]
+    points = []
+    for n in range(2, length):
+        values = [sum((f * c for f, c in zip(forms(degree, W, U, n), row, strict=True)), nmod(0, P)) for row in rows]
+        points.append([int(value / values[-1]) for value in values])
+    return points
+
+
+@pytest.mark.parametrize(
+    ("degree", "size"),
+    [(2, 2), (3, 3), (4, 3), (4, 4), (5, 3), (5, 4), (5, 5), (6, 3), (6, 6), (7, 3), (7, 5), (7, 7), (8, 4), (8, 8)],
+)
+def test_curves_of_any_degree(degree, size):
+    points = points_on_a_curve(degree, size, 150)
+    found = None
+    for needed in search.points_needed(size - 1):
+        try:
+            found = found or search.curve(points[:needed], P)
+        except ArithmeticError:
+            continue
+    assert found is not None
+    assert found.sections.degree == degree
+    assert search.curve(points[: found.sections.points_used], P, found.sections) == found
+
+
+@pytest.mark.parametrize("degree", range(2, 8))
+def test_sections_of_multiples_are_a_basis_and_belong_to_their_degree(degree):
+    W, U = (around(WARD[0], 20), around(WARD[1], 20, WARD[0]))
+    rows = [
+        [*forms(degree + 1, W, U, n), *(U[n] * entry for entry in _of_multiples(degree, W, n))] for n in range(2, 18)
+    ]
+    assert len(rows[0]) == 2 * degree + 1
+    assert fmpq_mat(rows).rank() == degree + 1
+    assert fmpq_mat([row[degree + 1 :] for row in rows]).rank() == degree

@@ -3,14 +3,16 @@
 Specified here: the steps are those of fractions solved entry by entry, whichever way the linear systems are solved (the
 thresholds between the ways are put to 0 and to infinity); long numbers of members are found by elimination
 (test_elimination.py); rows of the equation that do not depend on x are taken out, explicit maps are solved by
-substitution on fractions, and the steps stay the same.
+substitution on fractions, and the steps stay the same. In a plane with homogeneous coordinates the image is the Kahan
+map of u' = h_v, v' = -h_u for 2 eps (u, v) = (U/W, V/W), whatever eps is.
 """
 
 import pytest
 from flint import fmpq, fmpq_poly
-from helpers import NAMED_SYSTEMS
+from helpers import NAMED_SYSTEMS, points, rationals
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from planar_helpers import planar_system
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det
@@ -18,6 +20,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import SingularStep
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.maps.orbits import integer_steps
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -122,3 +125,29 @@ def test_a_step_of_a_map_is_that_of_fractions_and_so_is_its_determinant(name, da
     assert image == IntegerPoint.from_rationals(expected)
     for one, point in map_over.stages(x):
         assert one.determinant(point) == det(one.denominator_matrix(point))
+
+
+# The plane itself, over any numbers.
+
+
+rational = st.integers(-4, 4)
+cubics = st.tuples(rational, rational, rational, rational)
+triples = st.tuples(rational, rational, rational)
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [("image", "step"), ("preimage", "inverse_step")])
+@given(cubic=points(4, rationals(6)), point=points(2), eps=rationals().filter(bool))
+def test_image_and_preimage_are_those_of_the_kahan_map_of_the_plane(ours, theirs, cubic, point, eps):
+    U, V, W = getattr(PlanarBlock(*cubic), ours)((2 * eps * point[0], 2 * eps * point[1], fmpq(1)))
+    try:
+        expected = getattr(KahanMap(planar_system(cubic), eps), theirs)(point)
+    except SingularStep:
+        expected = None
+    assert (None if W == 0 else (U / W / (2 * eps), V / W / (2 * eps))) == expected
+
+
+@given(cubic=cubics, point=triples)
+def test_the_level_is_conserved(cubic, point):
+    block = PlanarBlock(*cubic)
+    (above, below), (h, denominator) = block.level(point), block.level(block.image(point))
+    assert above * denominator == h * below

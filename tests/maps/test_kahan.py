@@ -109,11 +109,7 @@ def test_the_jacobi_determinant_is_the_quotient_of_the_two_denominators(pair, ep
     assert det(phi.jacobian(x)) * phi.determinant(x) == phi.inverse.determinant(phi.step(x))
 
 
-@given(
-    pair=systems_with_points(dims=(2, 3)),
-    data=st.data(),
-    eps=steps,
-)
+@given(pair=systems_with_points(dims=(2, 3)), data=st.data(), eps=steps)
 def test_affine_changes_of_variables_commute_with_the_map(pair, data, eps):
     system, x = pair
     n = system.dim

@@ -3,11 +3,15 @@
 Specified here: the points are those of the map, one after the other and only when asked for; each way to end
 (completed, periodic, singular, budget, precision, interrupted) with its step and its sentence, and that all before it
 is delivered. With a structure, walked in normal form, all that is the same, and balls stay narrow; iterates that are
-reached directly are points of the orbit.
+reached directly are points of the orbit. The method follows from what is asked for; what is written is read back; with
+automatic precision every point that is shown is as accurate as asked for, or the orbit ended otherwise.
 """
 
+import csv
+import json
 import signal
 
+import numpy as np
 import pytest
 from flint import fmpq
 from helpers import (
@@ -23,10 +27,17 @@ from helpers import (
 from hypothesis import assume, given
 from planar_helpers import over_members, side_by_side, structure_and_system
 
+import kahanmaps as km
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.parsing import parse_number
+from kahanmaps.checks.conserve import functions_along
+from kahanmaps.documents.catalog import load
+from kahanmaps.family.random_members import random_member_with_eigenvalues
+from kahanmaps.family.system_normal_form import NoNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
+from kahanmaps.maps.orbits.methods import choose_method
+from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
@@ -210,3 +221,136 @@ def test_an_iterate_in_flight_is_given_up_when_a_signal_asks_for_it():
         signal.signal(signal.SIGALRM, previous)
     assert seen == [5]
     assert (orbit.end.status, orbit.end.steps) == ("interrupted", 5)
+
+
+SPLIT, _ = structure_and_system("m = 2")
+UNSPLIT, _ = structure_and_system("m = 2, sqrt 2")
+NONE = NoNormalForm("H is not a homogeneous cubic")
+
+
+@pytest.mark.parametrize(
+    ("wish", "arithmetic", "normal_form", "at", "expected"),
+    [
+        (None, "exact", NONE, None, "generic"),
+        (None, "mod", NONE, (10**9,), "generic"),
+        ("generic", "exact", SPLIT, (10**9,), "generic"),
+        (None, "exact", SPLIT, None, "normal-form"),
+        (None, "exact", UNSPLIT, None, "normal-form"),
+        (None, "float", UNSPLIT, None, "normal-form"),
+        (None, "float", SPLIT, (10**9,), "normal-form"),
+        (None, "ball", UNSPLIT, None, "normal-form"),
+        (None, "mod", SPLIT, None, "generic"),
+        ("normal-form", "exact", SPLIT, None, "normal-form"),
+        ("normal-form", "ball", UNSPLIT, None, "normal-form"),
+        ("doubling", "exact", UNSPLIT, (3,), "doubling"),
+        ("doubling", "mod", SPLIT, (3,), "doubling"),
+        # Iterates wanted alone are reached directly from a certain step on, where they are few.
+        (None, "exact", SPLIT, (23,), "normal-form"),
+        (None, "exact", SPLIT, (24,), "doubling"),
+        (None, "exact", SPLIT, (1, 2, 40), "doubling"),
+        (None, "exact", SPLIT, (1, 2, 3, 4, 5, 40), "normal-form"),
+        (None, "exact", SPLIT, (1, 2, 3, 40), "doubling"),
+        (None, "exact", UNSPLIT, (24,), "doubling"),
+        (None, "exact", UNSPLIT, tuple(range(10, 25)), "normal-form"),
+        (None, "mod", UNSPLIT, (9_999,), "generic"),
+        (None, "mod", UNSPLIT, (10_000,), "doubling"),
+        (None, "mod", UNSPLIT, tuple(range(10_001)), "doubling"),
+        (None, "ball", SPLIT, (0,), "normal-form"),
+        (None, "ball", SPLIT, (1,), "doubling"),
+        (None, "exact", SPLIT, (), "normal-form"),
+    ],
+)
+def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, normal_form, at, expected):
+    found = choose_method(wish, arithmetic, normal_form, at)
+    assert found.name == expected
+    assert found.text == f"method {expected}: {found.reason}"
+
+
+TOP = load("euler_top")
+ARITHMETICS = ["exact", "float", "mod:101", "ball:100"]
+
+
+def walk(arithmetic="exact", **options):
+    found = km.orbit(TOP, [1, "1/2", "-1/3"], "1/10", **({"steps": 4} | options), arithmetic=arithmetic)
+    found.integrals = functions_along(TOP, [("", "F1"), ("p", "1/(x1 - 1)")], arithmetic == "float")
+    return found
+
+
+def read(path):
+    """The texts of the points in a file, and its first and last record."""
+    if path.suffix == ".jsonl":
+        header, *points, end = map(json.loads, path.read_text().splitlines())
+        return [[str(entry) for entry in point["x"]] for point in points], header, end
+    if path.suffix == ".csv":
+        meta = json.loads(path.with_name("o.csv.meta.json").read_text())
+        _, *rows = csv.reader(path.read_text().splitlines())
+        return [row[1:4] for row in rows], meta["header"], meta["end"]
+    with np.load(path) as held:
+        meta, x = json.loads(str(held["meta"])), held["x"].tolist()
+    return [[e.decode() if isinstance(e, bytes) else str(e) for e in row] for row in x], meta["header"], meta["end"]
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("ending", ["csv", "jsonl", "npz"])
+def test_what_is_written_is_read_again(tmp_path, arithmetic, ending):
+    path = tmp_path / f"o.{ending}"
+    status = walk(arithmetic).write(path, name="top").status
+    points, header, end = read(path)
+    assert (status, end["status"], header["system"]) == ("completed", "completed", "top")
+    assert points == [list(point.text) for point in walk(arithmetic)]
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_a_table_has_the_values_of_integrals_and_none_at_a_pole(arithmetic):
+    rows = walk(arithmetic).rows()
+    assert list(rows[0]) == ["step", *TOP.variables, "F1", "p"]
+    assert rows[0]["p"] is None
+    assert rows[1]["p"] is not None
+    if arithmetic in ("exact", "mod:101"):
+        assert len({row["F1"] for row in rows}) == 1
+
+
+SPINNING = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
+NEAR = random_member_with_eigenvalues([1, fmpq(10001, 10000), fmpq(10002, 10000)], seed=23)
+START = [fmpq(0), fmpq(3, 29), fmpq(2, 27), fmpq(-3, 29), fmpq(3, 26), fmpq(-1, 23)]
+
+
+def worst(x) -> float:
+    """The largest radius over the largest coordinate."""
+    return max(float(entry.rad()) for entry in x) / max(abs(float(entry.mid())) for entry in x)
+
+
+@pytest.mark.parametrize("digits", [15, 40])
+@pytest.mark.parametrize("steps", [10, 100, 300])
+def test_stepping_is_as_accurate_as_asked_for(steps, digits):
+    def orbit_with(bits):
+        return Orbit(KahanMap(SPINNING, "1/10", RR(bits)), [1, 2, 3], steps)
+
+    orbit = orbit_with(bits_for(orbit_with, digits))
+    assert all(worst(point.x) <= 10.0**-digits for point in orbit)
+    assert orbit.end.status == "completed"
+
+
+@pytest.mark.parametrize("at", [[1000], [10, 100, 1000, 10000, 100000]])
+@pytest.mark.parametrize("digits", [15, 60])
+def test_jumps_are_as_accurate_as_asked_for(at, digits):
+    system = NEAR.chosen.system
+    normal_form = system_normal_form(system, member=NEAR)
+
+    def orbit_with(bits):
+        return Orbit(KahanMap(system, "1/20", RR(bits)), START, at=at, normal_form=normal_form)
+
+    orbit = orbit_with(bits_for(orbit_with, digits))
+    assert all(worst(point.x) <= 10.0**-digits for point in orbit)
+    assert (orbit.end.status, orbit.end.steps) == ("completed", at[-1])
+
+
+def test_where_no_precision_is_enough_that_is_said():
+    # 1/4, 1/3, 1/2, 1, and then a pole, which no ball can tell from a point near it
+    riccati = QuadraticSystem.from_text(["x"], ["x^2"])
+
+    def orbit_with(bits):
+        return Orbit(KahanMap(riccati, "1/2", RR(bits)), ["1/4"], 9)
+
+    with pytest.raises(NotAccurate, match="give 15 digits"):
+        bits_for(orbit_with, 15)

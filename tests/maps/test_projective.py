@@ -64,11 +64,7 @@ def test_the_forms_at_an_affine_point_are_proportional_to_its_image(n, seed):
 
 @pytest.mark.parametrize(
     ("image", "degree"),
-    [
-        (["y", "-x + 3*y/(y^2 - 1)"], 3),
-        (["y/x", "(x*z + 1)/(x*y)", "x/(y + 1)"], 3),
-        (["1/x", "x*y", "z + y"], 3),
-    ],
+    [(["y", "-x + 3*y/(y^2 - 1)"], 3), (["y/x", "(x*z + 1)/(x*y)", "x/(y + 1)"], 3), (["1/x", "x*y", "z + y"], 3)],
 )
 def test_the_forms_of_an_explicit_map_are_its_minors_without_common_factor(image, degree):
     names, over = NAMES[: len(image)], GF(1000003)

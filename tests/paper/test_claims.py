@@ -3,13 +3,19 @@
 Every claim is evaluated as it stands on members with every kind of spectrum, at a random point over GF(p), where a
 false one holds with probability below 2^-50; sides are compared here, not by the library. Every control that a claim
 names has to refute it on every one of these members, but for m = 1, where some hypotheses cannot be broken.
+Letters for which the library has code of its own are what the formulas of the paper give.
 """
 
+import random
+
 import pytest
+from flint import fmpq
 from helpers import together
 from paper.members import LARGE_SPECTRA, SPECTRA, member, point, values
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import SingularMatrix, SingularStep
+from kahanmaps.paper import specialize
 from kahanmaps.paper.controls import CONTROLS, broken
 from kahanmaps.paper.registry import ClaimKind, claims
 
@@ -138,3 +144,33 @@ def test_a_control_leaves_the_unbroken_objects_as_they_were():
     for control in CONTROLS:
         broken(control, o)
     assert (o.A, o.J, o.third, o.eps, o.roots, o.step_eps, o.minus, o.method) == before
+
+
+# Letter -> what gives it, for every index i of a root.
+LETTERS = {
+    "H_i": lambda o, i: o.H(o.x, i),
+    "nabla H_i": lambda o, i: o.gradient_of_chain(i, o.x),
+    "f_i": lambda o, i: o.value(o.f_(i), o.x),
+    "f_i'": lambda o, i: o.jac(o.f_(i), o.x),
+    "B_i": lambda o, i: o.B(i),
+    "B_s": lambda o, i: o.B_signs([-1 if j <= i else 1 for j in o.each]),
+    "x~": lambda o, i: o.step(o.f, o.x, times=i + 1),
+    "dPhi": lambda o, i: o.jacobian_of_step(o.f_(i), o.x),
+    "H~": lambda o, i: o.H_tilde(o.x),
+    "K~_i": lambda o, i: o.integral(o.g_(i), o.x),
+    "modified H": lambda o, i: o.modified_H(o.x),
+    "Pi": lambda o, i: o.Pi(o.x),
+}
+
+
+@pytest.mark.parametrize("name", ["m=2, split", "m=3, split"])
+@pytest.mark.parametrize("letter", LETTERS)
+def test_a_letter_of_the_library_is_that_of_the_formulas(name, letter):
+    found = member(name)
+    roots = specialize.rational_roots(found)
+    library = specialize.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
+    formulas = library.changed(base=None, known_chi=None, draw=library.vector)
+    other = formulas.changed(third=library.third * fmpq(2), roots=roots[::-1], draw=library.vector)
+    ours, theirs, wrong = ([values(LETTERS[letter](o, i)) for i in o.each] for o in (library, formulas, other))
+    assert ours == theirs
+    assert ours != wrong

@@ -2,11 +2,13 @@
 
 For a member with distinct roots every claim is proved, m = 7 and 8 aside, and misprints are refuted. Beside each proof
 stand random points over GF(p) with an error bound. Where chi has repeated roots, claims that need distinct ones are
-undecided and say why; nothing is refuted there but misprints.
+undecided and say why; nothing is refuted there but misprints. In
+the table of what survives beyond the paper everything is proved, or refuted by a smallest counterexample.
 """
 
 import random
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from flint import fmpq_mat, fmpq_poly
@@ -21,8 +23,11 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.paper import specialize
 from kahanmaps.paper import verify as verify_module
+from kahanmaps.paper.claims.beyond_table import beyond_table, smallest_counterexample, table
+from kahanmaps.paper.claims.further_claims import STATEMENTS
 from kahanmaps.paper.controls import CONTROLS
 from kahanmaps.paper.registry import ClaimKind, claims
+from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import Verifier, VerifyOptions, verify
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Certainty.PROVED, Certainty.REFUTED, Certainty.SUPPORTED, Certainty.UNDECIDED
@@ -315,3 +320,36 @@ def test_of_many_sign_vectors_all_single_flips_are_tried_and_up_to_four_others(m
     for others in (sample[m:] for sample in samples):
         assert len({*others, *flips}) == m + len(others)
         assert all(len(signs) == m and signs[0] == 1 and set(signs) == {1, -1} for signs in others)
+
+
+PAGE = Path(__file__).parent.parent.parent / "docs" / "beyond.md"
+FUNCTIONS = {formula: function for function, formula, *_ in STATEMENTS}
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.slow
+def test_every_cell_is_proved_or_refuted_by_a_counterexample_and_the_page_shows_the_table():
+    report = beyond_table(3)
+    answers = {
+        (formula, name): sign
+        for _, formula, *_, signs in STATEMENTS
+        for name, sign in zip(VARIATIONS, signs, strict=True)
+    }
+    found = {(one.place["statement"], one.place["variation"]): one.verdict for one in report.findings}
+    words = {"+": Certainty.PROVED, "-": Certainty.REFUTED}
+    assert found == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
+    assert table(report) in PAGE.read_text(encoding="utf-8")
+    for one in report.findings:
+        assert (one.verdict is Certainty.REFUTED) is one.control is (one.witness is not None)
+        assert one.witness is None or one.witness.left != one.witness.right
+
+
+def test_without_a_term_of_lower_degree_the_counterexample_is_none():
+    text, witness = smallest_counterexample(FUNCTIONS["eps^{-1} x^T J^{-1} x~ is conserved by f"], "inhomogeneous")
+    assert text == "m = 1, H = u1^3 + v1"
+    assert witness.point == ("0", "0")
+
+
+@pytest.mark.slow
+def test_what_holds_has_no_counterexample():
+    assert smallest_counterexample(FUNCTIONS["modified H is conserved by f"], "inhomogeneous") is None
