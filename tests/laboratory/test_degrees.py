@@ -6,6 +6,7 @@ The sequences were computed by others, modulo two primes each, or are in the lit
 
 import random
 from dataclasses import replace
+from functools import cache
 
 import pytest
 from degree_helpers import polynomial_degrees
@@ -22,6 +23,11 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 DAILY = ["riccati", "weierstrass", "euler_top", "henon_heiles", "zander_120", "paper_m3"]
 OPEN = Patterns((), None, False, "not looked at")
+
+
+@cache
+def of_lotka_volterra() -> DegreeGrowth:
+    return degree_growth(load("lotka_volterra").system)
 
 
 @pytest.mark.parametrize("name", quick(names(), DAILY))
@@ -121,7 +127,7 @@ def test_the_budget_and_the_degree_are_limits():
     assert (found.ended, found.degrees, found.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
     assert found.message == "work limit reached at iterate 8; raise --effort"
     assert found.to_json() == degree_growth(henon_heiles, effort=Budget(100_000)).to_json()
-    known = degree_growth(load("lotka_volterra").system).patterns
+    known = of_lotka_volterra().patterns
     found = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
     assert (found.ended, found.enclosure) == ("derived", None)
     assert found.notes == ("work limit reached before bounds of the dynamical degree were proved; raise --effort",)
@@ -144,13 +150,13 @@ def test_a_time_limit_keeps_the_degrees_that_were_measured():
     assert (found.ended, found.degrees) == ("stopped", (1, 3, 7, 17, 39))
     assert found.message == "the time limit of 1 s is over at iterate 5"
     assert len(found.to_json()["lines"]) == 2
-    whole = degree_growth(load("lotka_volterra").system)
 
     def stop_later(sentence):
         if sentence.startswith("dynamical degree"):
             raise TimeLimit("the time limit of 1 s is over")
 
     found = degree_growth(load("lotka_volterra").system, progress=stop_later)
+    whole = of_lotka_volterra()
     assert found == replace(whole, enclosure=None, message=f"{whole.message}; the time limit of 1 s is over")
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         degree_growth(load("henon_heiles").system, effort=Budget(1e9), progress=stop)

@@ -17,6 +17,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.cubics import belongs, default_variables
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.recognition import find_family_structure_of
+from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.conclusion import contradictions
 from kahanmaps.laboratory.growth.degrees import degree_growth
@@ -30,6 +31,9 @@ MEMBERS = {
     "m = 3, partly split": random_member_with_chi((t - 1) * (t**2 + 1), 1),
 }
 over_members = pytest.mark.parametrize("name", MEMBERS)
+STRUCTURE = [
+    step for step in ANALYSES if step.name in ("Hamiltonian structure", "the commuting family", "a larger algebra")
+]
 
 
 def elsewhere(H, seed: int) -> QuadraticSystem:
@@ -39,16 +43,15 @@ def elsewhere(H, seed: int) -> QuadraticSystem:
     return moved(CubicHamiltonian(H, standard_structure(n)), R).about([fmpq(k + 1, 2) for k in range(n)]).system
 
 
-def analysed(system: QuadraticSystem):
-    """What is found at once: the structure needs little work, and the rest is not asked for here."""
-    return analyze(SystemFile.from_system(system), effort=-6)
+def analysed(system: QuadraticSystem, analyses=STRUCTURE):
+    return analyze(SystemFile.from_system(system), effort=-6, analyses=analyses)
 
 
 @cache
 def moved_member(name: str):
     """A member in other coordinates, and what is found of it."""
     system = elsewhere(MEMBERS[name].H, 5)
-    return system, analysed(system)
+    return system, analysed(system, ANALYSES)
 
 
 def proved(found) -> list[str]:

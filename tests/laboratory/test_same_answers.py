@@ -21,9 +21,10 @@ from kahanmaps.laboratory.singular.singularities import singularities
 from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
-SYSTEMS = ("harmonic", "weierstrass", "nahm_tetrahedral", "riccati")
+SYSTEMS = ("weierstrass", "riccati")
 LARGE = ("lotka_volterra", "euler_top", "paper_m2", "volterra_periodic_5", "three_wave", "paper_m3_irreducible")
-LARGE += ("kirchhoff_generic", "nahm_icosahedral", "scan")
+LARGE += ("kirchhoff_generic", "nahm_icosahedral", "harmonic", "nahm_tetrahedral")
+LARGE += ("scan", "integrals", "densities", "limits")
 # Analyses, and searches of their own that are cut by their budgets, or begin at other points than an analysis does.
 PROGRAM = """
 import json, sys
@@ -66,8 +67,8 @@ for name in names:
         found = analysis.analyze(load(name), processes=int(processes))
         print(json.dumps(found.to_json()), found.work)
 """
-SEARCHES = ("degrees", "singularities", "heights", "integrals", "integrals of a flow", "integrals of a map")
-SEARCHES += ("integrals with symbols", "densities", "limits", "scan in a hurry")
+SEARCHES = ("degrees", "singularities", "heights", "integrals of a flow", "integrals of a map")
+SEARCHES += ("integrals with symbols", "scan in a hurry")
 
 
 def answers(names, hash_seed, processes):

@@ -7,6 +7,7 @@ system, exactly, and is what it finds there.
 import re
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_mpoly
@@ -82,6 +83,20 @@ def image_of(name: str, how: str) -> Image:
     return Image(parse_system(f"variables = {names}\n{section} = {moved}"), scale, place, speed)
 
 
+@cache
+def found_for(search, name: str, how: str, *arguments, **options):
+    """The image, and what a search finds for it; for the system itself that is wanted several times."""
+    image = image_of(name, how)
+    return image, search(image.file, *arguments, **options)
+
+
+def both(search, name: str, how: str, *arguments, **options):
+    """What a search finds for the system itself, the image, and what it finds for that."""
+    return found_for(search, name, "same", *arguments, **options)[1], *found_for(
+        search, name, how, *arguments, **options
+    )
+
+
 def primitive(P: fmpq_mpoly) -> str:
     """A polynomial up to a factor."""
     return str(primitive_part(P)[1])
@@ -100,8 +115,7 @@ def cases(*names):
 
 @pytest.mark.parametrize(("name", "how"), cases("lorenz", "euler", "conjugate", "double", "weighted"))
 def test_darboux_polynomials_of_flows(name, how):
-    same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (darboux_polynomials(one.file, 2, flow=True) for one in (same, image))
+    found, image, moved = both(darboux_polynomials, name, how, 2, flow=True)
     assert (found.reason, moved.reason) == ("", "")
     wanted = {primitive(P) for space in found.spaces for P in space.polynomials}
     assert {primitive(image.back(P).numerator) for space in moved.spaces for P in space.polynomials} == wanted
@@ -112,8 +126,7 @@ def test_darboux_polynomials_of_flows(name, how):
 
 @pytest.mark.parametrize(("name", "how"), cases("euler", "volterra", "lyness", "todd", "fibonacci"))
 def test_darboux_polynomials_of_maps(name, how):
-    same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (darboux_polynomials(one.file, 3) for one in (same, image))
+    found, image, moved = both(darboux_polynomials, name, how, 3)
     assert (found.reason, moved.reason) == ("", "")
     assert found.spaces
     wanted = sorted(span(space.polynomials) for space in found.spaces)
@@ -131,11 +144,10 @@ INTEGRALS = ["euler", "lorenz", "volterra", "conjugate", "lyness", "todd"]
 )
 def test_integrals(name, how, flow):
     """As many as there, and moved back they are integrals there: all is proved."""
-    same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (find_integrals(one.file, flow=flow, max_degree=4) for one in (same, image))
+    found, image, moved = both(find_integrals, name, how, flow=flow, max_degree=4)
     assert (len(found.integrals), found.reason) == (len(moved.integrals), moved.reason)
     assert len(found.time_dependent) == len(moved.time_dependent)
-    laboratory = Laboratory(same.file, flow=flow)
+    laboratory = Laboratory(found.file, flow=flow)
     assert all(laboratory.verdict_on(image.back(one.function))[0].holds for one in moved.integrals)
     for one in moved.time_dependent:
         back, speed = image.back(one.integral.function), fmpq(image.speed.numerator, image.speed.denominator)
@@ -148,19 +160,17 @@ def test_integrals(name, how, flow):
 
 @pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "double", "predators", "lyness", "todd"))
 def test_densities(name, how):
-    same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (find_densities(one.file).densities for one in (same, image))
-    assert found
-    wanted = sorted(primitive(one.function.numerator) for one in found)
-    assert sorted(primitive(image.back(one.function).numerator) for one in moved) == wanted
+    found, image, moved = both(find_densities, name, how)
+    assert found.densities
+    wanted = sorted(primitive(one.function.numerator) for one in found.densities)
+    assert sorted(primitive(image.back(one.function).numerator) for one in moved.densities) == wanted
 
 
 @pytest.mark.parametrize(("name", "how"), cases("predators", "volterra", "conjugate", "lyness"))
 def test_poisson_tensors(name, how):
     """{y_i, y_j} is scale_i scale_j {x_i, x_j}: all tensors together span the same space."""
-    same, image = image_of(name, "same"), image_of(name, how)
     spaces = []
-    for one, tensors in ((same, find_poisson(same.file, 3)), (image, find_poisson(image.file, 3))):
+    for one, tensors in (found_for(find_poisson, name, which, 3) for which in ("same", how)):
         n, entries = len(one.place), []
         context = ring([*"xyzw"[:n], "eps", *(f"d{i}" for i in range(n))])
         d = context.gens()[n + 1 :]
@@ -179,11 +189,14 @@ def test_poisson_tensors(name, how):
     assert spaces[0] == spaces[1]
 
 
-@pytest.mark.parametrize(("name", "how"), cases("euler", "volterra", "periodic", "predators", "weighted"))
+def symmetries_of(file):
+    return linear_symmetries(file.system)
+
+
+@pytest.mark.parametrize(("name", "how"), cases("predators", "euler", "volterra", "periodic", "weighted"))
 def test_symmetries(name, how):
     """Matrix and all: S for y is M S M^-1; in dimension 4 only permutations of scaled variables are sought."""
-    same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (linear_symmetries(one.file.system) for one in (same, image))
+    found, image, moved = both(symmetries_of, name, how)
     assert (found.order, found.reversing_order) == (moved.order, moved.reversing_order)
     assert len(found.infinitesimal) == len(moved.infinitesimal)
     M = image.matrix
@@ -192,11 +205,14 @@ def test_symmetries(name, how):
     assert len(wanted) > 1
 
 
+def quadratic_fields_of(file):
+    return commuting_systems(file.system, "quadratic")
+
+
 @pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "predators", "double"))
 def test_commuting_fields(name, how):
     """g for y is M g(M^-1 y), and runs faster as f does."""
-    same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (commuting_systems(one.file.system, "quadratic") for one in (same, image))
+    found, image, moved = both(quadratic_fields_of, name, how)
     assert found.complete
     assert moved.complete
     assert len(found.families) == len(moved.families)

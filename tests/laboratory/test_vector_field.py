@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_mat
+from helpers import THOROUGH
+from search_helpers import random_system
 
 from kahanmaps import KahanMap, System
 from kahanmaps.documents.catalog import load
@@ -148,9 +150,12 @@ def test_a_near_miss_is_no_equivalence():
     assert not holds(bad, found)
 
 
-def test_the_conjugate_fixed_points_of_a_generic_system_in_dimension_6_are_counted():
-    path = Path(__file__).parent / "further_systems" / "hamiltonian_6_generic.toml"
-    found = fixed_points(read_system(path))
-    assert (found.undecided, [(one.dimension, one.count) for one in found.found]) == ("", [(0, 64)])
-    short = fixed_points(read_system(path), effort=-5)
+GENERIC = [random_system(3, 1), read_system(Path(__file__).parent / "further_systems" / "hamiltonian_6_generic.toml")]
+
+
+@pytest.mark.parametrize("file", [GENERIC[0], pytest.param(GENERIC[1], marks=THOROUGH)], ids=["3", "6"])
+def test_the_conjugate_fixed_points_of_a_generic_system_are_counted(file):
+    found = fixed_points(file)
+    assert (found.undecided, [(one.dimension, one.count) for one in found.found]) == ("", [(0, 2**file.dim)])
+    short = fixed_points(file, effort=-20)
     assert (short.found, short.undecided) == ((), "work limit reached; raise --effort")

@@ -11,14 +11,14 @@ from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 SYSTEMS: list[tuple[str, dict[str, Any]]] = [
-    ("lotka_volterra", {"effort": -5}),
+    ("lotka_volterra", {"effort": -7}),
     ("lotka_volterra", {}),
     ("weierstrass", {}),
     ("weierstrass", {"eps": "1/5"}),
     ("zander_120", {}),
     ("riccati", {}),
     ("harmonic", {}),
-    ("euler_top", {"symbols": ["a1"]}),
+    ("weierstrass", {"symbols": ["g2"]}),
     ("x' = 0; y' = 0", {}),
     ("x' = 0; y' = 0; z' = 0", {}),
 ]

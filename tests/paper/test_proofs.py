@@ -8,7 +8,7 @@ a changed right-hand side, which must be refuted both at random points and in no
 from dataclasses import replace
 
 import pytest
-from helpers import together
+from helpers import quick, together
 from paper.members import member, named, point, verifier_of
 
 from kahanmaps.checks.certify import Contradiction
@@ -119,12 +119,13 @@ def changed(claim):
     return replace(claim, function=function)
 
 
-@together("claim", IDENTITIES)
-def test_a_claim_with_a_changed_side_has_no_proof(claim, only):
-    only(changed(claim))
-    m = claim.only_m or claim.least_m
-    with pytest.raises(Contradiction):
-        normal_form_proof(claim.key, claim.blocks_for_proof(m), 2)
+@pytest.mark.parametrize("k", quick(range(4), [0]))
+def test_a_claim_with_a_changed_side_has_no_proof(k, only):
+    for claim in IDENTITIES[k::4]:
+        only(changed(claim))
+        m = claim.only_m or claim.least_m
+        with pytest.raises(Contradiction):
+            normal_form_proof(claim.key, claim.blocks_for_proof(m), 2)
 
 
 @together("claim", IDENTITIES)
