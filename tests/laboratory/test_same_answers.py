@@ -56,7 +56,7 @@ SEARCHES = {
     "densities": lambda: km.find_densities("somos_4"),
     "limits": lambda: flow_and_map(km.find_integrals("lotka_volterra")),
     "scan": lambda: scan(lines, ["g"], terms=3, primes=[11, 13, 17], jobs=int(processes)),
-    "scan in a hurry": lambda: scan(lines, ["g"], terms=4, primes=[31, 37, 41], jobs=int(processes), effort=-9),
+    "scan in a hurry": lambda: scan(lines, ["g"], terms=4, primes=[31, 37, 41], jobs=int(processes), effort=-13),
 }
 for name in names:
     before = counted()
