@@ -284,7 +284,15 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
         ]
         if not moving:
             continue
-        shapes = {i: _extended(quotients[i].shape, axes[j][i], j) for i in moving}
+        shapes = {}
+        for i in moving:  # the possible monomials after adding symbol j, with its exponents on the axis
+            sides = zip((quotients[i].shape.numerator, quotients[i].shape.denominator), axes[j][i], strict=True)
+            shapes[i] = Shape(
+                *(
+                    tuple((*m[:j], e, *m[j + 1 :]) for m in monomials for e, c in enumerate(side.coeffs()) if int(c))
+                    for monomials, side in sides
+                )
+            )
         bound = max(sum(_size(axes[a][i][0]) + _size(axes[a][i][1]) for a in active) + 2 for i in moving)
         if max(shape.unknowns for shape in shapes.values()) > bound:
             direction = tuple(rng.randrange(1, p) if i in active else 0 for i in range(symbols))
@@ -367,16 +375,6 @@ def _least_fraction(through: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[n
             return None
         quotient, remainder = divmod(before[0], N)
         before, after = after, (remainder, before[1] - quotient * D)
-
-
-def _extended(shape: Shape, pair: tuple[nmod_poly, nmod_poly], j: int) -> Shape:
-    """Return the possible monomials after adding symbol j, with its exponents on the axis."""
-
-    def times(monomials: tuple[Exponents, ...], polynomial: nmod_poly) -> tuple[Exponents, ...]:
-        exponents = [e for e, c in enumerate(polynomial.coeffs()) if int(c)]
-        return tuple((*m[:j], e, *m[j + 1 :]) for m in monomials for e in exponents)
-
-    return Shape(times(shape.numerator, pair[0]), times(shape.denominator, pair[1]))
 
 
 # -- the linear systems: quotients with given monomials from values modulo a prime ------------------------------------

@@ -111,7 +111,12 @@ def read_structured_facts(
         **dict.fromkeys(("title", "convention"), (lambda value: isinstance(value, str), "text")),
         "sources": (lambda value: _are_texts(value) and set(value) <= set(SOURCES), "a list of keys of sources.py"),
         "facts": (_are_texts, "a list of texts"),
-        "degrees": (_are_degrees, "a list of positive integers of at most 100 digits, d_1 first"),
+        "degrees": (
+            lambda value: (
+                isinstance(value, list) and bool(value) and all(type(d) is int and 0 < d < 10**100 for d in value)
+            ),
+            "a list of positive integers of at most 100 digits, d_1 first",
+        ),
         "growth": (GROWTHS.__contains__, f"one of {', '.join(GROWTHS)}"),
         "verdict": (VERDICTS.__contains__, f"one of {', '.join(VERDICTS)}"),
         "dynamical_degree": (_is_minimal, "an irreducible polynomial in x with leading coefficient 1"),
@@ -147,10 +152,6 @@ def _are_texts(value: Any) -> bool:
 
 def _are_tables(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(item, dict) for item in value)
-
-
-def _are_degrees(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(type(d) is int and 0 < d < 10**100 for d in value)
 
 
 def _is_minimal(text: Any) -> bool:

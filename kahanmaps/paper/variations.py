@@ -48,7 +48,14 @@ def jordan_block(o: PaperObjects) -> PaperObjects:
     S, _ = o.symplectic_normal_form()
     A = -(S * o.doubled(o.companion(chi)) * o.J * S.transpose() * o.J)
     p = o.changed(A=A, known_chi=chi, base=None, draw=o.vector)
-    return p.changed(roots=None, third=_cubic(p), associate_matrices=_signs(o, A, roots), draw=o.vector)
+    # The third derivatives of a sum of l(M_a(x)^3), l the functional that pairs t^k with C_k: it is of the space.
+    terms = []
+    for name in ("d1", "d2", "d3"):
+        powers = [p.A_to(k) * p.vector(name) for k in range(p.m)]
+        for k in range(p.m):
+            for l in range(p.m):
+                terms.append(p.tensor(powers[k], powers[l], p.horner(k) * p.horner(l) * p.vector(name)))
+    return p.changed(roots=None, third=p.sum(terms), associate_matrices=_signs(o, A, roots), draw=o.vector)
 
 
 def derogatory(o: PaperObjects) -> PaperObjects:
@@ -68,17 +75,6 @@ def _signs(o: PaperObjects, A: Any, roots: tuple[Any, ...]) -> tuple[Any, ...]:
     for root in (*roots[:2], *roots[3:]):
         E = E * (A - o.I * root) * (o.K.one / (simple - root))
     return (o.I + E * (o.minus - o.K.one),)
-
-
-def _cubic(p: PaperObjects) -> Any:
-    """The third derivatives of a sum of l(M_a(x)^3), l the functional that pairs t^k with C_k: it is of the space."""
-    terms = []
-    for name in ("d1", "d2", "d3"):
-        powers = [p.A_to(k) * p.vector(name) for k in range(p.m)]
-        for k in range(p.m):
-            for l in range(p.m):
-                terms.append(p.tensor(powers[k], powers[l], p.horner(k) * p.horner(l) * p.vector(name)))
-    return p.sum(terms)
 
 
 _CMOQ = "the theorem of Celledoni, McLachlan, Owren and Quispel"

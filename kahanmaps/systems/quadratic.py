@@ -214,7 +214,8 @@ class SystemOver:
         with field.working():
             for i, polynomial in enumerate(system.rhs):
                 for monomial, coefficient in polynomial.terms():
-                    where = _indices(monomial[:n])
+                    # Of the variables in the monomial, each as often as it occurs.
+                    where = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
                     # Twice x_j^2/2 is an integer: f'' makes sense modulo 2 where Q does not.
                     is_square = len(where) == 2 and where[0] == where[1]
                     value = field.convert(coefficient * 2 if is_square else coefficient)
@@ -285,8 +286,3 @@ def as_system(value: Any) -> QuadraticSystem:
         return value
     system: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
     return system
-
-
-def _indices(monomial: Sequence[int]) -> list[int]:
-    """Of the variables in a monomial, each as often as it occurs."""
-    return [j for j, exponent in enumerate(monomial) for _ in range(exponent)]

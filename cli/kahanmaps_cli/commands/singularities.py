@@ -65,6 +65,26 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     verdict = runs[0].verdict if agree else lib.UNDECIDED
     symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
+        of_run = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
+        of_each = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
+        steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
+        records = [
+            {
+                **lib.attributes(run, *of_run, singular_everywhere="is_undefined", dominant="is_dominant"),
+                "eps": str(run.eps),
+                "time_step": lib.eps_record(run.eps, file.map)["time_step"],
+                "maps_a_step": None if run.word is None else run.word.length,
+                "hypersurfaces": [
+                    {
+                        **lib.attributes(surface, *of_each, "followed", "settled_at", "note", "stage"),
+                        **{name: [getattr(step, of) for step in surface.steps] for name, of in steps.items()},
+                        "primes": [str(prime) for prime in surface.primes],
+                    }
+                    for surface in run.hypersurfaces
+                ],
+            }
+            for run in runs
+        ]
         print_json(
             record_of(
                 "singularities",
@@ -75,7 +95,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
                 **search.work,
                 verdict=verdict,
                 symbolic_denominator=symbolic,
-                runs=[_run_record(file, run) for run in runs],
+                runs=records,
             )
         )
     else:
@@ -101,23 +121,3 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             why = next(h.note for run in runs for h in run.hypersurfaces if h.note)
         print_stderr(f"undecided: {why}")
     return 3 if verdict == lib.UNDECIDED or search.is_over else 0
-
-
-def _run_record(file: lib.SystemFile, run: lib.SingularityRun) -> dict[str, Any]:
-    of_run = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
-    of_each = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
-    steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
-    return {
-        **lib.attributes(run, *of_run, singular_everywhere="is_undefined", dominant="is_dominant"),
-        "eps": str(run.eps),
-        "time_step": lib.eps_record(run.eps, file.map)["time_step"],
-        "maps_a_step": None if run.word is None else run.word.length,
-        "hypersurfaces": [
-            {
-                **lib.attributes(surface, *of_each, "followed", "settled_at", "note", "stage"),
-                **{name: [getattr(step, of) for step in surface.steps] for name, of in steps.items()},
-                "primes": [str(prime) for prime in surface.primes],
-            }
-            for surface in run.hypersurfaces
-        ],
-    }

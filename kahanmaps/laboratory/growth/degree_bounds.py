@@ -194,8 +194,15 @@ def _search_lower_bound(
     if not bounds:
         return None
     steps = max(bounds, key=bounds.__getitem__)
-    largest = 0
-    for start in _random_tangents(map_.field.characteristic, rng):
+    # Tangents of a random conic: the lines with coordinates (1 : s : s^2), moved by a random matrix.
+    p, largest = map_.field.characteristic, 0
+    matrix = nmod_mat(3, 3, p)
+    while not int(matrix.det()):
+        matrix = nmod_mat(3, 3, [rng.randrange(p) for _ in range(9)], p)
+    for s in rng.sample(range(p), _TANGENTS):
+        # X + s Y + s^2 Z = 0 at (-s - s^2 t : 1 : t)
+        points, zero = [nmod_poly([-s, -s * s], p), nmod_poly([1], p), nmod_poly([0, 1], p)], nmod_poly([], p)
+        start = [sum((matrix[i, j] * points[j] for j in range(3)), zero) for i in range(3)]
         tangent = Line(map_, rng, budget, _MAX_DEGREE, start)
         try:
             while tangent.steps < steps:
@@ -208,23 +215,7 @@ def _search_lower_bound(
     bound = lower_bound(degrees[2 * steps], upper, steps)
     if bound is None:
         return None
-    prime, eps = map_.field.characteristic, int(map_.eps)
-    return DynamicalDegreeBounds(round_up(bound.lower(), -1), "", steps, degrees[2 * steps], upper, prime, eps)
-
-
-def _random_tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
-    """Return tangents of a random conic: the lines with coordinates (1 : s : s^2), moved by a random matrix."""
-    while True:
-        matrix = nmod_mat(3, 3, [rng.randrange(p) for _ in range(9)], p)
-        if int(matrix.det()):
-            break
-    lines = []
-    for s in rng.sample(range(p), _TANGENTS):
-        # X + s Y + s^2 Z = 0 at (-s - s^2 t : 1 : t)
-        points = [nmod_poly([-s, -s * s], p), nmod_poly([1], p), nmod_poly([0, 1], p)]
-        zero = nmod_poly([], p)
-        lines.append([sum((matrix[i, j] * points[j] for j in range(3)), zero) for i in range(3)])
-    return lines
+    return DynamicalDegreeBounds(round_up(bound.lower(), -1), "", steps, degrees[2 * steps], upper, p, int(map_.eps))
 
 
 def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> Iterator[int]:

@@ -313,18 +313,12 @@ def outcome_of(
             note = BUDGET_SPENT if limits.budget.is_spent else "its series have too few terms"
             break
     if len(outcomes) == _POINTS:
-        first, second = outcomes.values()
-        found, note = _agreed(first, second, limits.budget.is_spent)
+        first, second = ((h.status, h.contracted_at, h.confined_at, h.orders.known) for h in outcomes.values())
+        found, note = next(iter(outcomes.values())), ""
+        if first != second:  # a spent budget may be the reason
+            found, note = Hypersurface(steps=found.steps), BUDGET_SPENT if limits.budget.is_spent else POINTS_DIFFER
     known = replace(found, polynomial=text, degree=int(form.form.total_degree()), is_pole=form.is_pole, note=note)
     return replace(known, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
-
-
-def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hypersurface, str]:
-    """The outcome at two points, with a note if they differ; a spent budget (`is_over`) may be the reason."""
-    first, second = ((each.status, each.contracted_at, each.confined_at, each.orders.known) for each in (one, other))
-    if first == second:
-        return one, ""
-    return Hypersurface(steps=one.steps), BUDGET_SPENT if is_over else POINTS_DIFFER
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:

@@ -315,7 +315,16 @@ class Patterns:
     @property
     def series_text(self) -> str:
         """The generating function of the degrees as a formula in z; empty where it is not known."""
-        return " / ".join(f"({_ascending(part)})" for part in self.series)
+        texts = []
+        for part in self.series:
+            text = ""
+            for power, c in enumerate(part):
+                if c:
+                    letter = "" if power == 0 else "z" if power == 1 else f"z^{power}"
+                    term = "*".join(([] if abs(c) == 1 and letter else [str(abs(c))]) + ([letter] if letter else []))
+                    text += f" {'-' if c < 0 else '+'} {term}" if text else f"{'-' if c < 0 else ''}{term}"
+            texts.append(f"({text or '0'})")
+        return " / ".join(texts)
 
     @property
     def sentences(self) -> list[str]:
@@ -353,21 +362,6 @@ class Patterns:
         maps = self.word.length if self.word_text and self.word else None
         known = {"generating_function": series or None, "contracted": contracted, "eps": self.at or None}
         return {**found, **known, "maps_a_step": maps}
-
-
-def _ascending(coefficients: Sequence[int]) -> str:
-    """A polynomial in z, lowest powers first.
-
-    >>> _ascending([1, -2, 0, 2])
-    '1 - 2*z + 2*z^3'
-    """
-    text = ""
-    for power, c in enumerate(coefficients):
-        if c:
-            letter = "" if power == 0 else "z" if power == 1 else f"z^{power}"
-            term = "*".join(([] if abs(c) == 1 and letter else [str(abs(c))]) + ([letter] if letter else []))
-            text += f" {'-' if c < 0 else '+'} {term}" if text else f"{'-' if c < 0 else ''}{term}"
-    return text or "0"
 
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:

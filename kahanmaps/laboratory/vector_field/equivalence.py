@@ -103,15 +103,24 @@ def equivalent_system(
     for frame in _frames(f, fixed_points(f, budget.part(0.5)) if fixed is None else fixed):
         monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
         for g in known:
-            orders = _matching_permutations(monomials, g.monomials)
-            candidates += ((g, frame, order) for order in itertools.islice(orders, MAX_ORDERS))
+            if sorted(map(len, monomials)) != sorted(map(len, g.monomials)):
+                continue
+            orders = list[tuple[int, ...]]()  # those that take the monomials of each right-hand side to those of g
+            for order in itertools.permutations(range(f.dim)):
+                inverse = sorted(range(f.dim), key=order.__getitem__)
+                images = ({tuple(m[j] for j in inverse) for m in one} for one in monomials)
+                if all(g.monomials[i] == image for image, i in zip(images, order, strict=True)):
+                    orders.append(order)
+                if len(orders) == MAX_ORDERS:
+                    break
+            candidates += ((g, frame, order) for order in orders)
     if f.dim == 2:
         candidates += ((g, QQ.identity(2), None) for g in known)
     for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # the fast searches first
-        for g, frame, order in candidates:
+        for g, frame, permutation in candidates:
             if budget.is_spent:
                 return None
-            if (equivalence := _solve_for_equivalence(f, g, frame, order, is_scaled, budget)) is not None:
+            if (equivalence := _solve_for_equivalence(f, g, frame, permutation, is_scaled, budget)) is not None:
                 return equivalence
     return None
 
@@ -169,17 +178,6 @@ def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]
     """Return the invertible matrices whose rows are n of the vectors."""
     matrices = (fmpq_mat([list(row) for row in rows]) for rows in itertools.combinations(vectors, n))
     return (matrix for matrix in matrices if matrix.det() != 0)
-
-
-def _matching_permutations(source: Sequence[Monomials], target: Sequence[Monomials]) -> Iterator[tuple[int, ...]]:
-    """Yield the permutations that take the monomials of each right-hand side to those of another system."""
-    if sorted(map(len, source)) != sorted(map(len, target)):
-        return
-    for order in itertools.permutations(range(len(source))):
-        inverse = sorted(range(len(order)), key=order.__getitem__)
-        images = ({tuple(m[j] for j in inverse) for m in monomials} for monomials in source)
-        if all(target[i] == image for image, i in zip(images, order, strict=True)):
-            yield order
 
 
 def _solve_for_equivalence(

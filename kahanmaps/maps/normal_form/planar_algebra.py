@@ -87,7 +87,17 @@ class AlgebraBlock(LevelBlock):
         if W.polynomial.degree() == 0:
             numerators, denominator = over_one(e for z in (U, V) for e in (z / W).coefficients)
             return numerators, denominator, denominator
-        cofactor, norm = _adjugate(W)
+        # W' and the norm N = W W', by Faddeev and LeVerrier's recursion: traces instead of determinants.
+        algebra, power = W.field, W
+        for k in range(1, algebra.degree):
+            cofactor = power - algebra.trace(power) / k
+            if k < algebra.degree - 1:
+                power = W * cofactor
+        # Of the last product only one coefficient is wanted.
+        norm, shifted = fmpq(0), cofactor
+        for entry in W.coefficients:
+            norm += entry * shifted.polynomial[0]
+            shifted = shifted * algebra.generator
         numerators = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
         coprime_part, part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
         common = common_part(
@@ -249,18 +259,3 @@ def _signs(count: int) -> list[tuple[int, ...]]:
                 chosen = dict(zip(positions, (1, *signs), strict=True))
                 vectors.append(tuple(chosen.get(k, 0) for k in range(count)))
     return vectors
-
-
-def _adjugate(W: EtaleElement) -> tuple[EtaleElement, fmpq]:
-    """W' and the norm N = W W', by Faddeev and LeVerrier's recursion: traces instead of determinants."""
-    algebra, power = W.field, W
-    for k in range(1, algebra.degree):
-        cofactor = power - algebra.trace(power) / k
-        if k < algebra.degree - 1:
-            power = W * cofactor
-    # Of the last product only one coefficient is wanted.
-    norm, shifted = fmpq(0), cofactor
-    for entry in W.coefficients:
-        norm += entry * shifted.polynomial[0]
-        shifted = shifted * algebra.generator
-    return cofactor, norm

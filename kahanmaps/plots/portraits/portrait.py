@@ -256,7 +256,14 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         if found.values is None and shown.shape[1] <= len(COLORS):
             _draw_few(axes, shown, lines, found)
         elif found.values is None:
-            _draw_many(axes, shown, lines, found)
+            # In the colors of the color map, the widest first, so that those inside stay visible.
+            with np.errstate(all="ignore"):
+                extent = np.nanmax(shown, axis=0, initial=-np.inf) - np.nanmin(shown, axis=0, initial=np.inf)
+                extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)
+                scale = extent.max(axis=0, initial=0)
+                order = np.argsort(-(extent / np.where(scale > 0, scale, 1)).max(axis=1), kind="stable")
+            numbers = np.broadcast_to(np.arange(shown.shape[1], dtype=np.float64), shown.shape[:2])
+            _draw_colored(axes, shown, numbers, order, (0.0, shown.shape[1] - 1.0), lines, found)
         else:
             seen = found.values[~np.isnan(_inside(shown, found.window)).any(axis=2)]
             low, high = main_range(seen)
@@ -298,18 +305,6 @@ def _draw_few(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> Non
         else:
             mark = {"markersize": 3.0, "marker": MARKS[k]} if len(orbit) <= _MAX_MARKED else {}
             draw_points(axes, *orbit.T, **how, **mark, total=count)
-
-
-def _draw_many(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
-    """Draw orbits in the colors of the color map, the widest first, so that those inside stay visible."""
-    orbits = shown.shape[1]
-    with np.errstate(all="ignore"):
-        extent = np.nanmax(shown, axis=0, initial=-np.inf) - np.nanmin(shown, axis=0, initial=np.inf)
-        extent = np.nan_to_num(extent, nan=0, posinf=0, neginf=0)
-        scale = extent.max(axis=0, initial=0)
-        order = np.argsort(-(extent / np.where(scale > 0, scale, 1)).max(axis=1), kind="stable")
-    numbers = np.broadcast_to(np.arange(orbits, dtype=np.float64), shown.shape[:2])
-    _draw_colored(axes, shown, numbers, order, (0.0, orbits - 1.0), lines, found)
 
 
 def _draw_colored(

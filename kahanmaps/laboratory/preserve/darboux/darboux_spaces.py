@@ -152,7 +152,21 @@ def darboux_spaces(
         return [DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)]
     if len(fresh) + len(multiples) > largest:
         return None
-    solutions = _antisymmetric(map_, [*fresh, *multiples], degree)
+    # A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x, w = fresh + multiples.
+    size = len(fresh) + len(multiples)
+    places = [(a, b) for a in range(size) for b in range(a + 1, size)]
+    at_points, at_images = _values(map_, [*fresh, *multiples], degree, len(places) + _SPARE)
+    count_work(len(places) ** 2 / 2)
+    rows = []
+    for x, y in zip(integers(at_points), integers(at_images), strict=True):
+        rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
+    solutions = []
+    for vector in null_space(rows, len(places), prime):
+        A = nmod_mat(size, size, prime)
+        for (a, b), entry in zip(places, vector, strict=True):
+            A[a, b] = entry
+            A[b, a] = -entry
+        solutions.append(A)
     bases = [basis for basis in _separate(solutions, fresh, multiples, prime) if _is_darboux(map_, basis, degree)]
     if not bases and not multiples:
         bases = [basis for basis in _of_rank_two(solutions, fresh, prime) if _is_darboux(map_, basis, degree)]
@@ -176,25 +190,6 @@ def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
     return all(u[i, 0] * v[i, a] == u[i, a] * v[i, 0] for i in range(u.nrows()) for a in range(1, len(basis)))
 
 
-def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_mat]:
-    """Return a basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x."""
-    size, prime = len(basis), map_.prime
-    places = [(a, b) for a in range(size) for b in range(a + 1, size)]
-    at_points, at_images = _values(map_, basis, degree, len(places) + _SPARE)
-    count_work(len(places) ** 2 / 2)
-    rows = []
-    for x, y in zip(integers(at_points), integers(at_images), strict=True):
-        rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
-    solutions = []
-    for vector in null_space(rows, len(places), prime):
-        A = nmod_mat(size, size, prime)
-        for (a, b), entry in zip(places, vector, strict=True):
-            A[a, b] = entry
-            A[b, a] = -entry
-        solutions.append(A)
-    return solutions
-
-
 def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
     """Compute the spaces with a common cofactor from the matrices A on fresh + multiples.
 
@@ -212,7 +207,22 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, pri
     forms = [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
     if len(forms) > _MAX_FORMS:  # a few random combinations give the same conditions on E
         forms = [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_MAX_FORMS)]
-    algebra = _intertwining(forms, n, prime)
+    rows = []
+    count_work(n**3 + n**4 / 100)
+    for A in forms[:2]:  # two A leave few E with E A = A E^T; the other A are applied to these
+        for i in range(n):
+            for j in range(i, n):
+                row = [0] * (n * n)
+                for m in range(n):  # (E A)_ij - (A E^T)_ij = sum E_im A_mj - A_im E_jm
+                    row[i * n + m] = (row[i * n + m] + int(A[m, j])) % prime
+                    row[j * n + m] = (row[j * n + m] - int(A[i, m])) % prime
+                rows.append(row)
+    algebra = [nmod_mat(n, n, entries, prime) for entries in null_space(rows, n * n, prime)]
+    for A in forms[2:]:
+        count_work(len(algebra) * (n**3 / 500 + n**2))
+        differences = [(E * A - A * E.transpose()).entries() for E in algebra]
+        weights = null_space([list(map(int, row)) for row in zip(*differences, strict=True)], len(algebra), prime)
+        algebra = [combination_of(vector, algebra) for vector in weights]
     E = combination_of([rng.randrange(prime) for _ in algebra], algebra)
     spaces = []
     count_work(10 + 2 * n**3)
@@ -228,27 +238,6 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, pri
             if corrected is not None:
                 spaces.append(echelon(combine(corrected, [*fresh, *multiples], prime), prime))
     return spaces
-
-
-def _intertwining(forms: list[nmod_mat], n: int, prime: int) -> list[nmod_mat]:
-    """Return a basis of the n x n matrices E with E A = A E^T for all of these antisymmetric A."""
-    rows = []
-    count_work(n**3 + n**4 / 100)
-    for A in forms[:2]:  # two A leave few E; the other A are applied to these
-        for i in range(n):
-            for j in range(i, n):
-                row = [0] * (n * n)
-                for m in range(n):  # (E A)_ij - (A E^T)_ij = sum E_im A_mj - A_im E_jm
-                    row[i * n + m] = (row[i * n + m] + int(A[m, j])) % prime
-                    row[j * n + m] = (row[j * n + m] - int(A[i, m])) % prime
-                rows.append(row)
-    basis = [nmod_mat(n, n, entries, prime) for entries in null_space(rows, n * n, prime)]
-    for A in forms[2:]:
-        count_work(len(basis) * (n**3 / 500 + n**2))
-        differences = [(E * A - A * E.transpose()).entries() for E in basis]
-        weights = null_space([list(map(int, row)) for row in zip(*differences, strict=True)], len(basis), prime)
-        basis = [combination_of(vector, basis) for vector in weights]
-    return basis
 
 
 def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[Vectors]:

@@ -182,7 +182,15 @@ class _Reduced:
             for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
         )
         P, Q = (sum((X[i] * Y[j] * Z[top - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
-        curves = [self._component(P, Q) for _ in range(3)]
+        curves: list[nmod_mpoly] = []  # each the component through a random point of the curve of the pencil through it
+        for _ in range(3):
+            at = [self._random(), self._random()]
+            member = P * int(Q(*at)) - Q * int(P(*at))
+            _require(not member.is_zero())
+            through = [(C, e) for C, e in member.factor()[1] if not int(C(*at))]
+            _require(len(through) == 1 and through[0][1] == 1)
+            curves.append(through[0][0])
+            _require(any(int(curves[-1].derivative(k)(*at)) for k in range(2)))
         d = int(curves[0].total_degree())
         coefficients = [[int(C[i, j]) for i in range(d + 1) for j in range(d + 1 - i)] for C in curves]
         _require(all(C.total_degree() == d for C in curves) and nmod_mat(coefficients, self.prime).rank() == 2)
@@ -199,17 +207,6 @@ class _Reduced:
 
     def _random(self) -> int:
         return self._rng.randrange(1, self.prime)
-
-    def _component(self, P: nmod_mpoly, Q: nmod_mpoly) -> nmod_mpoly:
-        """Return the component through a random point of the curve of the pencil through this point."""
-        at = [self._random(), self._random()]
-        member = P * int(Q(*at)) - Q * int(P(*at))
-        _require(not member.is_zero())
-        through = [(C, e) for C, e in member.factor()[1] if not int(C(*at))]
-        _require(len(through) == 1 and through[0][1] == 1)
-        C: nmod_mpoly = through[0][0]
-        _require(any(int(C.derivative(k)(*at)) for k in range(2)))
-        return C
 
     def _find_points(self, C: nmod_mpoly, D: nmod_mpoly, d: int) -> None:
         eliminant = [0] * (d * d + 1)
@@ -233,8 +230,17 @@ class _Reduced:
             _require(k > 0)
             b = -common[k - 1] / K(k)
             _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates there is one point for each a
-            local = [_moved({(i, j): K(int(c)) for (i, j), c in F.terms()}, a, b, int(number)) for F in (C, D)]
-            self._resolve(K, local[0], local[1], int(number), exact=True, near=False)
+            most = int(number)
+            f, g = (  # F(x + a, y + b) without terms of a degree above `most`
+                _nonzero(
+                    ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
+                    for (i, j), c in ((exponents, K(int(c))) for exponents, c in F.terms())
+                    for k in range(min(i, most) + 1)
+                    for l in range(min(j, most - k) + 1)
+                )
+                for F in (C, D)
+            )
+            self._resolve(K, f, g, most, exact=True, near=False)
 
     def _add_simple(self, conjugates: int, chain: int, near: bool) -> None:
         self.points[1, near] += conjugates
@@ -259,7 +265,10 @@ class _Reduced:
         if m * m == most:
             return
         shear = K(self._random())  # afterwards x = 0 is tangent to neither curve
-        f, g = (_sheared(F, shear) for F in (f, g))
+        f, g = (  # F(x + s y, y)
+            _nonzero(((i - k, j + k), c * comb(i, k) * shear**k) for (i, j), c in F.items() for k in range(i + 1))
+            for F in (f, g)
+        )
         cones = [_polynomial(K, [F.get((m - j, j), K(0)) for j in range(m + 1)]) for F in (f, g)]
         _require(all(cone.degree() == m for cone in cones))
         directions = cones[0].gcd(cones[1]).factor()[1]
@@ -269,8 +278,15 @@ class _Reduced:
             embedded = _embedding(K, L)
             slope = _root(L, [embedded(c) for c in direction.coeffs()])
             bound = (most - m * m) // (k if len(directions) == 1 else 1)
-            blown = [_blown_up({e: embedded(c) for e, c in F.items()}, m, slope, bound) for F in (f, g)]
-            self._resolve(L, blown[0], blown[1], bound, exact=exact and len(directions) == 1, near=True)
+            above, beside = (  # F(x, x (y + slope))/x^m without terms of a degree above `bound`
+                _nonzero(
+                    ((i + j - m, k), c * comb(j, k) * slope ** (j - k))
+                    for (i, j), c in ((exponents, embedded(c)) for exponents, c in F.items())
+                    for k in range(min(j, bound - (i + j - m)) + 1)
+                )
+                for F in (f, g)
+            )
+            self._resolve(L, above, beside, bound, exact=exact and len(directions) == 1, near=True)
 
 
 def _polynomial(K: Any, coefficients: list[Any]) -> Any:
@@ -296,27 +312,3 @@ def _nonzero(terms: Iterable[tuple[tuple[int, int], Any]]) -> _Local:
     for exponents, c in terms:
         total[exponents] = total.get(exponents, 0) + c
     return {exponents: c for exponents, c in total.items() if not c.is_zero()}
-
-
-def _moved(F: _Local, a: Any, b: Any, most: int) -> _Local:
-    """Return F(x + a, y + b) without terms of a degree above `most`."""
-    return _nonzero(
-        ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
-        for (i, j), c in F.items()
-        for k in range(min(i, most) + 1)
-        for l in range(min(j, most - k) + 1)
-    )
-
-
-def _sheared(F: _Local, s: Any) -> _Local:
-    """Return F(x + s y, y)."""
-    return _nonzero(((i - k, j + k), c * comb(i, k) * s**k) for (i, j), c in F.items() for k in range(i + 1))
-
-
-def _blown_up(F: _Local, m: int, slope: Any, most: int) -> _Local:
-    """Return F(x, x (y + slope))/x^m, where m is the multiplicity, without terms of a degree above `most`."""
-    return _nonzero(
-        ((i + j - m, k), c * comb(j, k) * slope ** (j - k))
-        for (i, j), c in F.items()
-        for k in range(min(j, most - (i + j - m)) + 1)
-    )

@@ -50,7 +50,12 @@ def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSte
     Only coefficients much shorter than `bits`, the length of the points, are of use. Raises TooLongRelation if they are
     longer, and may be of use when the points are.
     """
-    period = _unit(map_over.factors)
+    factors = map_over.factors
+    period = next(  # the shortest initial sequence of factors of which all factors are a repetition
+        factors[:k]
+        for k in range(1, len(factors) + 1)
+        if len(factors) % k == 0 and all(factor is factors[i % k] for i, factor in enumerate(factors))
+    )
     max_primes = min(_MAX_PRIMES, bits // _BITS_PER_PRIME)
     start_point: IntegerPoint | None = start
     for left_out in (0, _SKIPPED_STEPS) if len(period) <= _MAX_FACTORS else ():
@@ -76,16 +81,6 @@ def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSte
         if not is_special:
             break
     return None
-
-
-def _unit(factors: Sequence[ElementaryMap]) -> Sequence[ElementaryMap]:
-    """Return the shortest initial sequence of factors of which all factors are a repetition."""
-    count = len(factors)
-    return next(
-        factors[:k]
-        for k in range(1, count + 1)
-        if count % k == 0 and all(factor is factors[i % k] for i, factor in enumerate(factors))
-    )
 
 
 class Numbers(NamedTuple):
