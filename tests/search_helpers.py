@@ -1,4 +1,5 @@
-"""What the tests of the searches for integrals and densities share: short systems, exact orbits, residues of functions.
+"""What the tests of the searches for integrals and densities share: short systems, exact orbits, residues of functions,
+degrees computed slowly, answers known from elsewhere.
 
 Formulas are read here by Python with fractions, not by the library that wrote them.
 """
@@ -6,22 +7,29 @@ Formulas are read here by Python with fractions, not by the library that wrote t
 import ast
 import operator
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from itertools import islice
 from typing import Any
 
+from flint import fmpq, fmpz_poly, nmod_poly
+
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import rank
+from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.analysis import Analysis, analyze
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -128,3 +136,139 @@ def at_residues(function: RationalFunction, map_: ModularMap, point: Sequence[in
     """The value of a function of the variables and eps modulo the prime of the map."""
     field = GF(map_.prime)
     return int(function.value(field, [field.convert(c) for c in (*point, map_.eps)]))
+
+
+def polynomial_degrees(system: QuadraticSystem, count: int, seed: int, eps: Any = None) -> list[int]:
+    """The degrees by Cramer's rule on homogeneous coordinates, common factors divided out: no power series."""
+    rng = random.Random(seed)
+    field = GF(2**61 - 1)
+    p, n = field.prime, system.dim
+    eps = field.random(rng) if eps is None else field.convert(fmpq(*map(int, eps.split("/"))))
+    local = system.over(field)
+    zero, one = nmod_poly([0], p), field.one
+    X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(p)], p) for _ in range(n))]
+    found = []
+    for _ in range(count):
+        matrix = [
+            [
+                X[0] * ((i == j) * one - eps * local.B[i, j])
+                - sum((X[k + 1] * (eps * local.tensor[i * n + j, k]) for k in range(n)), zero)
+                for j in range(n)
+            ]
+            for i in range(n)
+        ]
+        right = [
+            sum((X[j + 1] * ((i == j) * one + eps * local.B[i, j]) for j in range(n)), X[0] * (2 * eps * local.c[i, 0]))
+            for i in range(n)
+        ]
+        image = [determinant(matrix)]
+        for j in range(n):
+            image.append(determinant([[*row[:j], b, *row[j + 1 :]] for row, b in zip(matrix, right, strict=True)]))
+        common = image[0]
+        for entry in image[1:]:
+            common = common.gcd(entry)
+        X = [entry // common for entry in image]
+        found.append(max(entry.degree() for entry in X))
+    return found
+
+
+def by_formulas(variables: str, image: str) -> ImplicitMap:
+    """The map that formulas in some variables and eps give, "x,y" and "y; (1 + y)/x"."""
+    names = variables.split(",")
+    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image.split(";")])
+
+
+def determinant(rows: list[list[nmod_poly]]) -> nmod_poly:
+    """By expansion along the first row."""
+    if len(rows) == 1:
+        return rows[0][0]
+    minors = (determinant([[*row[:j], *row[j + 1 :]] for row in rows[1:]]) for j in range(len(rows)))
+    signed = (entry * minor * (-1) ** j for j, (entry, minor) in enumerate(zip(rows[0], minors, strict=True)))
+    return sum(signed, nmod_poly([0], rows[0][0].modulus()))
+
+
+Value = Callable[[ModularMap, Sequence[int]], int]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is known of a Kahan map for generic eps; None and () where nothing is.
+
+    `dynamical_degree` is the minimal polynomial in x, `formulas` are integrals, `density` the value of phi modulo the
+    prime of a map, `without_density` tells that there is no polynomial one of low degree.
+    """
+
+    integrals: int | None = None
+    growth: str | None = None
+    degrees: tuple[int, ...] = ()
+    dynamical_degree: str | None = None
+    formulas: tuple[RationalFunction, ...] = ()
+    density: Value | None = None
+    without_density: bool = False
+    verdict: str | None = None
+
+
+def residues_of(function: RationalFunction) -> Value:
+    """The values of a function of the variables and eps modulo the prime of a map."""
+    return lambda map_, point: at_residues(function, map_, point)
+
+
+def verdict_of(growth: str) -> str:
+    """What a kind of growth means for integrability."""
+    return {"bounded": "linearisable", "exponential": "not integrable"}.get(growth, "integrable")
+
+
+def minimal_polynomial(text: str) -> fmpz_poly:
+    """The polynomial in x with integer coefficients."""
+    terms = {int(monomial[0]): int(c.p) for monomial, c in parse_polynomial(text, ["x"]).terms()}
+    return fmpz_poly([terms.get(k, 0) for k in range(max(terms) + 1)])
+
+
+def same_measures(found: Analysis, known: Value) -> bool:
+    """Whether every density found is the known one times an integral, modulo two primes at several points."""
+    for map_ in Laboratory(found.file).maps:
+        for one in found.densities.densities:
+            for x, image in map_.pairs(3):
+                a, b = known(map_, x), known(map_, image)
+                c, d = (at_residues(one.function, map_, point) for point in (x, image))
+                if a == 0 or c == 0 or (a * d - b * c) % map_.prime:
+                    return False
+    return True
+
+
+def differences(found: Analysis, answer: Answer, least_degrees: int = 5) -> set[str]:
+    """In what an analysis contradicts the answer or falls short of it; so many degrees at least have to be compared."""
+    wrong = set()
+    degrees = found.degrees.degrees[1:]
+    common = min(len(degrees), len(answer.degrees))
+    if answer.degrees and (
+        common < min(least_degrees, len(answer.degrees)) or degrees[:common] != answer.degrees[:common]
+    ):
+        wrong.add("degrees")
+    conclusion = found.conclusion
+    if answer.growth is not None and conclusion.growth != answer.growth:
+        wrong.add("growth")
+    if answer.verdict is not None and conclusion.kind not in (
+        (answer.verdict, "linear") if answer.verdict == "linearisable" else (answer.verdict,)
+    ):
+        wrong.add("verdict")
+    rate = found.degrees.dynamical_degree  # None without a recurrence, and then there is nothing to compare
+    if (
+        answer.dynamical_degree is not None
+        and rate is not None
+        and rate.minimal_polynomial != minimal_polynomial(answer.dynamical_degree)
+    ):
+        wrong.add("dynamical degree")
+    if answer.integrals is not None and conclusion.integrals != answer.integrals:
+        wrong.add("count")
+    functions = [one.function for one in found.integrals.integrals]
+    number, _, together = ranks(functions, answer.formulas, Laboratory(found.file).maps[0])
+    if number != len(functions) or (answer.integrals is not None and together > answer.integrals):
+        wrong.add("formulas")
+    if not all(one.verdict.holds for one in (*found.integrals.integrals, *found.densities.densities)):
+        wrong.add("proofs")
+    if answer.density is not None and not (found.densities.densities and same_measures(found, answer.density)):
+        wrong.add("density")
+    if answer.without_density and found.densities.densities:
+        wrong.add("density")
+    return wrong

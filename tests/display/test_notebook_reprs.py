@@ -4,6 +4,8 @@ from xml.etree import ElementTree
 
 import pytest
 from flint import fmpq_mat
+from hypothesis import given
+from hypothesis import strategies as st
 from search_helpers import analysis_of
 from small_databases import ok, planned
 
@@ -11,6 +13,7 @@ import kahanmaps as km
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
+from kahanmaps.display import markup
 
 EVIL = '<script>alert("x")</script>\x1b[31m'
 LARGEST = 100_000  # characters of any representation
@@ -182,3 +185,46 @@ def test_a_store_shows_its_experiments_and_says_when_it_is_closed(tmp_path):
         assert "missing" in text_of(store)
         assert "1 ✓ proved" in text_of(store)
     assert "has been closed" in text_of(store)
+
+
+# Pieces of HTML
+
+
+HOSTILE = '<script>alert("x")</script>&amp;\x00\x1b[31m\ud800\'"'
+
+
+def well_formed(html):
+    return ElementTree.fromstring(f"<div>{html}</div>")
+
+
+@given(st.text())
+def test_every_text_is_well_formed_once_it_is_escaped(text):
+    assert list(well_formed(markup.escape(text))) == []
+
+
+@pytest.mark.parametrize(
+    "html",
+    [
+        markup.table([HOSTILE], [["<b>1</b>"]], HOSTILE),
+        markup.definitions([(HOSTILE, "1")]),
+        markup.titled(HOSTILE, "<p>1</p>", HOSTILE),
+        markup.verdict(HOSTILE),
+        markup.listed([markup.escape(HOSTILE)]),
+    ],
+)
+def test_no_text_becomes_an_element(html):
+    assert "script" not in {one.tag for one in well_formed(html).iter()}
+    assert "alert" in "".join(well_formed(html).itertext())
+
+
+@pytest.mark.parametrize("word", ["proved", "refuted", "supported", "measured", "undecided", "completed"])
+def test_a_verdict_is_a_word_with_a_mark_and_not_only_a_colour(word):
+    text = "".join(well_formed(markup.verdict(word)).itertext())
+    assert text.endswith(f" {word}")
+    assert len(text) == len(word) + 2
+
+
+def test_short_text_stays_and_long_text_says_its_length():
+    assert markup.shortened("x" * 60) == "x" * 60
+    assert markup.shortened("1" * 5000).endswith("(5000 characters)")
+    assert len(markup.shortened("1" * 5000)) < 90

@@ -1,7 +1,7 @@
 """System files: what is written reads back equal, and a wrong file is told all its mistakes at once, each with its key.
 
 Whatever the bytes are, reading them gives a SystemFile or raises InputError (SystemFileError for the contents of the
-file), and nothing else.
+file), and nothing else. Systems with symbols are those with numbers, wherever the symbols get these numbers.
 """
 
 import random
@@ -12,9 +12,13 @@ from flint import fmpq, fmpq_mat
 from helpers import table, together
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from search_helpers import PRIME, system
 
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
+from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.random_members import random_member_with_eigenvalues
@@ -201,3 +205,48 @@ def test_a_damaged_file_is_an_input_error_or_still_a_file(text, at, length, inse
     except InputError:
         return
     assert parse_system(file.to_toml()) == file
+
+
+# Symbols
+
+
+FIELD = GF(PRIME)
+WITH_PARAMETERS = [name for name in names() if load(name).parameters and load(name).kind != "family"]
+
+
+def same_maps(one, other, seed=0):
+    rng = random.Random(seed)
+    for _ in range(3):
+        x = [FIELD.random(rng) for _ in range(other.dim)]
+        assert list(one.polarised(x, x)) == list(other.value(x))
+        assert one.jacobian(x) == other.jacobian(x)
+
+
+@pytest.mark.parametrize("name", WITH_PARAMETERS)
+def test_symbols_at_the_numbers_of_the_file_give_its_system(name):
+    changed = {parameter: fmpq(2 * k + 3, k + 2) for k, parameter in enumerate(load(name).parameters)}
+    file = load(name, changed)
+    symbols = tuple(file.parameters)
+    over = with_symbols(load(name), symbols).over(FIELD, [FIELD.convert(file.parameters[s]) for s in symbols])
+    same_maps(over, file.system.over(FIELD))
+
+
+@pytest.mark.parametrize(
+    ("file", "symbols", "words"),
+    [
+        (load("euler_top"), ["a4"], "found the symbol 'a4', expected eps or a parameter of the system: a1, a2, a3"),
+        (load("lorenz"), ["x"], "found the symbol 'x'"),
+        (system("x y", "x*y", "1"), ["a"], "a parameter of the system: none"),
+        # a term that is not there only because the file says a = 0
+        (
+            system("x y", "a*x^3 + y", "x", a=0),
+            ["a"],
+            "with a as symbols: 1 mistake\n  system.rhs[1]: found a polynomial of degree 3",
+        ),
+        (system("x", "x^2/a", a=2), ["a"], "a division by something with variables in it"),
+    ],
+)
+def test_what_cannot_be_a_symbol_is_refused(file, symbols, words):
+    with pytest.raises(InputError) as caught:
+        with_symbols(file, symbols)
+    assert words in str(caught.value)

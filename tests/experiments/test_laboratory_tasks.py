@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from task_helpers import made, perform
+from specs import made, perform
 
 import kahanmaps as km
 from kahanmaps.documents.catalog import load

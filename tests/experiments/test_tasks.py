@@ -5,11 +5,12 @@ Verdicts, periods, ranks and last points are compared with the functions of the 
 
 import json
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import pytest
 from flint import fmpq
-from task_helpers import made, member, perform
+from specs import made, member, perform
 
 from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
@@ -21,6 +22,10 @@ from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
+from kahanmaps.experiments.results.store import Store
+from kahanmaps.experiments.running.local import perform as done_in_child
+from kahanmaps.experiments.running.run import run
+from kahanmaps.experiments.spec import parse_spec
 from kahanmaps.family.system_normal_form import system_normal_form
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.kahan import KahanMap
@@ -166,3 +171,72 @@ def test_a_period_is_that_of_the_library(prime):
 def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
     with pytest.raises(InputError, match=words):
         perform(name, system, **asked)
+
+
+FILES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
+SPEC = """
+name = "maps"
+[experiments.degrees]
+task = "degrees"
+system = [{files}]
+options = { terms = 3 }
+[experiments.confined]
+task = "singularities"
+system = [{files}]
+options = { eps = "1/3" }
+[experiments.orbits]
+task = "orbit"
+system = [{files}]
+options = { eps = "1/10", steps = 3 }
+axes = { arithmetic = ["exact", "float", "mod:10007"] }
+[experiments.measures]
+task = "check-measure"
+system = [{files}]
+[experiments.integrals]
+task = "find-integrals"
+system = [{files}]
+"""
+
+
+def test_a_batch_takes_all_kinds_of_map_and_says_of_each_task_that_does_not(tmp_path):
+    text = SPEC.replace("{files}", ", ".join(f'"{path}"' for path in FILES))
+    database = tmp_path / "maps.db"
+    list(run(parse_spec(text, "maps.toml"), database))
+    found, verdicts = {}, set()
+    with Store.open(database) as store:
+        for row in store.rows():
+            found.setdefault(row.task.kind, []).append((row.record.outcome, row.record.result or {}))
+            verdicts.add((row.task.kind, row.record.verdict))
+    assert sorted(result["degrees"][3] for _, result in found["degrees"]) == [8, 9, 19, 19, 74]
+    assert [outcome for outcome, _ in found["singularities"]] == ["ok"] * 5
+    assert {(outcome, result["status"]) for outcome, result in found["orbit"]} == {("ok", "completed")}
+    assert {verdict for kind, verdict in verdicts if kind == "check-measure"} == {"proved"}
+    assert [outcome for outcome, _ in found["find-integrals"]] == ["ok"] * 5
+
+
+WITHOUT_EPS = """
+[experiments.orbits]
+task = "orbit"
+system = ["lyness", "somos_4"]
+options = { steps = 3 }
+[experiments.heights]
+task = "heights"
+system = "lyness"
+options = { steps = 12 }
+[experiments.exponents]
+task = "lyapunov"
+system = "lyness"
+options = { steps = 12, orbits = 2 }
+[experiments.many]
+task = "ensemble"
+system = "lyness"
+options = { steps = 12, orbits = 2 }
+"""
+
+
+def test_no_eps_is_asked_for_where_no_map_depends_on_it():
+    spec = parse_spec(WITHOUT_EPS, "maps.toml")
+    tasks = [task for experiment in spec.experiments for task in experiment.tasks()]
+    assert [done_in_child(task, None, spec.documents)["outcome"] for task in tasks] == ["ok"] * 5
+    with pytest.raises(InputError, match=r"axes\.eps: missing, expected half the time step"):
+        parse_spec(WITHOUT_EPS.replace('"lyness", "somos_4"', '"lyness", "euler_top"'), "maps.toml")

@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
-from degree_helpers import polynomial_degrees
 from helpers import DIMENSION, quick
+from search_helpers import polynomial_degrees
 
 from kahanmaps.algebra.work import Budget
 from kahanmaps.documents.catalog import load, names

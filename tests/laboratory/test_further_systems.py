@@ -1,4 +1,4 @@
-"""Systems beyond the catalogue, analysed blind and compared with answers that were found without this library.
+"""Systems of the catalogue and beyond, analysed blind and compared with answers that were found without this library.
 
 further_systems/ has the right-hand sides, answers.json what is known of their Kahan maps for generic eps. Integrals and
 densities of the answers are tried here on exact orbits first, by the arithmetic of the tests; then `analyze` has to
@@ -13,14 +13,15 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from analysis_helpers import Answer, differences, residues_of, verdict_of
 from check_helpers import determinant, function_value, kahan_jacobian, kahan_step, modified_value, slope, unit
 from helpers import fraction, together
-from search_helpers import ranks
+from search_helpers import Answer, differences, ranks, residues_of, verdict_of
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.checks.settings import random_starts
-from kahanmaps.documents.files import read_system
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import SystemFile, read_system
+from kahanmaps.documents.structured_facts import relations
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
@@ -194,3 +195,58 @@ def test_a_wrong_answer_is_seen_to_be_different(name):
     assert differences(found, replace(answer, without_density=True)) == {"density"}
     foreign = function(found.file, "+".join(f"{k + 2}*{v}^3" for k, v in enumerate(found.file.variables)))
     assert differences(found, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"}
+
+
+# The catalogue
+
+
+FACTS = [name for name in names() if set(load(name).catalog) & {"degrees", "growth", "verdict", "codimension"}]
+# All others take less than a second.
+SLOW = ("henon_heiles", "zhukovski_volterra_2", "volterra_periodic_5", "kirchhoff_generic", "clebsch_first_flow")
+SLOW = (*SLOW, "kirchhoff_case", "lagrange_top", "so4_euler_manakov", "paper_m3", "paper_m3_irreducible", "three_wave")
+SLOW = (*SLOW, "lorenz", "zander_120", "paper_m2", "volterra_periodic_4")
+
+
+@cache
+def blind(name):
+    """The analysis of the right-hand sides, without anything else that the file says."""
+    return analyze(SystemFile.from_system(load(name).system, "somebody"))
+
+
+def marked(found):
+    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in found]
+
+
+def facts_of(name):
+    file = load(name)
+    facts = file.catalog
+    claimed = tuple(function for function in file.integrals.values() if set(function.names) == {*file.variables, "eps"})
+    count = facts.get("codimension")
+    if count is None:
+        count = ranks([], claimed, Laboratory(file).maps[0])[1]
+    return Answer(
+        count,
+        facts.get("growth"),
+        tuple(facts.get("degrees", ())),
+        facts.get("dynamical_degree"),
+        claimed,
+        None if file.density is None else residues_of(file.density),
+        False,
+        facts.get("verdict"),
+    )
+
+
+@pytest.mark.parametrize("name", marked(FACTS))
+def test_the_facts_of_the_file_are_found_blind(name):
+    found, answer = blind(name), facts_of(name)
+    assert differences(found, answer) == set()
+    nullities = found.integrals.profile.nullities
+    for known in relations(load(name).catalog, found.file.variables):
+        degree = _degree(known)
+        if degree is not None and degree <= len(nullities):
+            assert nullities[degree - 1] == known.dimension
+
+
+def _degree(known):
+    prefix = "degree <= "
+    return int(known.text.removeprefix(prefix)) if known.text.startswith(prefix) else None

@@ -4,8 +4,8 @@ import random
 from dataclasses import replace
 
 import pytest
-from degree_helpers import by_formulas
 from flint import fmpq, fmpz_mat, fmpz_poly
+from search_helpers import by_formulas
 
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load

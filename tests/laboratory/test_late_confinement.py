@@ -9,10 +9,9 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from degree_helpers import polynomial_degrees
 from flint import fmpq
 from helpers import quick
-from search_helpers import analysis_of
+from search_helpers import analysis_of, polynomial_degrees
 from search_helpers import system as file_from
 
 from kahanmaps.algebra.polynomials import ring

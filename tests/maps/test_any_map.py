@@ -1,6 +1,7 @@
 """One map, many evaluators: each kind of map in every arithmetic is what the generic step over its field says.
 
 The generic step solves M(x) x~ = r(x) as it stands; it is compared with independent formulas where there are some.
+Orbits from points over a number field are exact, and the same in every field.
 """
 
 from math import prod
@@ -12,12 +13,16 @@ from flint import fmpq
 from helpers import points, rationals
 from hypothesis import assume, given
 
+import kahanmaps as km
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
+from kahanmaps.algebra.roots import AlgebraicPoint, parse_algebraic_point, parse_root
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.maps.algebraic import over_number_field
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
@@ -200,3 +205,46 @@ def test_the_door_gives_the_orbit_in_every_arithmetic(name, text):
     else:
         numbers = [float(e) if text == "float" else float(e.mid()) for e in found[-1].x]
         assert np.allclose(numbers, [int(e.p) / int(e.q) for e in exact], rtol=1e-9)
+
+
+# Starts over a number field
+
+
+I = parse_root("root of t^2 + 1")
+
+
+def algebraic(text, **roots):
+    return parse_algebraic_point(text, {name: parse_root(root) for name, root in roots.items()}, {"c": fmpq(3)})
+
+
+# The image of a point over Q(i) is a computation with pairs of rational numbers: here by hand, for x' = y, y' = -x.
+def test_a_step_from_a_point_over_the_gaussian_numbers():
+    map_ = over_number_field(km.System("x' = y; y' = -x").map, I)
+    eps, i = fmpq(1, 2), I.number_field.generator
+    image = map_.at(eps).step((1, i))
+    scale = 1 + eps**2
+    assert image == ((1 - eps**2) / scale + i * (2 * eps / scale), i * ((1 - eps**2) / scale) - 2 * eps / scale)
+
+
+@pytest.mark.parametrize("name", ["euler_top", "paper_m2", "henon_heiles"])
+def test_orbits_over_a_number_field_reduce_to_those_modulo_a_prime(name):
+    file = km.load(name)
+    root = parse_root("root of t^2 - 2")
+    field = GF(2**61 - 1)
+    point = AlgebraicPoint(root, algebraic(",".join(["t"] + ["1"] * (file.dim - 1)), t="root of t^2 - 2").entries)
+    map_ = over_number_field(file.map, root)
+    exact = list(km.orbit(map_, point.over(root.number_field), "1/3", 3))
+    modular = list(km.orbit(map_, point.over(field), "1/3", 3, arithmetic=f"mod:{2**61 - 1}"))
+    at_root = root.over(field)
+    for one, other in zip(exact, modular, strict=True):
+        values = [sum(field.convert(c) * at_root**k for k, c in enumerate(entry.coefficients)) for entry in one.x]
+        assert [int(value) for value in values] == [int(entry) for entry in other.x]
+
+
+def test_a_check_tries_its_claims_along_such_an_orbit():
+    start = algebraic("1,t,1", t="root of t^2 + 1").over(I.number_field)
+    settings = km.Settings(eps="1/3", start=start, steps=3)
+    held, *_, refuted = km.check_integrals(km.load("euler_top"), settings, {"F1": "F1", "B": "x1*x2"}).findings
+    assert (held.verdict, refuted.verdict) == (Certainty.PROVED, Certainty.REFUTED)
+    assert "held exactly at 4 points of an orbit" in held.also[-1].summary
+    assert "fails at step 0 of an exact orbit" in refuted.also[-1].summary

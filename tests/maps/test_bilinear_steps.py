@@ -8,7 +8,7 @@ from math import prod
 
 import pytest
 from flint import fmpq, fmpz
-from orbit_helpers import begin, over, single_steps, walked
+from planar_helpers import begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.bilinear_steps as bilinear
 import kahanmaps.maps.orbits.relations.rational_orbit as rational_orbit

@@ -12,7 +12,7 @@ import pytest
 from flint import fmpq, fmpq_mat, nmod
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from orbit_helpers import START, begin, over, single_steps, walked
+from planar_helpers import START, begin, over, single_steps, walked
 
 import kahanmaps.maps.orbits.relations.elliptic_orbit as elliptic
 import kahanmaps.maps.orbits.relations.elliptic_search as search

@@ -2,23 +2,39 @@
 
 Specified here: over every field it is the point that the orbit comes to, or a singular step that is said as the orbit
 says it; over Q no pole on the way goes unnoticed, and what is too long is refused beforehand; iterates compose also
-where no orbit can be walked.
+where no orbit can be walked; an iterate that is reached directly ends as the orbit that is stepped to it. In a plane it
+is n times the translation, added by chords and tangents.
 """
 
 import random
+from itertools import islice, product
 
+import flint
 import pytest
 from flint import arb, fmpq, fmpz
 from helpers import encloses, quick, random_point, together
-from planar_helpers import STARTS, before, over_members, side_by_side, structure_and_system
+from planar_helpers import (
+    STARTS,
+    Finite,
+    before,
+    over_members,
+    planar_system,
+    planes_over,
+    side_by_side,
+    structure_and_system,
+)
 
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.errors import BadPrime, PrecisionLost, SingularStep
+from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import rational_iterate, tau
+from kahanmaps.maps.normal_form import rational_iterate, tau, translation
 from kahanmaps.maps.normal_form.iterate import NthIterate, special_start
+from kahanmaps.maps.normal_form.level_curves import LevelCubic
+from kahanmaps.maps.normal_form.planar_block import same_point
 from kahanmaps.maps.normal_form.planes_point import PlanesPoint
-from kahanmaps.maps.orbits.iteration import Orbit
+from kahanmaps.maps.normal_form.translation import NoTranslation, iterate
+from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 
 NUMBERS = (0, 1, 2, 3, 5, 16, 17, 18, 23, 24, 25, 26, 33, 40)
 
@@ -155,3 +171,157 @@ def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
     )
     assert coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30)) == wanted
     assert drawn == []
+
+
+# Roots: three rational, one rational (in other coordinates), none rational, double, triple.
+CUBICS = [(0, 3, -4, -4), (0, 1, 1, 0), (0, 3, 0, -1), (1, 0, 0, -2), (1, 0, -3, 2), (0, 1, 0, 0), (1, 3, 3, 1)]
+EPS = ("1/2", "1", "1/3", "-1/2")
+FAR = 10**12
+
+
+def found_structure(system) -> SystemNormalForm:
+    found = system_normal_form(system)
+    assert isinstance(found, SystemNormalForm)
+    return found
+
+
+def ended(orbit) -> OrbitEnd:
+    for _ in orbit:
+        pass
+    return orbit.end
+
+
+def event(system, normal_form, eps, start, steps, digits):
+    """What comes first, with the step before it; by three ways, which have to agree."""
+    kahan = KahanMap(system, eps)
+    walks = [ended(Orbit(kahan, start, steps, normal_form=known, max_digits=digits)) for known in (None, normal_form)]
+    assert walks[0] == walks[-1]
+    far = ended(Orbit(kahan, start, at=[steps], normal_form=normal_form, max_digits=digits))
+    walk = walks[0]
+    if walk.is_whole:
+        assert (far.status, far.steps) == ("completed", steps)
+    elif walk.status == "singular":
+        where = f"step {steps} cannot be reached: the map is not defined at step {walk.steps}"
+        assert far == OrbitEnd("singular", 0, where)
+    else:
+        assert far.status == walk.status == "budget"
+        assert far.message.endswith(walk.message)
+    return walk
+
+
+def seen_from(cubic, eps, sixths, runs):
+    """The events of starts with coordinates in sixths, and that far steps end so, too."""
+    system = planar_system(cubic)
+    normal_form, seen = found_structure(system), []
+    for u, v in product([fmpq(i, 6) for i in sixths], repeat=2):
+        for steps, digits in runs:
+            walk = event(system, normal_form, eps, [u, v], steps, digits)
+            seen.append(walk.status)
+            far = ended(Orbit(KahanMap(system, eps), [u, v], at=[FAR], normal_form=normal_form, max_digits=digits))
+            if not walk.is_whole:
+                assert far.status == walk.status
+    return seen
+
+
+@pytest.mark.parametrize("cubic", CUBICS[::3])
+def test_small_starts_end_alike_by_steps_and_by_jumps(cubic):
+    seen = [status for eps in EPS[:2] for status in seen_from(cubic, eps, range(-6, 7, 3), [(70, 12), (26, 3)])]
+    assert {"singular", "budget"} & set(seen)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eps", EPS)
+@pytest.mark.parametrize("cubic", [*CUBICS, (1, 3, 3, -4), (1, 0, 0, 1), (0, 2, -1, 2), (2, -1, 0, 3), (0, 0, 1, 5)])
+def test_many_small_starts_end_alike_by_steps_and_by_jumps(cubic, eps):
+    assert {"singular", "budget"} & set(seen_from(cubic, eps, range(-12, 13, 3), [(120, 30), (31, 3), (25, 1)]))
+
+
+@over_members
+def test_members_end_alike_by_steps_and_by_jumps(name):
+    normal_form, system = structure_and_system(name)
+    for seed, eps in enumerate(EPS[:2]):
+        event(system, normal_form, eps, random_point(system.dim, seed, height=2), 30, 40)
+
+
+def is_zero(element) -> bool:
+    return element == 0
+
+
+def planes(field, seed, amount):
+    """Random planes with starts of every kind that are not constant."""
+    found = planes_over(field, random.Random(f"{field} {seed}"), 10**9)
+    return islice((case for case in found if not case[0].is_zero and case[1][:2] != (0, 0)), amount)
+
+
+def stepped(block, start, steps):
+    """P_0, P_1, ... with W = 1, up to the last before a pole."""
+    points = [start]
+    for _ in range(steps):
+        U, V, W = block.image(points[-1])
+        if W == 0:
+            break
+        points.append((U / W, V / W, W / W))
+    return points
+
+
+def found(block, start, n):
+    """The n-th point, or what is said instead."""
+    try:
+        return iterate(block, start, n, is_zero, inexact=isinstance(start[0], flint.arb | flint.acb))
+    except SingularStep as error:
+        return str(error)
+    except NoTranslation:
+        return None
+
+
+FINITE = [(Finite(7), 160), (Finite(101), 48), (Finite(10007), 18), (Finite(2**89 - 1), 12), (Finite(5, 2), 30)]
+FINITE += [(Finite(5, 3), 60)]
+over_finite = pytest.mark.parametrize(("field", "amount"), quick(FINITE, FINITE[:-1]), ids=repr)
+TIMES = (0, 1, 2, 3, 7, 8, 11, 12, 15, 16, 17, 18, 19, 20, 23, 24, 25, 31, 32, 33, 47, 48, 49, 63)
+
+
+@over_finite
+def test_over_a_finite_field_it_is_the_point_that_steps_lead_to(field, amount):
+    compared = 0
+    for block, start in planes(field, 1, amount):
+        points = stepped(block, start, TIMES[-1])
+        for n in TIMES:
+            image = found(block, start, n)
+            if n < len(points) and image is not None:
+                assert same_point(image, points[n])
+                compared += 1
+    assert compared > amount
+
+
+def smooth(field, seed, amount):
+    for block, start in planes(field, seed, amount):
+        above, below = block.level(start)
+        if below != 0 and above != 0 and block.discriminant != 0:
+            delta = block.discriminant * above * above / (below * below)
+            if delta != 1:
+                yield block, start, LevelCubic(block, above, below, start)
+
+
+@over_finite
+def test_on_a_smooth_level_it_is_a_multiple_of_the_translation(field, amount):
+    # Chords and tangents, P_0 for zero: P_n = n P_1. Poles on the way do not matter to them.
+    rng, passed = random.Random(field.q), 0
+    for block, start, cubic in smooth(field, 4, min(amount, 40)):
+        for n in (rng.randrange(17, 100), rng.randrange(field.q**2 + 100), rng.randrange(10**30)):
+            image = found(block, start, n)
+            if isinstance(image, tuple):
+                assert any(image)
+                assert same_point(image, cubic.multiple(n, block.image(start)))
+                passed += 1
+    assert passed > 0
+
+
+@pytest.mark.parametrize("wrong", ["gamma", "digits"])
+def test_with_another_gamma_or_other_digits_the_point_is_another(wrong, monkeypatch):
+    block, start = next(iter(planes(Finite(10007), 1, 1)))
+    by_curve, digits = translation._by_curve, translation._digits
+    if wrong == "gamma":
+        monkeypatch.setattr(translation, "_by_curve", lambda P, gamma, *rest: by_curve(P, gamma + 1, *rest))
+    else:
+        monkeypatch.setattr(translation, "_digits", lambda n: digits(n + 1))
+    assert not same_point(found(block, start, 50), stepped(block, start, 50)[50])
