@@ -129,7 +129,6 @@ from .laboratory.scan.result import Scan as Scan
 from .laboratory.scan.scan import scan as scan
 from .laboratory.scan.sweep import TimeOver as TimeOver
 from .laboratory.singular.outcomes import UNDECIDED as UNDECIDED
-from .laboratory.singular.singularities import SingularityRun as SingularityRun
 from .laboratory.singular.singularities import singularities as singularities
 from .laboratory.singular.singularities import steps_by_default as steps_by_default
 from .laboratory.singular.singularities import symbolic_denominator as symbolic_denominator

@@ -1,9 +1,11 @@
 """The documentation is complete and hangs together: pages, commands, names, sources and links. `make docs` builds it.
 
 What is made of the code is looked at as the Markdown that Sphinx is given; one slow test builds the pages.
+Each picture carries its command.
 """
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +14,7 @@ import pytest
 
 from kahanmaps.paper.verify import verify
 from kahanmaps_cli.commands.verify import markdown
+from kahanmaps_cli.main import main
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -22,6 +25,7 @@ from helpers import together  # noqa: E402
 from kahanmaps_docs import expanded, reference  # noqa: E402
 from kahanmaps_docs.links import outside_code  # noqa: E402
 from page_helpers import letters_of_formulas, letters_of_the_font  # noqa: E402
+from redraw import command_of  # noqa: E402
 
 from kahanmaps.documents.catalog import names  # noqa: E402
 
@@ -108,3 +112,30 @@ AUDIT = (Path(__file__).parent.parent / "docs" / "audit.md").read_text(encoding=
 @pytest.mark.thorough
 def test_the_table_of_the_audit_is_what_verify_prints():
     assert AUDIT.split("<!-- table -->\n")[1].strip() == markdown(verify(m=3)).strip()
+
+
+PICTURES = sorted(path for path in (DOCS / "pictures").iterdir() if path.suffix in (".png", ".svg"))
+
+
+@pytest.mark.parametrize("kind", ["svg", "png", "pdf"])
+def test_the_metadata_hold_the_command_and_the_system(tmp_path, kind):
+    picture = tmp_path / f"é <&> (1).{kind}"
+    words = [
+        *["plot", "portrait", "harmonic", "--eps", "1/20", "--start", "1,2", "--steps", "3", "-q", "-o"],
+        str(picture),
+    ]
+    assert main(words) == 0
+    assert b"[hamiltonian]" in picture.read_bytes()
+    if kind != "pdf":
+        assert shlex.split(command_of(picture)) == ["kahanmaps", *words]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("picture", PICTURES, ids=lambda path: path.name)
+def test_the_command_makes_the_picture(picture, tmp_path, monkeypatch):
+    """Not the same bytes, which depend on the version of matplotlib: the same command, and a file of that size."""
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command_of(picture))[1:]) == 0
+    made = tmp_path / picture.name
+    assert command_of(made) == command_of(picture)
+    assert 0.7 < made.stat().st_size / picture.stat().st_size < 1.4

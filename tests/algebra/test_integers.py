@@ -9,15 +9,10 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.integers import common_part, divide_exactly, split_by_primes, without
 
-long_integers = st.integers(-(10**40), 10**40)
+longs = st.integers(-(10**40), 10**40)
 
 
-@given(
-    quotient=long_integers,
-    divisor=st.integers(2, 2**60),
-    remainder=st.integers(1, 2**60),
-    sign=st.sampled_from([1, -1]),
-)
+@given(quotient=longs, divisor=st.integers(2, 2**60), remainder=st.integers(1, 2**60), sign=st.sampled_from([1, -1]))
 def test_a_division_that_is_not_exact_raises(quotient, divisor, remainder, sign):
     assume(remainder % divisor != 0)
     with pytest.raises(ArithmeticError, match="please report"):

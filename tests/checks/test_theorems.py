@@ -196,10 +196,7 @@ def test_each_of_two_decoupled_parts_may_be_kept_reversed_or_stopped(signs):
 # (what is broken, f, g): no evidence, and the maps indeed do not commute at X.
 SWAP = fmpq_mat([[0, 1, 0], [1, 0, 0], [0, 0, 1]])
 BROKEN_SPLITTINGS = {
-    "g = C f only up to a constant": (
-        DECOUPLED,
-        system_of("x y z", "x^2 - 3*x + 1", "-y*z - 2*y + 1/3", "-y^2 + z - 5"),
-    ),
+    "g = C f up to a constant": (DECOUPLED, system_of("x y z", "x^2 - 3*x + 1", "-y*z - 2*y + 1/3", "-y^2 + z - 5")),
     "C^3 is not C": (DECOUPLED, DECOUPLED.scaled(2)),
     "C^3 = C on one part only": (DECOUPLED, DECOUPLED.transformed(fmpq_mat([[1, 0, 0], [0, 3, 0], [0, 0, 3]]))),
     "C swaps, f is not symmetric": (DECOUPLED, DECOUPLED.transformed(SWAP)),
@@ -220,9 +217,7 @@ def test_each_hypothesis_of_the_lemma_is_needed(f, g):
     assert commute_at(f, g, EPS, X[:3]) is False
 
 
-SADDLE = SystemFile.from_hamiltonian(
-    CubicHamiltonian(parse_polynomial("q*p", ["q", "p"]), standard_structure(2)), "saddle"
-)
+SADDLE = SystemFile.from_hamiltonian(CubicHamiltonian(parse_polynomial("q*p", ["q", "p"]), standard_structure(2)), "qp")
 CHECKS = [check_integrals, check_measure, check_poisson, lambda file, settings: check_commute(file, file, settings)]
 
 

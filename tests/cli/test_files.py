@@ -35,13 +35,8 @@ READS = {
     for heading, lines in table(Path(__file__).with_name("reads.txt")).items()
 }
 # Made before each test: what is in the file, by the name of what takes it.
-CONTENT = {
-    "starts": "starts.npy",
-    "record": "heights.json",
-    "records": "degrees.json",
-    "db": "study.db",
-    "database": "study.db",
-}
+CONTENT = {"starts": "starts.npy", "record": "heights.json", "records": "degrees.json"}
+CONTENT |= dict.fromkeys(("db", "database"), "study.db")
 CASES = [(words, name) for words, (_, lines) in READS.items() for name in lines]
 
 

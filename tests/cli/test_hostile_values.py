@@ -27,15 +27,8 @@ VALUES = {
     "path": ["\udcff.{end}", "a\0b.{end}", "loop.{end}"],
 }
 TAKE_THEIR_TIME = ("plot", "report", "analyze", "verify")
-ENDINGS = {
-    "db": "db",
-    "database": "db",
-    "sources": "db",
-    "target": "db",
-    "output": "png",
-    "starts": "npy",
-    "record": "json",
-}
+ENDINGS = {"output": "png", "starts": "npy", "record": "json"}
+ENDINGS |= dict.fromkeys(("db", "database", "sources", "target"), "db")
 PATHS = {"system", "other", "systems", "output", "db", "record", "name"}  # some are names as well
 KINDS = {
     "integer": ("ShortInteger", "IntRange", "Whole"),

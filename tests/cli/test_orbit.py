@@ -199,9 +199,7 @@ def test_steps_beyond_machine_integers_are_written_in_every_format(kahanmaps, tm
 def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path):
     command = f"{MEMBER} --steps 30 --every 7 --arithmetic float"
     outcome = kahanmaps(f"{command} -o", tmp_path / "x.npy")
-    points = [
-        [float(entry) for entry in record["x"]] for record in kahanmaps(f"{command} --format jsonl").records[1:-1]
-    ]
+    points = [[float(x) for x in record["x"]] for record in kahanmaps(f"{command} --format jsonl").records[1:-1]]
     assert (outcome.status, outcome.out) == (0, "")
     assert np.load(tmp_path / "x.npy").tolist() == points
     assert outcome.err.startswith(

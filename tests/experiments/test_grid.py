@@ -91,11 +91,7 @@ def combinations(axes: dict[str, list[int]], zips: list[list[str]]) -> list[dict
             groups.append(group)
     columns = [list(zip(*(axes[name] for name in group), strict=True)) for group in groups]
     return [
-        {
-            name: value
-            for group, values in zip(groups, row, strict=True)
-            for name, value in zip(group, values, strict=True)
-        }
+        {name: x for group, values in zip(groups, row, strict=True) for name, x in zip(group, values, strict=True)}
         for row in product(*columns)
     ]
 

@@ -84,11 +84,7 @@ def test_an_option_makes_what_the_library_wants(name, canonical, made):
         ("steps", 10**9 + 1, "found 1000000001, expected an integer from 0 to 1000000000"),
         ("m", 17, "found 17, expected an integer from 1 to 16"),
         ("report", 1, "found 1, expected true or false"),
-        (
-            "method",
-            "dubling",
-            "found 'dubling', expected one of generic, normal-form, doubling; did you mean doubling?",
-        ),
+        ("method", "dubling", "found 'dubling', expected one of generic, normal-form, doubling; did you mean doubling"),
         ("start", 1, 'found 1, expected numbers separated by commas in one text, e.g. "1/2,-1/3"'),
         ("start", "1,,2", "entry 2: found nothing, expected an integer, p/q or a decimal such as 0.1"),
         ("start", "", "found nothing, expected a point"),

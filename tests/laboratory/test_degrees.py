@@ -134,11 +134,8 @@ def test_the_budget_and_the_degree_are_limits():
     found = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
     assert (found.ended, found.growth) == ("budget", Growth.BOUNDED)
     found = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)
-    assert (found.ended, found.degrees, found.message) == (
-        "degree",
-        (1, 3, 7, 17, 39),
-        "the degree of iterate 5 is above 50",
-    )
+    assert (found.ended, found.message) == ("degree", "the degree of iterate 5 is above 50")
+    assert found.degrees == (1, 3, 7, 17, 39)
 
 
 def test_a_time_limit_keeps_the_degrees_that_were_measured():

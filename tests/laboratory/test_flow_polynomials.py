@@ -104,9 +104,7 @@ def test_of_a_pencil_no_member_is_taken_for_a_rational_one():
 def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():
     file = lorenz("10", "28", "20")
     found = find_integrals(file, flow=True, max_degree=2)
-    assert [(one.text, str(one.integral.verdict)) for one in found.time_dependent] == [
-        ("exp(20*t)*(x^2 - 20*z)", "proved")
-    ]
+    assert [(t.text, str(t.integral.verdict)) for t in found.time_dependent] == [("exp(20*t)*(x^2 - 20*z)", "proved")]
     assert find_integrals(lorenz("10", "28", "19"), flow=True, max_degree=2).time_dependent == ()
     beside = flow_and_map(find_integrals(file, max_degree=2))
     assert ("proved", "Darboux polynomials of the flow, apart from affine ones: x^2 - 20*z") in beside.lines()

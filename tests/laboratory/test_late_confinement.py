@@ -92,11 +92,8 @@ def test_seven_degrees_are_derived_by_a_pattern_that_is_longer():
     # Without what follows from the singularities there is an estimate only.
     length = max(found.patterns.lengths)
     measured = replace(found, patterns=replace(found.patterns, series=()))
-    assert (measured.recurrence, measured.dynamical_degree, measured.growth) == (
-        None,
-        None,
-        Growth.EXPONENTIAL,
-    )  # proved by its bounds
+    assert (measured.recurrence, measured.dynamical_degree) == (None, None)
+    assert measured.growth == Growth.EXPONENTIAL  # proved by its bounds
     assert measured.growth_text == (
         "exponential growth (proved), by a factor of about 2 (estimated: the last quotients are 2 to 2; "
         f"a singularity pattern of {length} steps calls for {length + 2} "
@@ -249,10 +246,7 @@ def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():
         ([("confined", 3), ("not confined", 0, 1, 50), ("not confined", 2, 1, 40)], Patterns((2, 3), 40, True)),
         ([("not confined", 0, 1, 50)], Patterns((), 50, False)),
         ([("not contracted", None), ("undecided", None, 0)], Patterns((), None, False)),
-        (
-            [("undecided", 3, 2, 9, "no luck")],
-            Patterns((), None, None, "the pattern of x - 1 = 0 is undecided: no luck"),
-        ),
+        ([("undecided", 3, 2, 9, "why")], Patterns((), None, None, "the pattern of x - 1 = 0 is undecided: why")),
         (
             [("not confined", None, 1, 90)],
             Patterns((), None, None, "the pattern of x - 1 = 0 has not settled after 90 steps; raise --steps"),

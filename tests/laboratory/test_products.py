@@ -89,10 +89,7 @@ def test_numbers_other_than_1_make_integrals_that_depend_on_time():
     file = system("x y z", "x", "-y", "-2*z")
     found = find_integrals(file)
     assert [one.text for one in found.integrals] == ["x*y"]
-    assert [one.text for one in found.time_dependent] == [
-        "((-eps - 1)/(eps - 1))^-n*x",
-        "((-2*eps + 1)/(2*eps + 1))^-n*z",
-    ]
+    assert [t.text for t in found.time_dependent] == ["((-eps - 1)/(eps - 1))^-n*x", "((-2*eps + 1)/(2*eps + 1))^-n*z"]
     assert {one.integral.verdict for one in found.time_dependent} == {Certainty.PROVED}
     kahan = file.map.at("1/5")
     x = kahan.point([3, 1, 7])

@@ -130,11 +130,7 @@ ALONE: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
     ("integrals", integrals_of, lambda found: [one.text for one in found.integrals]),
     ("densities", lambda name: find_densities(load(name)), lambda found: [one.text for one in found.densities]),
     ("poisson", lambda name: find_poisson(load(name)), lambda found: [one.text for one in found.tensors]),
-    (
-        "symmetries",
-        lambda name: linear_symmetries(load(name).system),
-        lambda found: [one.text for one in found.generators],
-    ),
+    ("symmetries", lambda name: linear_symmetries(load(name).system), lambda found: [t.text for t in found.generators]),
     ("commuting", lambda name: find_commuting(load(name).system), lambda found: [str(g.rhs) for g in found.solutions]),
     ("degrees", lambda name: degree_growth(load(name).map), lambda found: [found.growth_text]),
 ]

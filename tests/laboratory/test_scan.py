@@ -90,10 +90,7 @@ image = ["y", "x + (c - 1)*y^2 + (a*b + 1)*y^3"]
 inverse = ["y - (c - 1)*x^2 - (a*b + 1)*x^3", "x"]
 """
     found = scan(parse_system(text), ["a", "b", "c"], primes=(11, 13, 17), terms=2)
-    assert {one.text: one.degrees for one in found.components} == {
-        "a*b + 1 = 0": (2, 4),
-        "a*b + 1 = 0, c - 1 = 0": (1, 1),
-    }
+    assert {c.text: c.degrees for c in found.components} == {"a*b + 1 = 0": (2, 4), "a*b + 1 = 0, c - 1 = 0": (1, 1)}
     assert not any(found.unassigned)
 
 

@@ -34,11 +34,7 @@ def step(name, run=where, *, is_independent=True):
 
 
 def test_independent_steps_run_elsewhere_in_their_order_and_the_others_here():
-    steps = [
-        step("first"),
-        step("second", lambda context, **_: context.result["first"]),
-        step("third", is_independent=False),
-    ]
+    steps = [step("first"), step("second", lambda c, **_: c.result["first"]), step("third", is_independent=False)]
     found = analyze(load("harmonic"), analyses=steps, processes=2)
     assert found["first"] == found["second"] != found["third"] == HERE
     assert analyze(load("harmonic"), analyses=steps)["first"] == HERE  # with one process

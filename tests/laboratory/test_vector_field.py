@@ -32,10 +32,7 @@ def system(names, *rhs):
             ["(2, 0): (lambda - 2)*(lambda + 2)", "line of fixed points (0, y): lambda*(lambda - y)"],
         ),
         (system("x", "x^2 - 2"), ["2 fixed points (x) with x^2 - 2 = 0: lambda - 2*x"]),
-        (
-            system("x y z", "x^2 + y^2 - 1", "0", "z"),
-            ["set of dimension 1 of fixed points (x, y, 0) with x^2 + y^2 - 1"],
-        ),
+        (system("x y z", "x^2 + y^2 - 1", "0", "z"), ["dimension 1 of fixed points (x, y, 0) with x^2 + y^2 - 1"]),
         (system("x y", "0", "0"), ["plane of fixed points (x, y): lambda^2"]),
         (system("lambda y", "lambda^2 - 1", "y"), ["(-1, 0): (mu - 1)*(mu + 2)", "(1, 0): (mu - 2)*(mu - 1)"]),
     ],
