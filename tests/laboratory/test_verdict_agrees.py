@@ -11,7 +11,7 @@ from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 SYSTEMS: list[tuple[str, dict[str, Any]]] = [
-    ("lotka_volterra", {"effort": -7}),
+    ("lotka_volterra", {"effort": -5}),
     ("lotka_volterra", {}),
     ("weierstrass", {}),
     ("weierstrass", {"eps": "1/5"}),
