@@ -160,11 +160,16 @@ class FunctionField(Field):
         rows.sort(key=lambda row: len(row[0]))
         terms = {tuple(powers[m] for _, powers in rows): c for m, c in enumerate(polynomial.coeffs())}
         total = self._horner(terms, [factor for factor, _ in rows])
-        denominator = self._one
-        for D, top in zip(denominators, tops, strict=True):
-            for _ in range(top):
-                denominator = self.times(denominator, D)
-        return self.fraction(total, denominator)
+        powers = tuple((D, top) for D, top in zip(denominators, tops, strict=True) if top)
+        return Function(self, total, self.product_of(powers), powers)
+
+    def product_of(self, powers: Sequence[tuple[fmpq_mpoly, int]]) -> fmpq_mpoly:
+        """Return the product of powers of polynomials."""
+        product = self._one
+        for factor, exponent in powers:
+            for _ in range(exponent):
+                product = self.times(product, factor)
+        return product
 
     def _horner(self, terms: dict[tuple[int, ...], fmpq], factors: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
         """Return the sum of coefficients times powers of the factors; `terms` has the coefficients by exponents."""
@@ -194,16 +199,26 @@ class FunctionField(Field):
 
 
 class Function(Element):
-    """A quotient of two polynomials in a `FunctionField`, not reduced."""
+    """A quotient of two polynomials in a `FunctionField`, not reduced.
 
-    __slots__ = ("denominator", "numerator")
+    The value of a polynomial also knows its denominator as a product of powers, which cancel in a quotient of values.
+    """
+
+    __slots__ = ("denominator", "numerator", "powers")
 
     field: FunctionField
 
-    def __init__(self, field: FunctionField, numerator: fmpq_mpoly, denominator: fmpq_mpoly) -> None:
+    def __init__(
+        self,
+        field: FunctionField,
+        numerator: fmpq_mpoly,
+        denominator: fmpq_mpoly,
+        powers: tuple[tuple[fmpq_mpoly, int], ...] = (),
+    ) -> None:
         self.field = field
         self.numerator = numerator
         self.denominator = denominator
+        self.powers = powers
 
     def _plus(self, other: Function) -> Function:
         if self.numerator.is_zero():
@@ -233,6 +248,15 @@ class Function(Element):
     def _over(self, other: Function) -> Function:
         if self.field.vanishes(other.numerator):
             raise ZeroDivisionError("division by the zero function")
+        shared = [(D, min(top, low)) for D, top in self.powers for E, low in other.powers if D == E]
+        if shared:
+            # a/D^3 over b/D^2 is a/(D b): the denominators as they stand would be multiplied into both sides.
+            upper, lower = (
+                self.field.product_of([(D, top - sum(n for E, n in shared if D == E)) for D, top in value.powers])
+                for value in (self, other)
+            )
+            times = self.field.times
+            return self.field.fraction(times(self.numerator, lower), times(other.numerator, upper))
         return self._times(Function(self.field, other.denominator, other.numerator))
 
     def _same(self, other: Function) -> bool:

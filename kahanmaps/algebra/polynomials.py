@@ -78,6 +78,17 @@ def is_homogeneous(polynomial: fmpq_mpoly, of_degree: int) -> bool:
     return all(sum(monomial) == of_degree for monomial in polynomial.monoms())
 
 
+def is_weighted_homogeneous(polynomial: fmpq_mpoly, weights: Sequence[int]) -> bool:
+    """Whether all monomials have the same degree if the variables have these weights.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> is_weighted_homogeneous(x**2 + x * y**3, [3, 1])
+    True
+    """
+    degrees = {sum(w * int(e) for w, e in zip(weights, monomial, strict=True)) for monomial in polynomial.monoms()}
+    return len(degrees) <= 1
+
+
 def gradient(polynomial: fmpq_mpoly) -> tuple[fmpq_mpoly, ...]:
     """Return the partial derivatives, in the order of the variables of the ring.
 

@@ -53,9 +53,9 @@ def commutativity(
     labels = (f"Phi_{second}(Phi_{first}(x))", f"Phi_{first}(Phi_{second}(x))")
     subject = (first_map.subject, second_map.subject, *([] if ratio == 1 else [ratio]))
     has_eps = first_map.has_eps or second_map.has_eps
-    return Identity(
-        f.dim, sides, eps, *labels, has_eps=has_eps, root=first_map.root or second_map.root, subject=subject
-    )
+    scales = first_map.scales_with_eps and second_map.scales_with_eps
+    root = first_map.root or second_map.root
+    return Identity(f.dim, sides, eps, *labels, has_eps=has_eps, scales_with_eps=scales, root=root, subject=subject)
 
 
 def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamily, eps: Any, seed: int) -> None:

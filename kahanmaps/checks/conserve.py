@@ -63,7 +63,10 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
         return None if after is None or value_before is None else ([after], [value_before])
 
     subject = (map_.subject, integral.subject)
-    return Identity(map_.dim, sides, eps, *labels, has_eps=map_.has_eps, root=map_.root, subject=subject)
+    scales = map_.scales_with_eps and integral.scales_with_eps
+    return Identity(
+        map_.dim, sides, eps, *labels, has_eps=map_.has_eps, scales_with_eps=scales, root=map_.root, subject=subject
+    )
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:

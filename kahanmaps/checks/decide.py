@@ -61,6 +61,8 @@ class Identity:
     entries: tuple[str, ...] = ()  # names of the entries, if a witness should show only one that differs
     scope: str = ""  # for what it is stated, as text, if eps alone does not say it
     has_eps: bool = True  # whether the sides depend on eps
+    # Whether it is an identity in eps x, up to powers of eps: it then holds for every eps if it holds for eps = 1.
+    scales_with_eps: bool = False
     no_value: str = "a denominator seems to vanish identically"  # the likely reason if it is defined nowhere
     root: Root | None = None  # the algebraic number in the coefficients, if any
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)

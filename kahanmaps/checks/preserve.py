@@ -59,9 +59,9 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
     subject = (map_.subject, density.subject)
     no_value = "the map seems to have no inverse, to be defined nowhere, or a denominator to vanish identically"
-    return Identity(
-        map_.dim, sides, eps, *labels, no_value=no_value, has_eps=map_.has_eps, root=map_.root, subject=subject
-    )
+    properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": subject}
+    properties["scales_with_eps"] = map_.scales_with_eps and density.scales_with_eps
+    return Identity(map_.dim, sides, eps, *labels, no_value=no_value, **properties)
 
 
 def _image(kahan: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -28,6 +28,7 @@ from kahanmaps.algebra.polynomials import (
     coefficients_in,
     degree_in,
     evaluate,
+    is_weighted_homogeneous,
     names_of,
     primitive_part,
     ring,
@@ -53,6 +54,7 @@ class PhaseFunction(ABC):
     name: str
     formula: str
     condition: str = ""  # for which eps it is defined and not 0, in the form of `where`
+    scales_with_eps: bool = False  # whether it is known to be eps^k times a function of eps x
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -85,6 +87,13 @@ class ClaimedFunction(PhaseFunction):
         self.formula = format_rational_function(function)
         if self.iterates and map_ is None:
             raise InputError(f"found {name}, a function of x and its iterates, expected one of x alone here")
+
+    @property
+    def scales_with_eps(self) -> bool:  # type: ignore[override]  # computed here
+        weights = [1] * (len(self.function.names) - 1) + [-1]
+        if self.root is not None:
+            weights[-2] = 0
+        return all(is_weighted_homogeneous(p, weights) for p in (self.function.numerator, self.function.denominator))
 
     @property
     def subject(self) -> tuple[Any, ...]:

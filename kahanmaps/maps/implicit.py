@@ -353,6 +353,11 @@ class MapFamily(LatexDisplay, ABC):
         return True
 
     @property
+    def scales_with_eps(self) -> bool:
+        """Whether eps Phi(x, eps) is known to be a function of eps x, so that eps = 1 stands for every eps."""
+        return False
+
+    @property
     def image(self) -> tuple[RationalFunction, ...] | None:
         """The coordinates of x~ as functions of the `names`, if the map is explicit; otherwise None."""
         return None

@@ -177,6 +177,10 @@ class KahanFamily(MapFamily):
         return tuple(name for name in self.system.symbols if name != "eps")
 
     @property
+    def scales_with_eps(self) -> bool:
+        return self.system.is_homogeneous and "eps" not in self.system.symbols
+
+    @property
     def subject(self) -> tuple[Any, ...]:
         return self.system.rhs
 

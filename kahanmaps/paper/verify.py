@@ -8,6 +8,8 @@ The methods of verification:
 * *normal form*: the claim is evaluated over rational functions, for the normal form with indeterminate roots,
   coefficients, x and eps. This proves it for every member with distinct roots: over the splitting field of chi such a
   member is symplectically similar to a specialization (docs/mathematics.md); its hypotheses are verified exactly.
+* *formal proof*: the facts (5)-(12) about every quadratic system follow from identities of multilinear expressions,
+  which are compared without coordinates (formal_proofs.py).
 * *symbolic*: if the normal form does not apply, the claim is evaluated for this member with indeterminate x and eps.
 * *exact*: claims without x, and claims about dimensions and ranks, are evaluated over Q.
 
@@ -388,6 +390,8 @@ class Verifier:
 
     def proof(self, claim: Claim, needs: set[str], equation: CoefficientSize, poles: int) -> Evidence | None:
         """Return a proof, or None."""
+        if claim.formal is not None:
+            return formal_proof(claim)
         blocks, order = claim.blocks_for_proof(self.m), self.options.order
         if self.member is None:
             return normal_form_proof(claim.key, blocks, order) if claim.symplectic else None
@@ -585,6 +589,22 @@ class ClaimAtPoints:
     def data(self, undefined: int) -> dict[str, Any]:
         """Return the data of the evidence other than the bounds."""
         return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
+
+
+def formal_proof(claim: Claim) -> Evidence | None:
+    """Prove a claim about every system by identities of multilinear expressions, which are compared here.
+
+    Raises Contradiction where the two sides of one differ.
+    """
+    assert claim.formal is not None
+    number = 0
+    for left, right in claim.formal():
+        number += 1
+        if left != right:
+            raise Contradiction(f"{claim.place}: {claim.title}: identity {number} of its formal proof fails")
+    what = "one identity" if number == 1 else f"{number} identities"
+    text = f"follows, in every dimension, from {what} without coordinates (docs/mathematics.md, Formal proofs)"
+    return Evidence("formal proof", text, {"identities": number})
 
 
 @lru_cache(maxsize=4096)

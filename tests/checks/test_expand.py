@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 from flint import fmpq
 
-from kahanmaps import QuadraticSystem, parse_rational_function
+from kahanmaps import QuadraticSystem, load, parse_rational_function
 from kahanmaps.checks import certify
 from kahanmaps.checks.certify import NotEqual, expansion
 from kahanmaps.checks.claims import Certainty, Evidence
-from kahanmaps.checks.conserve import conservation
+from kahanmaps.checks.conserve import check_integrals, conservation
 from kahanmaps.checks.decide import Decision, Identity
 from kahanmaps.checks.settings import Settings
 from kahanmaps.invariants.phase_functions import ClaimedIntegral
@@ -56,6 +56,28 @@ def test_all_components_have_to_agree(wrong):
     assert expansion(right) is not None
     with pytest.raises(NotEqual):
         expansion(replace(right, sides=sides))
+
+
+def test_eps_is_scaled_out_only_where_the_map_and_the_claim_scale():
+    assert identity(CONSERVED, None).scales_with_eps
+    true_for_eps_1_only = identity("(1 - y^2)/(1 + 2*z^2)", None)
+    assert not true_for_eps_1_only.scales_with_eps
+    with pytest.raises(NotEqual):
+        expansion(true_for_eps_1_only)
+    assert expansion(replace(true_for_eps_1_only, eps=fmpq(1))) is not None
+    with pytest.raises(NotEqual):
+        expansion(identity("(1 - 2*eps^2*y^2)/(1 + 2*eps^2*z^2)", None))
+    pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "-x + x^2"])
+    energy = ClaimedIntegral("H", parse_rational_function("x^2 + y^2", ["x", "y", "eps"]))
+    assert not conservation(pendulum, energy, None).scales_with_eps
+
+
+@pytest.mark.slow
+def test_the_integrals_of_the_member_in_dimension_6_are_proved_and_changed_ones_refuted():
+    file = load("paper_m3")
+    assert check_integrals(file).verdict is Certainty.PROVED
+    changed = {name: f"{function.numerator + 1}" for name, function in file.integrals.items()}
+    assert {finding.verdict for finding in check_integrals(file, extra=changed).findings} == {Certainty.REFUTED}
 
 
 def test_a_small_budget_ends_without_an_answer():

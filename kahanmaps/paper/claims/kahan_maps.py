@@ -6,6 +6,7 @@ or any Hamiltonian one, also on systems without any structure.
 
 from __future__ import annotations
 
+from kahanmaps.paper import formal_proofs
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Pairs, claim
 
@@ -23,7 +24,7 @@ def derivatives_of_the_system(o: PaperObjects) -> Pairs:
     yield p.second_slope(lambda p, x: p.H(x), p.x, v, w), o.dot(v, p.hess(p.x) * w)
 
 
-@claim("(5)-(7)", "eq: Kahan gen", "map", symplectic=False)
+@claim("(5)-(7)", "eq: Kahan gen", "map", symplectic=False, formal=formal_proofs.map_of_any_quadratic_system)
 def any_quadratic_system(o: PaperObjects) -> Pairs:
     """A quadratic system without any structure: the equation, the explicit form, reversibility
     Kahan's equation, its solution and its inverse, for any quadratic f"""
@@ -36,7 +37,7 @@ def any_quadratic_system(o: PaperObjects) -> Pairs:
     yield o.step(f, x_tilde, times=-1), o.x
 
 
-@claim("(8), (9)", "eq: Phi hom", "map eps", symplectic=False)
+@claim("(8), (9)", "eq: Phi hom", "map eps", symplectic=False, formal=formal_proofs.map_of_any_homogeneous_system)
 def any_homogeneous_system(o: PaperObjects) -> Pairs:
     """A homogeneous quadratic system without any structure
     x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, for any homogeneous f"""
@@ -46,7 +47,7 @@ def any_homogeneous_system(o: PaperObjects) -> Pairs:
     yield x_tilde, o.plus_eps_jac(f, x_tilde) * o.x
 
 
-@claim("(10)", "Jac", "map eps", symplectic=False)
+@claim("(10)", "Jac", "map eps", symplectic=False, formal=formal_proofs.jacobian_of_any_map)
 def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
     """The Jacobi matrix of the map of a system without any structure: M(x + t v) x~(x + t v) differentiated
     dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~)), for any quadratic f"""
@@ -59,7 +60,7 @@ def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
     yield moved - v, half_sum
 
 
-@claim("(11)", "eq: CMOQ integral", "map eps", symplectic=False)
+@claim("(11)", "eq: CMOQ integral", "map eps", symplectic=False, formal=formal_proofs.integral_of_any_cubic)
 def integral_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
     """An arbitrary cubic H, with terms of all degrees, and an arbitrary skew J
     H + (2 eps/3) nabla H^T (I - eps f')^{-1} f is conserved, for any cubic H and any skew J"""
@@ -67,7 +68,7 @@ def integral_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
     yield p.modified_H(p.step(p.f, p.x)), p.modified_H(p.x)
 
 
-@claim("(12)", "eq: CMOQ measure", "map eps", symplectic=False)
+@claim("(12)", "eq: CMOQ measure", "map eps", symplectic=False, formal=formal_proofs.measure_of_any_hamiltonian_map)
 def measure_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
     """The invariant measure for an arbitrary cubic H and an arbitrary skew J
     dx/det(I - eps f') is invariant, for any cubic H and any skew J"""

@@ -1,0 +1,183 @@
+"""Formal proofs of the facts (5)-(12), which hold for every quadratic f and every cubic H in every dimension.
+
+Coordinates would be too many in dimension 6. None are needed: the facts follow from a few identities between
+multilinear expressions, in which Q is any symmetric bilinear map, B any linear map, T any symmetric trilinear form and
+J any skew matrix. Each function yields the pairs of expressions that have to be equal; docs/mathematics.md, "Formal
+proofs", says how the claims follow from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from flint import fmpq, fmpq_poly
+
+# A term is a letter, ("x",), or a map of terms, ("Q", ("x",), ("y",)); a word is a product of letters, ("J", "S").
+Term = tuple[Any, ...]
+Scalar = fmpq_poly  # a polynomial in eps
+Pairs = Iterator[tuple["Expression", "Expression"]]
+
+EPS = fmpq_poly([0, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """A linear combination of terms with coefficients in Q[eps]; equal expressions have equal coefficients."""
+
+    coefficients: dict[Term, Scalar]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Expression) and (self - other).coefficients == {}
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __add__(self, other: Expression) -> Expression:
+        return combine([*self.coefficients.items(), *other.coefficients.items()])
+
+    def __sub__(self, other: Expression) -> Expression:
+        return self + other * -1
+
+    def __mul__(self, scalar: int | fmpq | Scalar) -> Expression:
+        return combine([(term, coefficient * scalar) for term, coefficient in self.coefficients.items()])
+
+    __rmul__ = __mul__
+
+    def times(self, other: Expression) -> Expression:
+        """Return the product of two combinations of words, which do not commute."""
+        pairs = product(self.coefficients.items(), other.coefficients.items())
+        return combine([(left + right, a * b) for (left, a), (right, b) in pairs])
+
+
+def combine(terms: list[tuple[Term, Scalar]]) -> Expression:
+    """Add up terms with coefficients."""
+    total: dict[Term, Scalar] = {}
+    for term, coefficient in terms:
+        total[term] = total.get(term, fmpq_poly()) + coefficient
+    return Expression({term: coefficient for term, coefficient in total.items() if not coefficient.is_zero()})
+
+
+def letter(name: str) -> Expression:
+    """Return a letter as an expression."""
+    return Expression({(name,): fmpq_poly([1])})
+
+
+@dataclass(frozen=True)
+class Multilinear:
+    """A multilinear map of which nothing else is known than its symmetry: 1 symmetric, -1 skew, 0 none."""
+
+    name: str
+    symmetry: int = 0
+
+    def __call__(self, *arguments: Expression) -> Expression:
+        terms = []
+        for chosen in product(*(argument.coefficients.items() for argument in arguments)):
+            coefficient = fmpq_poly([1])
+            for _, factor in chosen:
+                coefficient *= factor
+            inner = [term for term, _ in chosen]
+            if self.symmetry:
+                inversions = sum(a > b for i, a in enumerate(inner) for b in inner[i + 1 :])
+                coefficient *= self.symmetry**inversions
+                if self.symmetry < 0 and len(set(inner)) < len(inner):
+                    continue
+                inner.sort()
+            terms.append(((self.name, *inner), coefficient))
+        return combine(terms)
+
+
+Q = Multilinear("Q", symmetry=1)
+B = Multilinear("B")
+T = Multilinear("T", symmetry=1)
+X, Y, Z = letter("x"), letter("y"), letter("z")
+
+
+class KahanEquation:
+    """Kahan's equation E = 0 for f(x) = Q(x, x) + B x + c, with the matrices M = I - eps f' and P = I + eps f'."""
+
+    def __init__(self, Q: Multilinear = Q, homogeneous: bool = False) -> None:
+        self.Q = Q
+        none = Expression({})
+        self.B: Callable[[Expression], Expression] = (lambda v: none) if homogeneous else B
+        self.c = none if homogeneous else letter("c")
+
+    def f(self, x: Expression) -> Expression:
+        return self.Q(x, x) + self.B(x) + self.c
+
+    def df(self, x: Expression, v: Expression) -> Expression:
+        """Return f'(x) v."""
+        return self.Q(x, v) * 2 + self.B(v)
+
+    def E(self, x: Expression, y: Expression, eps: Scalar = EPS) -> Expression:
+        """Return y - x - 2 eps (Q(x, y) + B(x + y)/2 + c), which is 0 where y = Phi(x)."""
+        return y - x - (self.Q(x, y) * 2 + self.B(x + y) + self.c * 2) * eps
+
+    def M(self, x: Expression, v: Expression) -> Expression:
+        return v - self.df(x, v) * EPS
+
+    def P(self, x: Expression, v: Expression) -> Expression:
+        return v + self.df(x, v) * EPS
+
+
+def map_of_any_quadratic_system(Q: Multilinear = Q) -> Pairs:
+    """Yield the identities behind (5)-(7): the explicit form, and reversibility."""
+    kahan = KahanEquation(Q)
+    yield kahan.M(X, Y - X) - 2 * EPS * kahan.f(X), kahan.E(X, Y)
+    yield kahan.E(Y, X, -EPS), kahan.E(X, Y) * -1
+
+
+def map_of_any_homogeneous_system(Q: Multilinear = Q) -> Pairs:
+    """Yield the identities behind (8) and (9)."""
+    kahan = KahanEquation(Q, homogeneous=True)
+    yield kahan.M(X, Y) - X, kahan.E(X, Y)
+    yield Y - kahan.P(Y, X), kahan.E(X, Y)
+
+
+def jacobian_of_any_map(Q: Multilinear = Q) -> Pairs:
+    """Yield the identity behind (10): E changes by M(x) w - P(y) v to first order if x and y change by v and w."""
+    kahan, v, w = KahanEquation(Q), letter("v"), letter("w")
+    first_order = kahan.M(X, w) - kahan.P(Y, v)
+    yield kahan.E(X + v, Y + w) - kahan.E(X, Y), first_order - Q(v, w) * (2 * EPS)
+
+
+def integral_of_any_cubic(T: Multilinear = T, skew: Multilinear | None = None) -> Pairs:
+    """Yield the identities behind (11), for three successive points x, y, z of an orbit.
+
+    H(x) = T(x, x, x) with a last coordinate 1 of x. G_uv is the covector with G_uv . w = 3 T(u, v, w) for all w with
+    last coordinate 0. Kahan's equation reads y - x = 2 eps J G_xy, hence T(u, v, y - x) = (2 eps/3) G_uv . J G_xy.
+    """
+    pairing = skew or Multilinear("G.JG", symmetry=-1)
+    steps = {"xy": Y - X, "yz": Z - Y}
+    parts = ((X, Y, "xy", "xy"), (Y, Z, "yz", "xy"), (X, Y, "xy", "yz"))  # u, v, name of G_uv, step from there
+    differences = (T(u, v, steps[step]) for u, v, _, step in parts)
+    by_the_equation = (pairing(letter(G), letter(step)) for _, _, G, step in parts)
+    none = Expression({})
+    yield sum(differences, none), T(Y, Y, Z) - T(X, X, Y)
+    yield sum(by_the_equation, none), none
+    yield T(X, X, X) + T(X, X, Y - X), T(X, X, Y)  # H + (1/3) nabla H . (y - x), which is the second form
+
+
+def measure_of_any_hamiltonian_map(J_transposed: int = -1) -> Pairs:
+    """Yield the identities behind (12): det(I + eps J S) = det(I - eps J S) for a skew J and a symmetric S.
+
+    Transposition gives det(I + eps J S) = det(I - eps S J); that this is det(I - eps J S) is read off two products of
+    block matrices, of which the factors on one side have determinant 1.
+    """
+    one, zero = Expression({(): fmpq_poly([1])}), Expression({})
+    J, S = letter("J"), letter("S")
+
+    def transposed(expression: Expression) -> Expression:
+        terms = expression.coefficients.items()
+        return combine([(word[::-1], c * J_transposed ** word.count("J")) for word, c in terms])
+
+    yield transposed(one + EPS * J.times(S)), one - EPS * S.times(J)
+    A, C = EPS * J, S
+    middle, shear = ((one, A), (C, one)), ((one, A * -1), (zero, one))
+    for left, right, triangular in (
+        (middle, shear, ((one, zero), (C, one - C.times(A)))),
+        (shear, middle, ((one - A.times(C), zero), (C, one))),
+    ):
+        for i, k in product(range(2), repeat=2):
+            yield left[i][0].times(right[0][k]) + left[i][1].times(right[1][k]), triangular[i][k]
