@@ -7,7 +7,7 @@ polynomials. What is composed of these is bounded by composition; tests/checks a
 import math
 
 import pytest
-from bound_helpers import F, covers, covers_polynomial, numerator, polynomials, true_size
+from check_helpers import F, covers, covers_polynomial, numerator, polynomials, true_size
 from flint import fmpq
 from hypothesis import assume, given
 from hypothesis import strategies as st

@@ -3,8 +3,7 @@
 import random
 
 import pytest
-from bound_helpers import check, covers_polynomial, differences, lowest, true_size
-from check_helpers import claim, hamiltonians, system_of
+from check_helpers import check, claim, covers_polynomial, differences, hamiltonians, lowest, system_of, true_size
 from flint import fmpq
 from helpers import HENON_HEILES, LOTKA_VOLTERRA, rationals, systems, together
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Members that do not say so: A is found from H and J alone.
+"""Members that do not say so: A is found from H and J alone. The normal form of a system, declared or found.
 
 Specified here: all A with A^T J = J A and A Hess(H) = Hess(H) A^T are found, for every invertible J; of a member whose
 A is forgotten an A with the same splitting is found again, and its normal form steps like the system itself; without
@@ -11,9 +11,10 @@ from dataclasses import replace
 import pytest
 from family.members import GENERIC, t
 from flint import fmpq, fmpq_mat
+from helpers import EULER_TOP, HENON_HEILES, LORENZ, LOTKA_VOLTERRA, random_point
 from hypothesis import given
 from hypothesis import strategies as st
-from planar_helpers import invertible, moved
+from planar_helpers import invertible, moved, over_members, structure_and_system
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
@@ -25,7 +26,11 @@ from kahanmaps.family.cubics import default_variables, third_derivatives
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.family.recognition import find_family_structure, structure_space, why_not_member
 from kahanmaps.family.skew_hamiltonian import chi, evaluate_at_matrix, random_symplectic
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 MEMBERS = GENERIC | {
     "m = 2, complex": random_member_with_chi(t**2 + 1, 1),
@@ -143,3 +148,62 @@ def test_a_member_of_another_system_is_refused():
         replace(found, T=2 * found.T)
     with pytest.raises(HypothesisError, match="sign -1"):
         replace(found, member=replace(found.member, signs=(1, -1)))
+
+
+def hamiltonian(text: str, n: int) -> CubicHamiltonian:
+    return CubicHamiltonian(parse_polynomial(text, default_variables(n)), standard_structure(n))
+
+
+def steps_like(normal_form: SystemNormalForm, system: QuadraticSystem) -> bool:
+    """Whether one step in the planes is a step of the system."""
+    splitting, x = Splitting(normal_form.form, QQ, "1/10", normal_form.T), random_point(system.dim, 8)
+    images = [plane.block.image(P) for plane, P in zip(splitting.planes, splitting.triples(x), strict=True)]
+    return splitting.point(images) == KahanMap(system, "1/10").step(x)
+
+
+# Found.
+
+
+def test_a_declared_member_keeps_its_a():
+    member = random_member_with_eigenvalues(["1/2", -7], 3)
+    found = system_normal_form(member.chosen.system, member=member)
+    assert (found.declared, found.T) == (True, None)
+    assert found.form.A == member.A
+    assert found.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
+
+
+@over_members
+def test_the_structure_steps_like_the_system(name):
+    normal_form, system = structure_and_system(name)
+    assert steps_like(normal_form, system)
+    assert not normal_form.declared
+
+
+@pytest.mark.parametrize("n", [2, 4, 6])
+def test_with_another_J_there_is_a_change_of_coordinates(n):
+    member = random_member_with_eigenvalues([1, -2, 3][: n // 2], 2)
+    other = moved(CubicHamiltonian(member.H, standard_structure(n)), invertible(n, 5))
+    found = system_normal_form(other.system, other)
+    assert found.T * standard_structure(n) * found.T.transpose() == other.J
+    assert steps_like(found, other.system)
+    # x = S z alone, without T, are other coordinates
+    assert not steps_like(SystemNormalForm(found.form, None, False, ""), other.system)
+
+
+# None, with the reason.
+
+REASONS = [
+    (HENON_HEILES, "H is not a homogeneous cubic"),
+    (LORENZ, "x' is not J grad H"),
+    (EULER_TOP, "x' is not J grad H"),
+    (LOTKA_VOLTERRA, "x' is not J grad H"),
+    (hamiltonian("x1^3 + x2^3 + x3^3 + x4^3 + x1*x2*x3", 4).system, "only the multiples of I satisfy"),
+    (QuadraticSystem.from_text(["x", "y"], ["x", "-y"]), "H is not a homogeneous cubic"),
+]
+
+
+@pytest.mark.parametrize(("system", "reason"), REASONS)
+def test_without_a_structure_the_reason_is_said(system, reason):
+    found = system_normal_form(system)
+    assert isinstance(found, NoNormalForm)
+    assert found.reason.startswith(reason)

@@ -1,20 +1,23 @@
 """One report of everything: it reads no claims, concludes nothing from one eps, and says what it did not do; what no
-search can be asked is named."""
+search can be asked is named, and no field contradicts another one."""
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from helpers import together
 from search_helpers import analysis_of, system
 
-from kahanmaps.documents.catalog import load
+import kahanmaps as km
+from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analyses import table
 from kahanmaps.laboratory.analyses.table import ANALYSES
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
@@ -296,3 +299,94 @@ WRONG = [
 def test_what_cannot_be_searched_is_refused(search, given, options, words):
     with pytest.raises(InputError, match=words):
         search(given, **options)
+
+
+# Fields that contradict each other
+
+
+SYSTEMS: list[tuple[str, dict[str, Any]]] = [
+    ("lotka_volterra", {"effort": -5}),
+    ("lotka_volterra", {}),
+    ("weierstrass", {}),
+    ("weierstrass", {"eps": "1/5"}),
+    ("zander_120", {}),
+    ("riccati", {}),
+    ("harmonic", {}),
+    ("weierstrass", {"symbols": ["g2"]}),
+    ("x' = 0; y' = 0", {}),
+    ("x' = 0; y' = 0; z' = 0", {}),
+]
+
+
+def disagreements(found: dict[str, Any]) -> list[str]:
+    """Which fields of the JSON of `analyze` contradict each other."""
+    verdict, degrees = found["verdict"], found["degrees"]
+    word, growth, exact = verdict["integrability"], verdict["growth"], verdict["integrals_exact"]
+    told = {line["status"] for line in found["statements"] if degrees and line["text"] == degrees["growth_text"]}
+    enclosed = bool(degrees and degrees["enclosure"])
+    limits = {
+        "a map that is not integrable grows exponentially": word != "not integrable" or growth == "exponential",
+        "an integrable map does not": word != "integrable" or growth != "exponential",
+        "a dynamical degree above 1 is exponential growth": not enclosed or degrees["growth"] == "exponential",
+        "it decides": not enclosed or word in ("not integrable", "undecided"),
+        "the growth of the verdict is that of the degrees": not degrees
+        or growth == degrees["growth"]
+        or (degrees["looks_exponential"] and growth == "exponential"),
+        "a rate is of a recurrence": not degrees
+        or (degrees["dynamical_degree"] is None or degrees["recurrence"] is not None),
+        "the status of the growth is its basis": not degrees or told <= {degrees["basis"].partition(":")[0]},
+        "an undecided verdict has no ground, others have one": (verdict["ground"] == "") == (word == "undecided")
+        or word == "singular",
+        "superintegrable maps have dim - 1 integrals": verdict["sense"] != "superintegrable"
+        or verdict["integrals"] >= found["dim"] - 1,
+        "a number of integrals is exact on curves and points only": not exact
+        or verdict["integrals"] >= found["dim"] - 1,
+        "a lower bound is called so": exact
+        or not verdict["integrals"]
+        or "at least" in verdict["sentence"]
+        or "integral" not in verdict["sentence"]
+        or word == "not integrable",
+        "and nothing else is": not exact or "at least" not in verdict["sentence"] or enclosed,
+        "periodic maps have as many integrals as coordinates, or more are possible": not exact
+        or verdict["integrals"] == found["dim"]
+        or found["integrals"]["relations"]["period"] is None,
+    }
+    return [words for words, holds in limits.items() if not holds]
+
+
+@pytest.mark.parametrize(("system", "options"), SYSTEMS, ids=[f"{name} {more}" for name, more in SYSTEMS])
+def test_the_fields_of_an_analysis_agree(system, options):
+    found = km.analyze(system, **options) if options or system not in names() else analysis_of(system)
+    assert disagreements(found.to_json()) == []
+
+
+def test_fields_that_disagree_would_be_noticed():
+    found = analysis_of("lotka_volterra").to_json()
+    assert found["degrees"]["enclosure"]
+    found["verdict"]["growth"] = "unknown"
+    found["degrees"]["growth"] = "unknown"
+    found["verdict"]["ground"] = ""
+    assert len(disagreements(found)) == 3
+
+
+def test_growth_is_exponential_where_positive_entropy_is_proved_and_no_recurrence_confirmed():
+    # Degrees 2^n of lotka_volterra, whose singularities the budget left out.
+    degrees = tuple(2**n for n in range(9))
+    bounds = bound_dynamical_degree(km.load("lotka_volterra").map, None)
+    found = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), (), enclosure=bounds)
+    assert (str(found.growth), found.recurrence) == ("exponential", None)
+    control = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), ())
+    assert (str(control.growth), str(control.known)) == ("unknown", "undecided")
+
+
+# x' = a y, y' = -a x, z' = a x y has two integrals for generic a; at a = 0 every point is fixed.
+TURNING = "x' = a*y; y' = -a*x; z' = a*x*y"
+
+
+@pytest.mark.parametrize(("a", "is_exact"), [(0, False), (1, True)])
+@pytest.mark.parametrize("flow", [False, True])
+def test_a_number_of_integrals_is_a_lower_bound_where_orbits_close_at_the_values_of_the_file(a, is_exact, flow):
+    found = km.find_integrals(km.System(TURNING, a=a), symbols=["a"], flow=flow)
+    assert (found.codimension, found.is_exact) == (2, is_exact)
+    assert ("at least" in found.count_text) is not is_exact
+    assert ("at a = 0" in found.note) is not is_exact

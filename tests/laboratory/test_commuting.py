@@ -4,7 +4,7 @@ import random
 from types import SimpleNamespace
 
 import pytest
-from bound_helpers import check
+from check_helpers import check
 from flint import fmpq, fmpq_mat
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,19 +1,27 @@
 """Cofactors, and spaces of polynomials with a common one: their ratios are conserved, and nothing is found where
-nothing is.
+nothing is. All Darboux polynomials of a degree have their identities on exact points.
 """
 
 import random
 from math import comb
+from typing import Any
 
 import pytest
+from flint import fmpq
 from helpers import DIMENSION
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.modular_matrices import combine, rank
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to, monomial_values
+from kahanmaps.laboratory.preserve.darboux import darboux_polynomials as module
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
     DETERMINANT,
     Cofactor,
@@ -24,7 +32,10 @@ from kahanmaps.laboratory.preserve.darboux.cofactors import (
     determinant_polynomial,
     points_needed,
 )
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace, darboux_spaces, gradient_rank
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 SMALL = 101
 
@@ -123,3 +134,84 @@ def test_polynomials_with_a_given_cofactor():
     assert cofactor_space(sample, CofactorProduct((1,), 1), 2).basis == [[0, 0, 0, 0, 1, 0]]
     assert cofactor_space(sample, CofactorProduct((0,), 0), 2).basis == [[1, 0, 0, 0, 0, 0]]
     assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []
+
+
+# Polynomials found with their cofactors
+
+
+def listed(name: str, degree: int, **options: Any) -> dict[str, list[str]]:
+    """Cofactors and polynomials as text."""
+    found = darboux_polynomials(load(name), degree, **options)
+    assert not found.reason
+    return {space.cofactor: [format_polynomial(P) for P in space.polynomials] for space in found.spaces}
+
+
+def test_the_coordinates_of_lotka_volterra_and_nothing_else() -> None:
+    """Origin: x' = x(...), y' = y(...), and the map has no integral; products are not listed."""
+    assert listed("lotka_volterra", 4) == {"C[x]": ["x"], "C[y]": ["y"]}
+
+
+def test_the_pencils_of_the_periodic_volterra_lattice() -> None:
+    """Origin: petrera-pfadler-suris-2011, integrals x1 x3/(1 - eps^2 (x2 - x4)^2) and its shift."""
+    found = listed("volterra_periodic_4", 2)
+    assert found["C[x1]*C[x3]"] == ["x1*x3", "x2^2*eps^2 - 2*x2*x4*eps^2 + x4^2*eps^2 - 1"]
+    assert found["1"][0] == "x1 + x2 + x3 + x4"
+
+
+@pytest.mark.parametrize("name", ["nahm_octahedral", "dressing_chain_3"])
+def test_ratios_of_one_space_are_conserved_along_exact_orbits(name: str) -> None:
+    file = load(name)
+    rng = random.Random(name)
+    seen = 0
+    for space in darboux_polynomials(file, 4).spaces:
+        for eps in (fmpq(1, 7), fmpq(-2, 5)):
+            x = tuple(fmpq(rng.randint(-9, 9), rng.randint(1, 9)) for _ in file.variables)
+            image = KahanMap(file.system, eps).step(x)
+            before = [evaluate(P, QQ, (*x, eps)) for P in space.polynomials]
+            after = [evaluate(P, QQ, (*image, eps)) for P in space.polynomials]
+            for k in range(1, len(before)):
+                assert after[k] * before[0] == before[k] * after[0]
+                seen += 1
+            assert all(value != 0 for value in before), "a random point should lie on no Darboux curve"
+    assert seen > 0
+
+
+@pytest.mark.parametrize(("rhs", "eps"), [(["x", "y"], -1), (["x", "y"], 1)])
+def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynomials(rhs, eps):
+    # At eps = -1 every point goes to x = 0, and all multiples of x would have the cofactor 0.
+    found = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)
+    assert found.spaces == ()
+    assert f"at eps = {eps} the map" in found.reason
+
+
+@pytest.mark.parametrize(("symbols", "cofactor"), [((), "1/5*(y + 1)*1/(x)^2"), (("a",), "(1/a)*(y + 1)*1/(x)^2")])
+def test_a_cofactor_has_a_number_in_front(symbols, cofactor):
+    """Lyness' map x_{n+1} x_{n-1} = a + x_n for a multiples of the x_n: factors of det dPhi are right up to numbers."""
+    file = parse_system("variables = ['x', 'y']\nparameters.a = 5\n[map]\nimage = ['y', '(y + 1)/(a*x)']")
+    found = darboux_polynomials(file, 3, symbols=symbols)
+    [space] = found.spaces
+    assert (space.cofactor, space.verdict, found.reason) == (cofactor, Certainty.PROVED, "")
+    assert [len(P) for P in space.polynomials] == [1, 7 if not symbols else 9]
+    assert str(space.polynomials[0]) == "x*y"
+
+
+def test_polynomials_whose_cofactors_differ_by_a_number_come_apart():
+    """x + y goes to itself, and x - y to its negative."""
+    file = parse_system("variables = ['x', 'y', 'z']\n[map]\nimage = ['y', 'x', '3*z/(1 + z)']")
+    spaces = {one.cofactor: list(map(str, one.polynomials)) for one in darboux_polynomials(file, 1).spaces}
+    assert spaces["1"] == ["x + y"]
+    assert spaces["-1"] == ["x - y"]
+
+
+def test_a_wrong_number_in_front_is_refuted(monkeypatch):
+    file = parse_system("variables = ['x', 'y']\n[map]\nimage = ['y', '(y + 1)/(5*x)']")
+    right = module.constants_of
+
+    def doubled(*arguments):
+        [c] = right(*arguments)
+        return [RationalFunction(c.numerator * 2, c.denominator)]
+
+    monkeypatch.setattr(module, "constants_of", doubled)
+    found = darboux_polynomials(file, 3)
+    assert found.spaces == ()
+    assert "did not pass as an identity" in found.reason

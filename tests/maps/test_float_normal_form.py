@@ -1,13 +1,28 @@
-"""The normal form in floating point: its blocks, found in balls and rounded once, and their integrals."""
+"""The normal form in floating point: its blocks, found in balls and rounded once, and their integrals.
+
+Float orbits are rounded once, near the exact ones, and of order 2; a file of one is complete and readable at every
+moment, also after the program was killed. Tolerances say where they come from.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from math import log2, nextafter
 
 import numpy as np
 import pytest
-from flint import acb, arb, fmpq_poly
+from flint import acb, arb, fmpq, fmpq_poly
+from helpers import EULER_TOP
+from hypothesis import given
+from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
-from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function
+from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function, to_float
 from kahanmaps.maps.floats.planar_blocks import _sine, _Unclear, planar_blocks
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -84,3 +99,67 @@ def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
     for _ in orbit:
         pass
     assert orbit.drift[1].largest == of_flow.largest[0]
+
+
+OSCILLATOR = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+
+
+def last(orbit: FloatOrbit) -> np.ndarray:
+    """The last point."""
+    *_, (_, x) = orbit
+    return x
+
+
+@given(a=st.integers(-(10**30), 10**30), b=st.integers(1, 10**30))
+def test_a_number_is_rounded_to_the_nearest_double(a, b):
+    found = to_float(fmpq(a, b))
+    error = abs(fmpq(a, b) - exact(found))
+    for neighbour in (nextafter(found, -np.inf), nextafter(found, np.inf)):
+        assert error <= abs(fmpq(a, b) - exact(neighbour))
+
+
+def exact(number: float) -> fmpq:
+    return fmpq(*number.as_integer_ratio())
+
+
+def test_the_method_has_order_two():
+    # The oscillator from (1, 0) after time 1, against (cos 1, -sin 1). The errors, above 1e-7, are far from rounding.
+    errors = []
+    for k in range(4, 11):
+        x = last(FloatOrbit(OSCILLATOR, fmpq(1, 2 ** (k + 1)), [1, 0], 2**k))  # the time step is 2 eps
+        errors.append(np.hypot(x[0] - np.cos(1), x[1] + np.sin(1)))
+    assert min(errors) > 1e-8
+    slopes = [log2(a / b) for a, b in pairwise(errors)]
+    assert len(slopes) >= 3
+    assert max(abs(slope - 2) for slope in slopes) < 0.01  # the next term of the error is of order 4: h^2 <= 2^-8
+
+
+START = ["1", "1/2", "1/3"]
+
+
+ENDLESS = """
+from kahanmaps.maps.floats.float_orbit import FloatOrbit, stream_orbit
+from kahanmaps.systems.quadratic import QuadraticSystem
+top = QuadraticSystem.from_text(["x1", "x2", "x3"], ["x2*x3", "-2*x3*x1", "x1*x2"])
+orbit = FloatOrbit(top, "1/10", ["1", "1/2", "1/3"], None, every=50, kernel="numpy")
+stream_orbit(orbit, {path!r}, progress=lambda step: print(step, flush=True))
+"""
+
+
+def test_a_killed_run_leaves_a_readable_file(tmp_path):
+    path = tmp_path / "x.npy"
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENDLESS.format(path=str(path))], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        told = [int(process.stdout.readline()) for _ in range(2)]
+        time.sleep(0.01)
+    finally:
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        process.stdout.close()
+    points = np.load(path)
+    assert len(points) >= told[-1] // 50 + 1  # what was told is there, and perhaps a portion more
+    steps = 50 * (len(points) - 1)
+    expected = np.concatenate(list(FloatEnsemble(EULER_TOP, "1/10", [START], kernel="numpy").records(steps, 50)))
+    assert np.array_equal(points, expected[:, 0])
