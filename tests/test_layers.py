@@ -237,9 +237,6 @@ def test_each_name_is_one_of_the_library_and_is_used():
     assert [name for name in used if getattr(internals, name) is None] == []
 
 
-# What a command loads
-
-
 HEAVY = {"numpy", "flint", "rich", "numba", "llvmlite", "matplotlib", "distributed"}
 
 COMMAND = """

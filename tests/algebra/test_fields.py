@@ -1,11 +1,13 @@
 """The fields of numbers: one protocol over QQ, GF(p), RR(bits) and CC(bits).
 
 Specified here: what `convert` takes and what it refuses, that it respects sums and products, that text comes back,
-which moduli and precisions are allowed, and what a ball may be said to be.
+which moduli and precisions are allowed, and what a ball may be said to be. What integers have in common with
+the primes of another one.
 """
 
 from fractions import Fraction
 from itertools import product
+from math import gcd
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import CC, GF, RR, rational
+from kahanmaps.algebra.integers import common_part, divide_exactly, split_by_primes, without
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -144,3 +147,41 @@ def test_powers_of_balls_around_zero_are_known(balls):
             assert entry.is_finite()
             assert entry.contains(0)
             assert abs(entry) < 1e-15
+
+
+longs = st.integers(-(10**40), 10**40)
+
+
+@given(quotient=longs, divisor=st.integers(2, 2**60), remainder=st.integers(1, 2**60), sign=st.sampled_from([1, -1]))
+def test_a_division_that_is_not_exact_raises(quotient, divisor, remainder, sign):
+    assume(remainder % divisor != 0)
+    with pytest.raises(ArithmeticError, match="please report"):
+        divide_exactly([fmpz(divisor), fmpz(quotient * divisor + remainder)], fmpz(sign * divisor))
+
+
+@given(
+    numbers=st.lists(st.integers(-(10**6), 10**6), min_size=1, max_size=3),
+    shared=st.lists(st.sampled_from([2, 3, 5, 7]), max_size=12),
+    power=st.sampled_from([2, 6, 30, 9 * 125]),
+)
+def test_what_numbers_have_in_common_in_some_primes(numbers, shared, power):
+    assume(any(numbers))
+    product = 1
+    for prime in shared:
+        product *= prime
+    common = gcd(*(product * number for number in numbers))
+    expected = 1
+    for prime in (2, 3, 5):
+        while power % prime == 0 and common % (expected * prime) == 0:
+            expected *= prime
+    assert common_part([fmpz(product * number) for number in numbers], fmpz(power)) == expected
+
+
+@given(st.integers(-(10**9), 10**9).filter(bool), st.integers(1, 10**6))
+def test_primes_are_taken_away_with_all_their_powers(value, primes):
+    left, taken = split_by_primes(fmpz(value), fmpz(primes))
+    assert left * taken == value
+    assert without(fmpz(value), fmpz(primes)) == left
+    assert taken > 0
+    assert fmpz(primes).gcd(left) == 1
+    assert (fmpz(primes) ** 30) % taken == 0

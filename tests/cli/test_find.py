@@ -125,9 +125,6 @@ def test_a_hirota_kimura_basis_may_contain_images(kahanmaps):
     assert none["dimension"] == 0
 
 
-# Checks
-
-
 def claims(report):
     """Claim -> the rest, without the control."""
     return {found["claim"]: found for found in report["claims"] if "control" not in found}

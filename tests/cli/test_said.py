@@ -88,9 +88,6 @@ def test_a_full_disk_is_no_wrong_use_gives_3_and_names_the_file(kahanmaps, form)
     assert (outcome.status, outcome.err) == (3, "Error: No space left on device: /dev/full\n")
 
 
-# Wrong use
-
-
 WRONG = table(Path(__file__).with_name("wrong_use.txt"))
 WRONG["checks are listed"] = [f"check euler_top => Did you mean {' or '.join(CHECKS)}?"]
 

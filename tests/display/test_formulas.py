@@ -140,9 +140,6 @@ def test_a_matrix_is_shown_row_by_row_up_to_eight_and_by_its_size_beyond():
     assert "2 columns" in matrix(fmpq_mat([[1, fmpq(10) ** 100]]))
 
 
-# LaTeX
-
-
 def plain(latex):
     """A formula in our own syntax: names, then exponents, then quotients, then products."""
     for name in sorted(NAMES, key=len, reverse=True):

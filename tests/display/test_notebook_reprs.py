@@ -187,9 +187,6 @@ def test_a_store_shows_its_experiments_and_says_when_it_is_closed(tmp_path):
     assert "has been closed" in text_of(store)
 
 
-# Pieces of HTML
-
-
 HOSTILE = '<script>alert("x")</script>&amp;\x00\x1b[31m\ud800\'"'
 
 

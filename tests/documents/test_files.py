@@ -207,9 +207,6 @@ def test_a_damaged_file_is_an_input_error_or_still_a_file(text, at, length, inse
     assert parse_system(file.to_toml()) == file
 
 
-# Symbols
-
-
 FIELD = GF(PRIME)
 WITH_PARAMETERS = [name for name in names() if load(name).parameters and load(name).kind != "family"]
 

@@ -132,9 +132,6 @@ def test_every_document_is_a_spec_or_a_list_of_mistakes(tmp_path_factory, text):
         assert all(Task.from_text(e[0].text) == e[0] for e in spec.experiments)
 
 
-# Systems that cannot be read
-
-
 GOOD = "[system]\nrhs = \"x' = y; y' = -x\"\n"
 FILES = {"a.toml": GOOD, "b.toml": '[system]\nrhs = "x\' = z"\n', "c.toml": "?", "d.toml": GOOD.replace("-x", "x*y")}
 SPEC = '[experiments.o]\ntask = "{task}"\nsystem = {system}\noptions = {{ {options} }}\n'

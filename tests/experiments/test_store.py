@@ -298,9 +298,6 @@ def test_shards_merged_in_any_order_are_the_whole(plan, bad, parts):
             assert contents(folder / f"merged{count}.db") == whole
 
 
-# Records and tasks are plain data that JSON gives back
-
-
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),

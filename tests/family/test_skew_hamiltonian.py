@@ -84,9 +84,6 @@ def test_a_random_symplectic_matrix_is_symplectic(m, seed):
     assert S.transpose() * J * S == J
 
 
-# Drawn from a seed
-
-
 DRAWS = {
     "eigenvalues": lambda seed: random_member_with_eigenvalues([1, -2, "1/2"], seed),
     "a repeated eigenvalue": lambda seed: random_member_with_eigenvalues([1, 1, 2], seed),

@@ -98,9 +98,6 @@ def test_over_a_prime_field_every_integral_is_its_rational_value_reduced(field, 
         assert reduced == field.convert(value)
 
 
-# Measures dx/phi: phi(x~) = phi(x) det dPhi(x)
-
-
 @given(systems_with_points(), nonzero)
 def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, eps):
     system, x = drawn
@@ -126,9 +123,6 @@ def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, e
 )
 def test_a_condition_names_the_common_zeros_of_the_coefficients(texts, expected):
     assert where(2, *(claim(text, "x y a b").numerator for text in texts)) == expected
-
-
-# The Poisson tensor J - eps^2 f'(x)^2 J
 
 
 @given(with_points(), nonzero)

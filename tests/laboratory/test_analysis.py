@@ -257,9 +257,6 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence
 
 
-# Wrong use
-
-
 FILE = load("euler_top")
 TWICE = {"eps": 1, "symbols": ["eps"]}
 WRONG = [
@@ -299,9 +296,6 @@ WRONG = [
 def test_what_cannot_be_searched_is_refused(search, given, options, words):
     with pytest.raises(InputError, match=words):
         search(given, **options)
-
-
-# Fields that contradict each other
 
 
 SYSTEMS: list[tuple[str, dict[str, Any]]] = [

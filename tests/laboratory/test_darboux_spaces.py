@@ -103,9 +103,6 @@ def test_no_members_of_a_pencil_are_sparser(rng):
     assert rank([*basis, P, Q], p) == rank(basis, p) == 2
 
 
-# Cofactors
-
-
 SMALL_ONES = [name for name in names() if DIMENSION[name] <= 4]
 
 
@@ -134,9 +131,6 @@ def test_polynomials_with_a_given_cofactor():
     assert cofactor_space(sample, CofactorProduct((1,), 1), 2).basis == [[0, 0, 0, 0, 1, 0]]
     assert cofactor_space(sample, CofactorProduct((0,), 0), 2).basis == [[1, 0, 0, 0, 0, 0]]
     assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []
-
-
-# Polynomials found with their cofactors
 
 
 def listed(name: str, degree: int, **options: Any) -> dict[str, list[str]]:

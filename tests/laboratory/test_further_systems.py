@@ -197,9 +197,6 @@ def test_a_wrong_answer_is_seen_to_be_different(name):
     assert differences(found, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"}
 
 
-# The catalogue
-
-
 FACTS = [name for name in names() if set(load(name).catalog) & {"degrees", "growth", "verdict", "codimension"}]
 # All others take less than a second.
 SLOW = ("henon_heiles", "zhukovski_volterra_2", "volterra_periodic_5", "kirchhoff_generic", "clebsch_first_flow")

@@ -138,9 +138,6 @@ def test_a_recurrence_that_does_not_fit_the_proof_is_not_given():
     assert replace(found, proof=other).recurrence is None
 
 
-# Maps that are given by formulas
-
-
 DIMENSION_5 = "b; c; d; e; 3/(b*c*d*e) - a - b - c - d - e"
 
 

@@ -87,9 +87,6 @@ def test_which_coefficients_are_integrals():
     assert found.to_json()["integrals"] == [[not same for same in row] for row in found.constant]
 
 
-# Relations with few terms
-
-
 FURTHER = Path(__file__).parent / "further_systems"
 
 # Of the literature: the Euler top has (x1^2 - a x3^2) and (x2^2 - b x3^2) with integrals a, b; sums of open and closed

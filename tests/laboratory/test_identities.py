@@ -90,9 +90,6 @@ def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_boun
     assert integral_verdict(system, wrong, None)[0] is Certainty.REFUTED
 
 
-# Members: where their planes separate, identities are short, and the same ones
-
-
 PAPER = load("paper_m2").system
 THERE = separated(PAPER)
 

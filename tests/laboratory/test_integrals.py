@@ -188,9 +188,6 @@ def test_formulas_with_symbols_that_depend_at_the_values_of_the_file_say_so():
     assert integrals_of("euler_top", *symbols).reason == ""
 
 
-# Recurrences that are published as integrable, and their images under scalings and permutations
-
-
 NAMES = "abcdefg"
 
 

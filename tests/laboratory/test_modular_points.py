@@ -90,9 +90,6 @@ def test_a_map_defined_nowhere_is_reported():
     assert singular.step((1, 1)) is None
 
 
-# The flow
-
-
 @pytest.mark.parametrize("kind", ["map", "flow", "lifted"])
 def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
     system = load("lotka_volterra").system

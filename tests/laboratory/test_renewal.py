@@ -177,9 +177,6 @@ def test_unknown_orders_that_are_needed_derive_nothing():
     )
 
 
-# Compositions
-
-
 def word(*letters, power=1):
     """The composition of systems of the catalogue, "-" for the inverse, or of inline maps of the plane."""
     entries = []

@@ -123,9 +123,6 @@ def test_work_that_is_not_the_search_is_not_charged_to_it():
     assert len(less.degrees) < len(whole.degrees)
 
 
-# An analysis alone finds no less than `analyze`, both with their defaults
-
-
 ALONE: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
     ("integrals", integrals_of, lambda found: [one.text for one in found.integrals]),
     ("densities", lambda name: find_densities(load(name)), lambda found: [one.text for one in found.densities]),

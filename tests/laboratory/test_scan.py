@@ -1,11 +1,12 @@
 """Scans find the conditions that are known, confirm them, and tell what was tried; points modulo primes become
-conditions over Q.
+conditions over Q. Degrees of many members compiled and by FLINT are the same.
 """
 
 import random
 from dataclasses import replace
 from itertools import product
 
+import numpy as np
 import pytest
 from flint import fmpq
 
@@ -25,6 +26,7 @@ from kahanmaps.laboratory.scan.modular_components import find_components
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirm, _continues_as, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
+from kahanmaps.maps.residues.families import NOWHERE, Family
 
 THREE_LINES = """variables = ["x", "y"]
 parameters = { g1 = 1, g2 = 1 }
@@ -235,9 +237,6 @@ def test_symmetries_of_parameter_space_are_found_where_they_permute_special_memb
     assert scan(planar(*rhs, *names), [*names], primes=(17, 19, 23), terms=4).symmetric == symmetric
 
 
-# Points modulo primes
-
-
 FIELD_PRIMES = (53, 59, 61, 67, 71, 73, 79, 83, 89, 97, 101, 103)
 PRIMES = (31, 37, 41)
 
@@ -327,3 +326,56 @@ def test_a_product_is_factored_and_has_to_agree_modulo_the_last_prime(spoilt):
         hypersurfaces[p] = [[-4 % p, 0, 0, 1, 0, 2], both[1]] if spoilt and p == 41 else both
     found = {str(form) for form, _ in lift_hypersurfaces(hypersurfaces, ["a", "b"])}
     assert found == ({"a*b - 2"} if spoilt else expected)
+
+
+LYNESS = """variables = ["x", "y"]
+parameters = { a = 1, b = 1 }
+[map]
+image = ["y", "(a + b*y^2 + y)/x"]"""
+CASES = [
+    (THREE_LINES, ["g1", "g2"], 6, 67),
+    (LOTKA_VOLTERRA, ["A", "B", "C"], 3, 23),
+    (LYNESS, ["a", "b"], 5, 31),  # an equation of degree 2 in the point
+]
+
+
+def family(text: str, names: list[str], prime: int) -> Family:
+    return Family(map_with_symbols(parse_system(text), names), prime)
+
+
+def members(count: int, prime: int, size: int = 40) -> np.ndarray:
+    return np.array([[random.Random(k).randrange(prime) for k in range(i, i + count)] for i in range(size)])
+
+
+@pytest.mark.parametrize(("text", "names", "terms", "prime"), CASES)
+def test_the_compiled_loop_and_flint_give_the_same_degrees_on_the_same_lines(text, names, terms, prime):
+    pytest.importorskip("numba")
+    one = family(text, names, prime)
+    points = members(len(names), prime)
+    found = [one.degrees(points, None, terms, 400, random.Random(3), kernel=kernel) for kernel in ("numba", "numpy")]
+    assert (found[0] == found[1]).all()
+    assert len({tuple(row) for row in found[0].tolist()}) > 1  # members are told from each other
+
+
+def test_special_members_have_smaller_degrees():
+    points = np.array([[1, 1], [1, 2], [2, 3], [5, 6], [3, 12]])
+    found = np.max(
+        [family(THREE_LINES, ["g1", "g2"], 8179).degrees(points, None, 7, 300, random.Random(k)) for k in (1, 2)],
+        axis=0,
+    )
+    assert found.tolist() == [
+        [2, 4, 8, 13, 20, 28, 38],  # zander-2021
+        [2, 4, 7, 12, 18, 25, 34],
+        [2, 4, 7, 11, 16, 23, 31],
+        [2, 4, 7, 12, 20, 33, 54],
+        [2, 4, 8, 16, 32, 64, 128],
+    ]
+
+
+@pytest.mark.parametrize("kernel", ["numba", "numpy"])
+def test_an_iterate_defined_nowhere_is_reported(kernel):
+    if kernel == "numba":
+        pytest.importorskip("numba")
+    vanishing = 'variables = ["x"]\nparameters.a = 1\n[bilinear]\nequations = ["a*(X - x) = eps*a*x*X"]'
+    found = family(vanishing, ["a"], 13).degrees(np.array([[2], [0]]), None, 2, 99, random.Random(1), kernel=kernel)
+    assert found.tolist() == [[1, 1], [NOWHERE, NOWHERE]]

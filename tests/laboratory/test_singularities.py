@@ -190,9 +190,6 @@ def test_the_denominator_is_that_determinant_in_every_dimension(name):
     assert evaluate(denominator, QQ, point) == KahanMap(system, "1/7").determinant(point)
 
 
-# Components of the zeros of forms over GF(p), told apart by factors on surfaces
-
-
 NAMES = ("x1", "x2", "x3", "z")
 X1, X2, X3, Z = fmpq_mpoly_ctx.get(NAMES, Ordering.degrevlex).gens()
 DIRECTION = (31, 41, 59, 26)
@@ -230,9 +227,6 @@ def test_roots_are_points_of_the_component():
                 x1, x2, x3, _ = ((a + b * t + u * w) % p for (a, b), w in zip(curve, DIRECTION, strict=True))
                 assert (x1**2 + x2**2) * x3 % p == 0
     assert not any(one.roots(t) for one in found(X1**2 + X2**2, 1000003, curve) for t in range(5))
-
-
-# Names for every eps: over Q[eps], by polynomials that are those at the eps followed
 
 
 def conics(*signs):

@@ -205,9 +205,6 @@ def test_python_takes_no_word_of_a_title_for_an_encoding():
     compile(text.encode(), "file", "exec")
 
 
-# LaTeX
-
-
 DOCUMENTS = {name: convert(file, "latex", questions(file)[0]) for name, file in SYSTEMS.items()}
 
 

@@ -207,9 +207,6 @@ def test_the_door_gives_the_orbit_in_every_arithmetic(name, text):
         assert np.allclose(numbers, [int(e.p) / int(e.q) for e in exact], rtol=1e-9)
 
 
-# Starts over a number field
-
-
 I = parse_root("root of t^2 + 1")
 
 

@@ -1,29 +1,37 @@
 """The normal form in floating point: its blocks, found in balls and rounded once, and their integrals.
 
 Float orbits are rounded once, near the exact ones, and of order 2; a file of one is complete and readable at every
-moment, also after the program was killed. Tolerances say where they come from.
+moment, also after the program was killed. Tolerances say where they come from. Lyapunov exponents: linear maps in
+closed form, exact derivatives along exact orbits, and the Lorenz map.
 """
 
+import math
 import os
 import signal
 import subprocess
 import sys
 import time
+from fractions import Fraction
 from itertools import pairwise
 from math import log2, nextafter
 
 import numpy as np
 import pytest
-from flint import acb, arb, fmpq, fmpq_poly
+from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.documents.catalog import load
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
+from kahanmaps.hard_stop import TimeLimit
+from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function, to_float
+from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.floats.planar_blocks import _sine, _Unclear, planar_blocks
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -163,3 +171,75 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
     steps = 50 * (len(points) - 1)
     expected = np.concatenate(list(FloatEnsemble(EULER_TOP, "1/10", [START], kernel="numpy").records(steps, 50)))
     assert np.array_equal(points, expected[:, 0])
+
+
+def system_of(*rhs: str) -> QuadraticSystem:
+    return QuadraticSystem.from_text(["x", "y", "z"][: len(rhs)], list(rhs))
+
+
+def exponent(eps: float, eigenvalue: float) -> float:
+    """That of the linear map (1 + eps a)/(1 - eps a), per unit of time."""
+    return math.log(abs((1 + eps * eigenvalue) / (1 - eps * eigenvalue))) / (2 * eps)
+
+
+@pytest.mark.parametrize("eps", ["1/10", "-1/10", "1/3"])
+def test_linear_systems_have_the_logarithms_of_their_eigenvalues(eps):
+    """Triangular, so that the frame turns into the flag of eigenvectors at a geometric rate."""
+    found = lyapunov_exponents(system_of("x/2 + y", "-y", "-2*z + x"), [[1.0, 0.5, 0.2]], eps, 400, transient=200)
+    value = float(eps.split("/")[0]) / float(eps.split("/")[1])
+    expected = sorted((exponent(value, a) for a in (0.5, -1.0, -2.0)), reverse=True)
+    assert found.mean == pytest.approx(expected, abs=1e-9)
+    assert found.per_step == pytest.approx(np.array(expected) * 2 * value, abs=1e-9)
+    assert found.change == pytest.approx([0, 0, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["lorenz", "lotka_volterra", "henon_heiles"])
+@pytest.mark.parametrize(("steps", "transient"), [(5, 3), (6, 0), (2, 1)])
+def test_the_exponents_are_those_of_the_exact_derivatives_along_the_exact_orbit(name, steps, transient):
+    """Q_k R_k = dPhi(x_k) Q_(k-1), Q = I at the start, and the sums of log |R_k| from after the transient on."""
+    kahan = KahanMap(load(name).system, "1/50")
+    start = x = kahan.point([f"1/{k + 2}" for k in range(kahan.dim)])
+    Q, logs, volumes = np.eye(kahan.dim), [], []
+    for _ in range(transient + steps):
+        rows = fmpq_mat(kahan.jacobian(x)).tolist()
+        J = np.array([[float(Fraction(int(entry.p), int(entry.q))) for entry in row] for row in rows])
+        Q, R = np.linalg.qr(J @ Q)
+        logs.append(np.log(np.abs(np.diagonal(R))))
+        volumes.append(math.log(abs(np.linalg.det(J))))
+        x = kahan.step(x)
+    counted, half = logs[transient:], steps // 2
+    exponents, early = sum(counted) / (steps / 25), sum(counted[:half]) / (half / 25)
+    order = np.argsort(-exponents)
+    point = [int(entry.p) / int(entry.q) for entry in start]
+    found = lyapunov_exponents(load(name).system, [point, point], "1/50", steps, transient=transient)
+    assert (found.steps, found.transient, found.orbits, found.ended, found.stopped) == (steps, transient, 2, 0, False)
+    for lane in (0, 1):
+        assert found.exponents[lane] == pytest.approx(exponents[order], abs=1e-9)
+        assert found.half[lane] == pytest.approx(early[order], abs=1e-9)
+        assert found.log_volume[lane] == pytest.approx(sum(volumes[transient:]) / (steps / 25), abs=1e-9)
+
+
+@pytest.mark.slow
+def test_the_lorenz_map_at_a_small_step():
+    """About 0.906 for the flow (s = 10, r = 28, b = 8/3), and the divergence -41/3 for the sum."""
+    found = lyapunov_exponents(load("lorenz").system, starts_in_box(32, 3, 5.0, 0), "1/400", 20_000, transient=4_000)
+    assert found.ended == 0
+    assert found.mean[0] == pytest.approx(0.906, abs=0.06)
+    assert abs(found.mean[1]) < 0.05
+    assert found.mean.sum() == pytest.approx(-41 / 3, abs=0.05)
+
+
+def test_a_time_limit_keeps_the_complete_portions():
+    told = []
+
+    def stop(sentence):
+        told.append(sentence)
+        if len(told) == 4:
+            raise TimeLimit
+
+    system, starts = load("lorenz").system, [[1.0, 2.0, 3.0]]
+    found = lyapunov_exponents(system, starts, "1/100", 5000, progress=stop)
+    assert (told[-1], found.stopped, found.steps) == ("step 1536 of 5000", True, 1536)
+    whole = lyapunov_exponents(system, starts, "1/100", 1536)
+    assert found.exponents == pytest.approx(whole.exponents, abs=1e-9)
+    assert np.isnan(found.half).all()

@@ -2,10 +2,12 @@
 
 Specified here, for one table of systems: a step agrees with the exact one, written out for numpy, as machine code, and
 in arrays where it is too long for that; kernels, threads, company, portions and records make no difference, to the last
-bit, hostile orbits among them; each way to end has its status and its step, which other orbits do not notice.
-Steps of RK4 and of the implicit midpoint rule are those of their formulas.
+bit, hostile orbits among them; each way to end has its status and its step, which other orbits do not notice. Steps of
+RK4 and of the implicit midpoint rule are those of their formulas; straight-line code solves linear equations of every
+pattern of zeros.
 """
 
+import random
 from fractions import Fraction
 
 import numpy as np
@@ -24,6 +26,7 @@ from kahanmaps.maps.floats.classical import ClassicalOrbit
 from kahanmaps.maps.floats.float_conversion import exact
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, to_floats
 from kahanmaps.maps.floats.planar_blocks import planar_blocks
+from kahanmaps.maps.floats.straight_line_program import StepChecks, StraightLineProgram, solve
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
@@ -330,3 +333,77 @@ def test_midpoint_of_linear_equations_is_their_cayley_transform(rows):
     x, end = walk(QuadraticSystem.from_text(names, rhs), "1/2", [str(e) for e in start.entries()], 1, "midpoint")
     assert end.status == "completed"
     assert x[1].tolist() == pytest.approx([float(e.p) / float(e.q) for e in expected.entries()], rel=1e-12)
+
+
+PATTERNS = {
+    "one equation": ["*"],
+    "diagonal": ["*..", ".*.", "..*"],
+    "triangular": ["*..", "**.", "***"],
+    "triangular from the right": ["***", ".**", "..*"],
+    "exchanged": [".*.", "..*", "*.."],
+    "two equations": ["**", "**"],
+    "no diagonal": [".*", "*."],
+    "blocks": ["**...", "**...", "..***", "..***", "..***"],
+    "a block behind others": ["**..", "**..", "*.**", ".***"],
+    "an arrow": ["****", "**..", "*.*.", "*..*"],
+    "dense": ["****"] * 4,
+    "no diagonal, dense": [".***", "*.**", "**.*", "***."],
+    "a cycle": ["**...", ".**..", "..**.", "...**", "*...*"],
+}
+
+
+def to_float(x):
+    return int(x.p) / int(x.q)
+
+
+def code_of(pattern, careful):
+    """The solution of M y = r as code of the entries of M that are not 0, row by row, and of r."""
+    n = len(pattern)
+    code, asked = StraightLineProgram(sum(row.count("*") for row in pattern) + n), StepChecks(careful)
+    entries = iter(code.arguments)
+    rows = [[next(entries) if mark == "*" else 0.0 for mark in row] for row in pattern]
+    rows = [[*row, right] for row, right in zip(rows, entries, strict=True)]
+    size = code.arguments[0]
+    for x in code.arguments[1:]:
+        size = size.code.emit("max", abs(size), abs(x))
+    code.outputs = [*solve(rows, lambda: abs(size), asked), *asked.outputs()]
+    return code
+
+
+@pytest.mark.parametrize("pattern", PATTERNS.values(), ids=PATTERNS)
+@pytest.mark.parametrize("small", [False, True], ids=["large diagonal", "any pivots"])
+def test_equations_of_any_pattern_have_the_exact_solution(pattern, small):
+    rng, n = random.Random(3), len(pattern)
+    fast, careful = (code_of(pattern, kind) for kind in (False, True))
+    contented = 0
+    for _ in range(20):
+        M = [[fmpq(rng.randint(1, 64), 64) if mark == "*" else fmpq(0) for mark in row] for row in pattern]
+        for i in range(n):
+            M[i][i] *= 1 if small else 8
+        if fmpq_mat(M).det() == 0:
+            continue
+        right = [fmpq(rng.randint(-64, 64), 64) for _ in range(n)]
+        expected = [to_float(x) for x in fmpq_mat(M).solve(fmpq_mat(n, 1, right)).entries()]
+        given = [to_float(M[i][j]) for i in range(n) for j in range(n) if pattern[i][j] == "*"]
+        given += [to_float(x) for x in right]
+        *found, near, singular, overflow = careful.function(float)(*given)
+        assert (bool(near), bool(singular), bool(overflow)) == (False, False, False)
+        condition = np.linalg.cond([[to_float(x) for x in row] for row in M])
+        # some dozen roundings, and rows subtracted up to 8 times from others
+        assert found == pytest.approx(expected, rel=1e-13 * condition, abs=1e-13 * condition)
+        *quick, good = fast.function(float)(*given)
+        if good:
+            contented += 1
+            assert quick == found
+        arrays = careful.function(np.ndarray)(*(np.array([x]) for x in given))
+        assert [float(x[0]) for x in arrays[:n]] == found
+    assert small or contented > 10
+
+
+SINGULAR = [["..", "**"], [".*", ".*"], ["**.", "**.", "**."], ["***", "*..", "*.."]]
+
+
+@pytest.mark.parametrize("pattern", SINGULAR, ids=str)
+def test_a_matrix_that_its_zeros_make_singular_is_reported(pattern):
+    assert code_of(pattern, careful=True).outputs[-2] is True
+    assert code_of(pattern, careful=False).outputs[-1] is False

@@ -77,9 +77,6 @@ def test_functions_of_other_variables_and_too_many_levels_are_refused():
         level_curves(point_function("x", ["x", "y"]), (0, 1), 2, range(201), SQUARE)
 
 
-# Functions of points in doubles
-
-
 POINTS = np.array([[[1.0, 2.0], [3.0, 0.0]], [[np.nan, np.nan], [-1.0, 5.0]]])
 
 

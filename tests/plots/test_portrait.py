@@ -143,9 +143,6 @@ def test_the_legend_names_only_what_is_drawn():
     assert plot_portrait(portrait_of(orbits(8), AXES, color="step"), STYLE).legends == []
 
 
-# Windows
-
-
 CIRCLE = np.stack([np.cos(np.linspace(0, 6, 500)), np.sin(np.linspace(0, 6, 500))], axis=1)
 
 
@@ -185,9 +182,6 @@ def test_the_axes_are_those_that_are_filled_and_in_order():
 @together("dim, count", [(2, 2), (5, 2), (5, 3)])
 def test_of_points_that_do_not_move_the_first_variables_are_chosen(dim, count):
     assert fullest_axes(np.ones((4, dim)), count) == tuple(range(count))
-
-
-# The flow
 
 
 BOX = ((-3.0, 3.0), (-3.0, 3.0))

@@ -112,9 +112,6 @@ def test_a_constant_matrix_times_a_system_has_its_values_and_derivatives(field, 
     assert moved.jacobian(here) == matrix * local.jacobian(here)
 
 
-# Hamiltonian systems
-
-
 PLANE = ring(["q", "p"])
 q, p = PLANE.gens()
 FOUR = ("q1", "q2", "p1", "p2")
