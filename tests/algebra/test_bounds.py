@@ -20,9 +20,6 @@ def bounded(K, element):
     return K.polynomial(*true_size(element.numerator))
 
 
-# Numbers
-
-
 @given(polynomials(), polynomials(), polynomials())
 def test_sums_differences_and_products_of_polynomials_are_bounded(p, q, r):
     K = BoundField()
@@ -59,9 +56,6 @@ def test_entries_of_a_matrix_with_one_bound_are_different_denominators():
     assert K.pole_degree == 12
     one = K.matrix(1, 1, [K.polynomial(3, 1.0)])
     assert (K.one / one[0, 0] + K.one / one[0, 0]).pole_degree == 3
-
-
-# Matrices
 
 
 @st.composite
@@ -102,9 +96,6 @@ def cleared(entry, determinant):
     quotient = product / entry.denominator
     assert quotient * entry.denominator == product
     return quotient
-
-
-# What pairs amount to
 
 
 def test_what_is_compared_with_zero_must_not_be_zero():

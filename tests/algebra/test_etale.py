@@ -83,9 +83,6 @@ def test_trace_and_norm_are_sum_and_product_over_the_roots(roots, p):
     assert K.norm(a) == math.prod(values(roots, a), start=fmpq(1))
 
 
-# Zero divisors and other refusals.
-
-
 def test_a_zero_divisor_is_not_zero_and_divides_nothing():
     left, right = SPLIT.generator - 1, SPLIT.generator + 1
     assert (left == 0, right == 0, left * right == 0) == (False, False, True)
@@ -106,9 +103,6 @@ WRONG = [
 def test_a_chi_that_is_not_monic_and_squarefree_is_refused(chi, sentence):
     with pytest.raises(InputError, match=sentence):
         EtaleAlgebra(chi)
-
-
-# Matrices.
 
 
 @some

@@ -67,9 +67,6 @@ def test_an_element_of_another_field_is_refused(field, element):
         field.convert(element)
 
 
-# convert is a homomorphism.
-
-
 @over_all_fields
 @some
 @given(a=integers, b=integers)
@@ -88,9 +85,6 @@ def test_a_denominator_that_the_prime_divides_is_refused_with_the_prime(prime):
     assert error.value.prime == prime
 
 
-# Text.
-
-
 @over_exact_fields
 @some
 @given(number=rationals(10**20))
@@ -100,16 +94,10 @@ def test_a_printed_exact_element_parses_back(field, number):
     assert field.convert(field.format(element)) == element
 
 
-# Prime fields.
-
-
 @pytest.mark.parametrize("modulus", [4, 561, 2**67 - 1, 3215031751])  # 561 and the last pass weak tests of primality
 def test_a_composite_modulus_is_refused(modulus):
     with pytest.raises(InputError, match="is composite"):
         GF(modulus)
-
-
-# Balls.
 
 
 @over_balls

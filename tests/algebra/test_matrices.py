@@ -37,9 +37,6 @@ def is_zero_column(field, column) -> bool:
     return all(field.equal(entry, field.zero) for entry in column.entries())
 
 
-# Determinant and solution.
-
-
 @over_all_fields
 @some
 @given(matrix=st.integers(1, 4).flatmap(lambda n: matrices(n, n, small)))
@@ -74,9 +71,6 @@ def test_balls_that_cannot_tell_a_determinant_from_zero_say_so():
         solve(matrix, RR(64).column([1, 1]))
 
 
-# Rank and null space.
-
-
 RANKS = [
     (fmpq_mat([[1, 2], [3, 4]]), 2),
     (fmpq_mat([[1, 2], [2, 4]]), 1),
@@ -102,9 +96,6 @@ def test_the_matrix_kills_a_null_space_of_the_right_dimension(field, left, right
     assert rank(field, here) + len(kernel) == 4
 
 
-# Trace and primitive integers.
-
-
 @given(matrices(3, 4, st.integers(-1, 1)))
 def test_rank_and_null_space_over_a_number_field_are_those_over_q(matrix):
     K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
@@ -114,9 +105,6 @@ def test_rank_and_null_space_over_a_number_field_are_those_over_q(matrix):
     over = K.matrix(4, 4, [entry for row in rows for entry in row])
     assert rank(K, over) == rank(QQ, matrix)
     assert nullspace(K, over) == [tuple(map(K.convert, vector)) for vector in nullspace(QQ, matrix)]
-
-
-# Kernel vectors by minors.
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 5])

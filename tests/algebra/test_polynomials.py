@@ -44,15 +44,9 @@ def rational_functions():
     return st.builds(RationalFunction, polynomials(), polynomials().filter(lambda p: not p.is_zero()))
 
 
-# Rings, degrees, derivatives.
-
-
 @given(p=polynomials(), q=polynomials())
 def test_the_gradient_obeys_leibniz(p, q):
     assert gradient(p * q) == tuple(a * q + p * b for a, b in zip(gradient(p), gradient(q), strict=True))
-
-
-# Integer forms.
 
 
 @given(p=polynomials())
@@ -69,9 +63,6 @@ def test_a_primitive_part_has_coprime_integers_and_a_positive_leading_one(p):
     assert primitive.leading_coefficient() > 0
 
 
-# Values.
-
-
 @pytest.mark.parametrize("prime", [31, 2**61 - 1])
 @some
 @given(p=polynomials(), point=st.tuples(rationals(), rationals(), rationals()))
@@ -86,9 +77,6 @@ def test_variables_can_be_given_values_one_after_the_other(p, point):
     reduced = substitute(p, {"y": point[1]})
     assert names_of(reduced) == ("x", "z")
     assert reduced(point[0], point[2]) == p(*point)
-
-
-# Quotients.
 
 
 @given(f=rational_functions(), factor=polynomials().filter(lambda p: not p.is_zero()))

@@ -49,9 +49,6 @@ def error_of(text: str, limits: ExpressionLimits | None = None) -> ExpressionErr
     return caught.value
 
 
-# Numbers
-
-
 @pytest.mark.parametrize(
     ("text", "value"),
     [
@@ -95,9 +92,6 @@ def test_numbers_pass_the_4300_digits_at_which_python_stops():
     assert format_number(parse_polynomial(f"{digits}*x", NAMES).leading_coefficient()) == digits
 
 
-# Points
-
-
 @given(st.lists(rationals).map(tuple))
 def test_a_printed_point_parses_back(point: tuple[fmpq, ...]):
     assert parse_point(format_point(point), len(point)) == point
@@ -116,9 +110,6 @@ def test_a_mistake_in_a_point_names_entry_and_column(text: str, entry: int, colu
     with pytest.raises(ExpressionError, match=f"^entry {entry}: ") as caught:
         parse_point(text)
     assert caught.value.column == column
-
-
-# Polynomials
 
 
 @pytest.mark.parametrize(
@@ -151,9 +142,6 @@ def test_a_constant_knows_its_constants_only():
         parse_constant("b", {"a": THIRD})
     with pytest.raises(ExpressionError, match="expected numbers only"):
         parse_constant("b")
-
-
-# Rational functions
 
 
 @pytest.mark.parametrize(
@@ -202,9 +190,6 @@ def test_arithmetic_of_texts_is_arithmetic_of_functions(left: RationalFunction, 
     crossed = left.numerator * right.denominator - right.numerator * left.denominator
     assert parse_rational_function(f"({a})*({b})", NAMES) == product
     assert parse_rational_function(f"{a} - ({b})", NAMES) == RationalFunction(crossed, product.denominator)
-
-
-# Mistakes
 
 
 @pytest.mark.parametrize(
@@ -279,9 +264,6 @@ def test_a_hostile_text_is_refused(name: str):
 def test_every_limit_has_two_sides(limits: ExpressionLimits, good: str, bad: str):
     parse_rational_function(good, NAMES, limits=limits)
     error_of(bad, limits)
-
-
-# Products.
 
 
 @given(rational_functions, nonzero, st.integers(0, 3))

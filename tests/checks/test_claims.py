@@ -30,9 +30,6 @@ def finding(verdict: Certainty, control: bool = False) -> Finding:
     return Finding("a claim", verdict, Evidence("method", "why"), witness=witness, control=control)
 
 
-# Verdicts
-
-
 @pytest.mark.parametrize(("verdict", "holds"), [(P, True), (S, True), (R, False), (U, None)])
 def test_a_verdict_says_whether_the_claim_holds(verdict, holds):
     assert verdict.holds is holds
@@ -49,9 +46,6 @@ def test_a_result_has_no_truth_value_and_says_what_to_ask_instead(result):
 @pytest.mark.parametrize(("verdicts", "expected"), [([P], P), ([P, S], S), ([S, U], U), ([P, S, U, R], R), ([], U)])
 def test_verdicts_combine_to_the_weakest(verdicts, expected):
     assert combined(verdicts) is expected
-
-
-# JSON
 
 
 def test_the_json_of_a_refuted_control_shows_the_witness_and_what_was_expected():
@@ -118,9 +112,6 @@ def test_every_report_comes_out_the_same_from_the_same_seed_and_its_orbit_from_i
     orbit = first["orbit"]
     again = run(Settings(steps=2, eps=orbit["eps"], start=orbit["start"], seed=12)).to_json()
     assert again["orbit"] == orbit
-
-
-# Bounds of an error
 
 
 @pytest.mark.parametrize(

@@ -108,9 +108,6 @@ def test_a_control_that_commutes_is_noted():
     assert report.verdict is PROVED
 
 
-# Pairs from two files
-
-
 def signed(member: FamilyMember, *signs: int) -> SystemFile:
     return SystemFile.from_member(FamilyMember(member.A, member.H, signs), "".join("+-"[sign < 0] for sign in signs))
 
@@ -168,9 +165,6 @@ def test_a_commuting_pair_disturbed_in_a_far_digit_is_refuted(monomial, power):
     verify_commute_witness(found.witness, f, disturbed)
 
 
-# Proved or supported without the family
-
-
 def test_shears_along_one_direction_are_supported():
     # x' = h(y), y' = 0: the maps are x + 2 eps h(y), and the components of f are dependent.
     f, g = system_of("x y", "y^2 + 3*y", "0"), system_of("x y", "y^2/7 - 1", "0")
@@ -213,9 +207,6 @@ def test_a_map_that_is_the_identity_at_another_eps_is_compared():
         check_commute(load("lotka_volterra"), AT_A_TENTH, Settings(eps="1/9", steps=2), eps2="1/10")
 
 
-# What is told
-
-
 @pytest.mark.parametrize("names", [("y", "x"), ("x", "y")])
 def test_variables_are_matched_by_name_where_the_names_agree(names):
     # x' = x^2 + y, y' = x y, which commutes with itself, and by position does not.
@@ -237,9 +228,6 @@ def test_an_indeterminate_initial_point_is_reported():
     assert (orbit["start"], orbit["status"], orbit["steps"]) == (["5"], "singular", 0)
     assert "could not be tried at any point" in only(report).also[-1].summary
     assert "det(I - eps f'(x)) = 0 at step 0" in only(report).also[-1].summary
-
-
-# Wrong use
 
 
 @pytest.mark.parametrize(

@@ -68,17 +68,11 @@ def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Certain
     return verdicts(check_integrals(SystemFile.from_hamiltonian(hamiltonian), how))
 
 
-# Hamiltonian systems
-
-
 @given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
 def test_modified_h_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
     found = set(proved(hamiltonian, Settings(eps=eps, steps=2)))
     # At one eps, as for H = q p at eps = 1, there may be no map at all, and modified H may be a constant, as for H = 0.
     assert found == {PROVED} or ((eps is not None or hamiltonian.H.is_constant()) and found == {UNDECIDED})
-
-
-# H itself, and modified H written out
 
 
 def written_out(hamiltonian: CubicHamiltonian) -> str:
@@ -115,9 +109,6 @@ def test_modified_h_with_a_slip_in_it_is_refuted(right, wrong):
     assert check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS).replace(right, wrong)).verdict is REFUTED
 
 
-# Known answers from the literature
-
-
 def test_an_integral_of_the_discrete_euler_top_is_supported():
     # petrera-suris-euler: (1 - eps^2 a_i a_j x_k^2)/(1 - eps^2 a_j a_k x_i^2), here a = (1, -2, 1).
     assert check_claim(EULER_TOP, "(1 - eps^2*x2^2)/(1 + 2*eps^2*x3^2)").verdict is SUPPORTED
@@ -137,9 +128,6 @@ def test_an_integral_that_exists_at_one_eps_is_supported_there():
 @pytest.mark.parametrize("eps", [None, "1/2", "1001/1000"])
 def test_an_integral_that_exists_at_one_eps_is_refuted_elsewhere(eps):
     assert check_claim(PERIODIC, OF_PERIOD_FOUR, Settings(eps=eps, steps=2)).verdict is REFUTED
-
-
-# The family
 
 
 FAMILY = {
@@ -175,9 +163,6 @@ def test_a_matrix_that_does_not_commute_with_the_jacobian_gives_no_integral(monk
     assert proof is None
     monkeypatch.setattr("kahanmaps.checks.conserve.known_integrals", lambda file: [(integral, proof, "")])
     assert only(check_integrals(SystemFile.from_member(member), QUICK)).verdict is REFUTED
-
-
-# What is told
 
 
 def test_claims_of_the_caller_come_first_and_alone_unless_the_known_ones_are_requested():
@@ -261,15 +246,9 @@ def test_an_orbit_alone_never_makes_a_claim_proved_or_supported():
     assert found.also[-1].summary.startswith("held exactly at 6 points")
 
 
-# Wrong use
-
-
 def test_a_system_without_any_integral_is_wrong_use():
     with pytest.raises(InputError, match="no integral of f is known or claimed"):
         check_integrals(file_of(LOTKA_VOLTERRA))
-
-
-# Mutations
 
 
 ORIGINAL_VALUE = ModifiedHamiltonian.value

@@ -112,9 +112,6 @@ def test_coefficients_in_a_number_field_of_degree_c_multiply_the_bad_primes_by_2
     assert log2_error(size, 0, conjugates) - log2_error(size, 0) == pytest.approx(math.log2(2 * conjugates**2))
 
 
-# False identities
-
-
 @given(
     st.lists(rationals(50), min_size=1, max_size=6), st.lists(rationals(50), min_size=1, max_size=6), st.integers(0, 5)
 )
@@ -160,9 +157,6 @@ def test_where_no_rational_point_shows_it_the_witness_is_modular():
     assert (decision.witness.left, decision.witness.right) == ((str(x),), (str(p - x),))
 
 
-# Every eps, or one
-
-
 def one_eps(eps: fmpq | None) -> Identity:
     """x eps = x/3: true at eps = 1/3 alone."""
     return identity_of(lambda x, e, K: x * e, lambda x, e, K: x / K.convert(3), eps=eps)
@@ -176,9 +170,6 @@ def test_an_identity_that_holds_at_one_eps_is_supported_there_and_refuted_elsewh
     (x,), (at,) = exact(*decision.witness.point), exact(decision.witness.eps)
     assert eps is None or at == fraction(eps)
     verify_witness(decision.witness, [x * at], [x / 3])
-
-
-# Nowhere defined, or too large
 
 
 def raises(error):

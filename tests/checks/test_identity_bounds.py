@@ -27,9 +27,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 some_eps = st.one_of(st.none(), rationals(6).filter(lambda eps: eps != 0))
 
 
-# Commutativity
-
-
 @given(st.sampled_from([1, 2]), st.data(), some_eps)
 def test_commutativity_is_bounded(n, data, eps):
     f, g = (data.draw(systems(dims=(n,))) for _ in range(2))
@@ -101,9 +98,6 @@ def test_invariance_of_a_density_is_bounded(text, eps):
     check(density_identity(LOTKA_VOLTERRA, density, eps), differs=True)
 
 
-# Poisson tensors
-
-
 @given(hamiltonians(dims=(1, 2)), some_eps)
 def test_the_transformation_law_is_bounded(hamiltonian, eps):
     check(transformation_identity(KahanFamily(hamiltonian.system), HamiltonianTensor(hamiltonian), eps))
@@ -112,9 +106,6 @@ def test_the_transformation_law_is_bounded(hamiltonian, eps):
 @given(hamiltonians(dims=(3,)), some_eps)
 def test_the_jacobi_identity_is_bounded(hamiltonian, eps):
     check(jacobi_identity(HamiltonianTensor(hamiltonian), eps))
-
-
-# Claims
 
 
 def is_short(claim):

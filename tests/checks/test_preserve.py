@@ -73,9 +73,6 @@ def at_witness(found: Finding, system: QuadraticSystem):
     return x, eps, image
 
 
-# Densities
-
-
 @given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
 def test_the_determinant_density_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
     found = only(check_measure(file(hamiltonian), Settings(eps=eps, steps=2)))
@@ -146,9 +143,6 @@ def test_what_is_no_density_is_wrong_use(phi, variables, message):
         check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi and claim(phi, variables))
 
 
-# The Poisson tensor
-
-
 def verify_law(found: Finding, hamiltonian: CubicHamiltonian) -> None:
     """The law fails at the witness: the entry shown, and dPhi Pi(x) dPhi^T is not Pi(x~)."""
     x, eps, image = at_witness(found, hamiltonian.system)
@@ -212,17 +206,11 @@ def test_where_A_is_derogatory_the_tensor_is_not_proved_but_decided():
     assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [SUPPORTED, SUPPORTED]
 
 
-# Mutations
-
-
 @pytest.mark.parametrize("check", [check_measure, check_poisson])
 def test_a_step_of_half_the_length_contradicts_the_theorems(check, monkeypatch):
     monkeypatch.setattr(KahanMap, "step", half_step)
     with pytest.raises(Contradiction, match="defining equation of the Kahan map"):
         check(SystemFile.from_member(MEMBERS["m=1"]), QUICK)
-
-
-# Given tensors
 
 
 LYNESS = """variables = ["x", "y"]

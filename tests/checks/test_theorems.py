@@ -41,9 +41,6 @@ def failing(hypotheses: list[tuple[str, bool]]) -> list[str]:
     return [name for name, holds in hypotheses if not holds]
 
 
-# Members and their associated systems
-
-
 ASSOCIATE = MEMBER.associate((1, 1, -1))
 
 # Each breaks one hypothesis and keeps the others.
@@ -124,9 +121,6 @@ def test_over_the_splitting_field_every_chi_gives_its_associated_systems(member)
     assert theorems.commuting_over_splitting_field(member) is not None
 
 
-# Poisson tensor, modified H, density
-
-
 def test_generic_members_have_an_invariant_poisson_tensor_and_those_with_a_repeated_root_none_by_the_theorem():
     assert theorems.poisson_tensor_invariant(MEMBER.chosen.hamiltonian, MEMBER) is not None
     member = random_member_with_eigenvalues([1, 1, 2], seed=3)
@@ -169,9 +163,6 @@ DECOUPLED = system_of("x y z", "x^2 - 3*x + 1", "y*z + 2*y - 1/2", "y^2 - z + 5"
 @given(matrices(3, 3))
 def test_a_linear_relation_is_found_where_there_is_one(C):
     assert theorems.linear_relation(DECOUPLED, DECOUPLED.transformed(C)) == C
-
-
-# The splitting lemma
 
 
 @given(systems(dims=(1, 2)), systems(dims=(1, 2)), points(4, rationals(9)))

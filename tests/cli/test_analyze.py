@@ -59,17 +59,11 @@ def test_text_json_and_markdown_say_the_same(once):
     assert all(text in markdown.replace("\\", "") for _, _, text in lines)
 
 
-# Exit statuses
-
-
 @pytest.mark.parametrize("form", ["", "--json", "--markdown"])
 def test_undecided_gives_3(kahanmaps, form):
     outcome = kahanmaps(f"analyze clebsch_first_flow --effort -20 {form}")
     assert outcome.status == 3
     assert "The growth is undecided" in outcome.out
-
-
-# Time, progress and interrupts
 
 
 @pytest.fixture

@@ -21,9 +21,6 @@ def without_claims(name):
     return "\n".join(kept) + "\n"
 
 
-# What is found is accepted
-
-
 @pytest.mark.parametrize(
     ("find", "check", "count"),
     [
@@ -87,9 +84,6 @@ def test_the_commuting_systems_of_a_member_that_does_not_say_so_can_be_pasted(ka
     assert (outcome.status, outcome.json["holds"]) == (0, True)
 
 
-# JSON
-
-
 def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps):
     words = "find-integrals lorenz -p b=20 --flow --darboux 2"
     assert kahanmaps(words).out.splitlines() == [
@@ -105,9 +99,6 @@ def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps
     assert "T1\tproved\texp(20*t)*(x^2 - 20*z)\n\tdepends on time\n" in kahanmaps(beside).out
     data = kahanmaps(f"{beside} --json").json
     assert data["beside_map"]["polynomials_degree"] == 3
-
-
-# What stays open
 
 
 def test_integrals_without_a_formula_give_3(kahanmaps, monkeypatch):

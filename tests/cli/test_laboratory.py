@@ -11,8 +11,6 @@ from kahanmaps.invariants.heights import height_growth
 from kahanmaps.laboratory.cycles import _ProjectiveMap, cycle_census
 from kahanmaps.laboratory.growth.height_survey import height_survey
 
-# cycles
-
 
 def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
     outcome = kahanmaps("cycles weierstrass --prime 31")
@@ -44,9 +42,6 @@ def test_p_sets_a_parameter_and_the_error_names_the_option_for_a_prime(kahanmaps
     assert "found '31', expected NAME=VALUE (the prime of cycles is --prime 31)" in outcome.err
 
 
-# lyapunov
-
-
 def test_numbers_are_printed_per_time_and_per_step(kahanmaps):
     outcome = kahanmaps("lyapunov riccati --eps 1/10 --steps 300 --random 4")
     assert outcome.status == 0
@@ -69,9 +64,6 @@ def test_starts_from_a_file(kahanmaps, tmp_path):
     found = kahanmaps("lyapunov harmonic --eps 1/10 --steps 50 --json --starts", tmp_path / "starts.csv").json
     assert found["orbits"] == 2
     assert found["per_time"] == pytest.approx([0, 0], abs=1e-12)
-
-
-# heights
 
 
 def test_values_of_eps_that_disagree_are_reported(monkeypatch):

@@ -27,9 +27,6 @@ def failing_with(monkeypatch, error):
     monkeypatch.setattr("kahanmaps_cli.commands.version.version_of", fail)
 
 
-# Errors become messages
-
-
 @pytest.mark.parametrize(
     ("error", "status", "words"),
     [
@@ -101,9 +98,6 @@ def test_nothing_in_a_message_can_steer_a_terminal(kahanmaps):
     assert outcome.status == 2
     assert r"\x1b[31mred\x07.toml" in outcome.err
     assert outcome.err.replace("\n", "").isprintable()
-
-
-# Standard streams
 
 
 def test_a_reader_that_has_seen_enough_changes_no_verdict(tmp_path):

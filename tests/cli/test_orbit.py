@@ -36,9 +36,6 @@ def test_a_file_of_xpp_is_a_system(kahanmaps, tmp_path):
     assert kahanmaps(f"orbit {path} {rest}").out == kahanmaps(f"orbit lorenz {rest}").out
 
 
-# JSON lines
-
-
 def test_the_header_has_the_documented_shape(kahanmaps):
     assert kahanmaps(f"{TOP} --steps 3 --format jsonl").records[0] == {
         "record": "header",
@@ -70,9 +67,6 @@ def test_an_orbit_can_be_made_again_from_its_header(kahanmaps, arithmetic):
     assert again.records[1:] == first.records[1:]
 
 
-# Where the system comes from
-
-
 def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_command_line(kahanmaps, tmp_path):
     toml = kahanmaps("systems euler_top --toml").out
     (tmp_path / "top.toml").write_text(toml)
@@ -83,9 +77,6 @@ def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_co
     assert kahanmaps(f"orbit {inline} {rest}").records[1:] == from_catalogue
     piped = shell(f"kahanmaps orbit - {rest}", tmp_path, stdin=toml.encode())
     assert piped.records[1:] == from_catalogue
-
-
-# Formats
 
 
 def test_text_is_tab_separated_between_comments(kahanmaps):
@@ -141,9 +132,6 @@ def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monke
     assert 1 < len(found.x) < 20
 
 
-# Talk
-
-
 def test_progress_goes_to_standard_error_only(kahanmaps, slow_clock):
     outcome = kahanmaps(f"{TOP} --steps 3")
     assert outcome.err.splitlines()[0] == "step 0 of 3 (10 s)"
@@ -151,16 +139,10 @@ def test_progress_goes_to_standard_error_only(kahanmaps, slow_clock):
     assert "step 3 of 3" not in outcome.out
 
 
-# Terminals
-
-
 def test_npz_is_refused_on_a_terminal():
     outcome = terminal(*shlex.split(f"{TOP} --steps 5 --format npz"))
     assert (outcome.status, outcome.out) == (2, "")
     assert "npz is a binary format: add -o FILE" in outcome.err
-
-
-# Interrupts
 
 
 def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(tmp_path):
@@ -173,9 +155,6 @@ def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(tmp_path):
     assert (end["record"], end["status"]) == ("end", "interrupted")
     assert steps == list(range(0, end["steps"] + 1, 100))
     assert len(steps) > 1
-
-
-# Methods.
 
 
 MEMBER = "orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10"

@@ -6,8 +6,6 @@ from kahanmaps.documents import catalog
 from kahanmaps.documents.files import parse_system
 from kahanmaps.maps.kahan import KahanFamily
 
-# The list
-
 
 def test_every_system_has_a_line(kahanmaps):
     listed = {line.split()[0]: line.split()[1] for line in kahanmaps("systems").out.splitlines()}

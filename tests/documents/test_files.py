@@ -83,9 +83,6 @@ def keys(text: str | bytes, **parameters: object) -> list[str]:
     return [key for key, _ in mistakes(text, **parameters)]
 
 
-# Reading
-
-
 def test_a_system_file_gives_its_claims_as_rational_functions_of_variables_and_eps():
     file = parse_system(SYSTEM)
     names = ["x", "y", "eps"]
@@ -130,9 +127,6 @@ def test_a_parameter_is_read_exactly(written, value):
     file = parse_system(f'variables = ["x"]\n[parameters]\na = {written}\n[system]\nrhs = ["a*x"]')
     assert file.parameters == {"a": value}
     assert file.system.B[0, 0] == value
-
-
-# Round trips
 
 
 @over_hand_written
@@ -191,9 +185,6 @@ def test_the_mistakes_of_a_wrong_file_are_reported_by_key(text, expected, words)
 @pytest.mark.parametrize(("text", "expected"), LARGE.values(), ids=LARGE)
 def test_files_that_are_too_large_or_no_text_are_refused_by_key(text, expected):
     assert keys(text) == expected
-
-
-# Anything at all
 
 
 @settings(max_examples=60)

@@ -41,9 +41,6 @@ def orbit_of(file, count):
     return points
 
 
-# names
-
-
 def test_a_member_goes_where_a_name_of_the_catalogue_goes(tmp_path):
     twice = parse_system('[composition]\nof = [{ system = "lv(3,1)", power = 2 }]', "twice")
     start = (fmpq(1), fmpq(2), fmpq(5))
@@ -51,9 +48,6 @@ def test_a_member_goes_where_a_name_of_the_catalogue_goes(tmp_path):
     assert twice.map.at(EPS).step(start) == over.step(over.step(start))
     assert find_file("lv(3,1)", tmp_path).system == load("lv(3,1)").system
     assert parse_system(load("lv(6,1)").to_toml(), "again").system == load("lv(6,1)").system
-
-
-# the measure
 
 
 @pytest.mark.parametrize(("n", "k"), [(2, 0), (5, 1), (7, 3)])
@@ -134,9 +128,6 @@ def test_cross_ratios_are_conserved(n, k):
             evaluate(function.numerator, QQ, (*x, EPS)) / evaluate(function.denominator, QQ, (*x, EPS)) for x in points
         }
         assert len(values) == 1
-
-
-# degrees
 
 
 def measured(file):

@@ -174,9 +174,6 @@ def workers(shared):
         yield opened
 
 
-# What goes out and what comes back
-
-
 def test_a_record_that_is_printed_twice_is_handed_back_once(workers):
     jobs = jobs_of(10, twice=True)
     assert_exactly_once(done(workers, jobs), jobs)
@@ -196,9 +193,6 @@ def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
         {},
         {"first": "one = 1", "third": "three = 3"},
     ]
-
-
-# Failures of a task
 
 
 def test_a_group_that_is_killed_leaves_only_the_guilty_job_lost(workers):
@@ -246,16 +240,10 @@ def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, mon
     assert hung.message == "the worker's command did not end within 0.6 s"
 
 
-# Workers that cannot run anything
-
-
 def test_a_module_that_the_workers_lack_is_one_error_and_not_a_record_for_each_task(shared):
     command = [sys.executable, "-S", "-m", "no_such_module"]
     with closing(shared.workers(command=command)) as workers, pytest.raises(WorkersUnfit, match="no_such_module"):
         done(workers, jobs_of(3))
-
-
-# Workers and schedulers that come and go
 
 
 def test_every_record_is_returned_once_although_a_worker_and_its_nanny_are_killed(own):
@@ -344,9 +332,6 @@ def test_what_is_killed_on_a_cluster_changes_nothing(own, study):
     assert batch.returncode == 3, err  # some tasks fail, as meant
     list(run("study.toml", "home.db", jobs=2))
     assert exported("away.db") == exported("home.db")
-
-
-# Before there is a cluster
 
 
 def test_an_address_where_no_scheduler_answers_is_refused_in_a_sentence():

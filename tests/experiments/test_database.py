@@ -17,8 +17,6 @@ from small_databases import LIMITS, ok, planned, seed, seeds, small_chunks, star
 from kahanmaps.experiments.results import store as store_module
 from kahanmaps.experiments.results.store import Store, StoreError, Unavailable
 
-# Files that cannot be used
-
 
 def test_a_missing_file_is_not_made_unless_asked_for(path):
     for readonly in (True, False):
@@ -80,9 +78,6 @@ def test_a_store_that_is_closed_or_opened_to_be_read_refuses_to_write(path):
         store.status()
 
 
-# A full disk, kills
-
-
 def test_a_full_disk_is_reported_in_a_sentence_and_loses_nothing(store):
     store.plan("a", "1", LIMITS, tasks(*range(500)), {})
     (pages,) = store._execute("PRAGMA page_count").fetchone()
@@ -141,9 +136,6 @@ Store.open(path).plan("a", "another", TaskLimits(), made(), {})
     with Store.open(path, readonly=True) as store:  # which plays it back
         assert seeds(store.pending()) == [1, 3]
         assert [seed(row.task) for row in store.rows()] == [2]
-
-
-# One writer, many readers
 
 
 def test_one_process_writes_at_a_time_and_its_lock_is_gone_at_rest(path):

@@ -82,9 +82,6 @@ def many_rows(draw):
     ]
 
 
-# JSON lines
-
-
 @given(many_rows())
 def test_lines_parse_back_to_what_was_put_in(rows):
     header, *results, end = [json.loads(line) for line in jsonl(rows).split("\n")[:-1]]
@@ -97,9 +94,6 @@ def test_lines_parse_back_to_what_was_put_in(rows):
             assert {value for name, value in of_record.items() if name != "key"} == {None}
         else:
             assert Record.from_json(of_record) == source.record
-
-
-# Columns of a table
 
 
 def test_columns_come_in_the_documented_order():
@@ -117,9 +111,6 @@ def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result
     assert [found[name] for name in names] == ["proved", "v", "6", "hilbert", "h"]
     (found,) = table([row(result={"a": {"b": 1}, "a.b": 2, "result.a.b": 3})])
     assert [found[name] for name in ("a.b", "result.a.b", "result.result.a.b")] == ["1", "2", "3"]
-
-
-# Cells
 
 
 @pytest.mark.parametrize(
@@ -170,9 +161,6 @@ def test_stable_exports_are_the_same_bytes_wherever_the_work_was_done(rows):
     assert csv_text(rows, stable=True) == csv_text(others, stable=True)
 
 
-# Memory
-
-
 class Sink:
     """A stream that keeps nothing but the count."""
 
@@ -208,9 +196,6 @@ def test_many_rows_are_never_held_together(write, extra_lines):
         tracemalloc.stop()
     assert sink.lines == 1_000 + extra_lines
     assert peak < 300_000  # measured: 4 kB and 140 kB, for any count; 1,000 rows in a list take 700 kB
-
-
-# Parquet
 
 
 @pytest.fixture

@@ -105,9 +105,6 @@ def wait_until_gone(pids: Sequence[int]) -> None:
     until(lambda: not any(map(is_running, pids)))
 
 
-# What a task does to its worker
-
-
 @pytest.fixture(scope="module")
 def faulty(fault_tasks) -> dict[int, Record]:
     """What became of a task of each fault but that which hangs, with as many between them that are done."""
@@ -206,9 +203,6 @@ def test_an_error_caused_by_lack_of_memory_is_reported_as_such(error, is_memory)
             assert ("stderr" in found) is (raised is not caused)  # a traceback, where nobody raised it on purpose
 
 
-# One worker for many tasks
-
-
 def test_the_time_of_one_task_is_not_that_of_the_tasks_before_it():
     records = done([pause(150, seed, TaskLimits(time=1.5)) for seed in range(11)], workers=1)
     assert all(record.is_ok for record in records.values())  # 1.65 seconds in one worker
@@ -227,9 +221,6 @@ def test_what_earlier_tasks_left_belongs_to_the_memory_of_a_task():
 def test_an_error_nobody_expected_is_tried_again_in_a_fresh_worker():
     jobs = [Job(Task("first", None, {"steps": 0, "seed": seed}), TaskLimits(100.0)) for seed in range(2)]
     assert all(record.is_ok for record in done(jobs, workers=1).values())
-
-
-# Deaths
 
 
 def test_the_signals_of_a_task_itself_are_those_of_faults_and_limits():
@@ -337,9 +328,6 @@ def test_a_script_may_run_a_batch_without_asking_whether_it_is_the_main_module(t
     (tmp_path / "script.py").write_text(f"import kahanmaps as km\nprint(len(list(km.run({text!r}, jobs=2))))\n")
     ran = subprocess.run([sys.executable, tmp_path / "script.py"], capture_output=True, text=True, timeout=60)
     assert (ran.stdout, ran.stderr) == ("4\n", "")
-
-
-# What remains of it
 
 
 def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_machine_to_try(tmp_path: Path):

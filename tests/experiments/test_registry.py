@@ -92,9 +92,6 @@ def test_an_unknown_task_is_refused_with_the_known_ones_and_a_suggestion():
     assert all(name in str(caught.value) for name in LIBRARY)
 
 
-# Modules of others
-
-
 def test_tasks_of_ones_own_are_brought_in_by_the_environment(modules, monkeypatch):
     named(modules, monkeypatch, own_one=TASK.replace("NAME", "one"), own_two=TASK.replace("NAME", "two"))
     assert task_kind("two").perform(None, {"seed": 4}) == {"seed": 4}

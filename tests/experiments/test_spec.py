@@ -29,8 +29,6 @@ from kahanmaps.family.random_members import (
     random_member_with_eigenvalues,
 )
 
-# What a spec says
-
 
 def test_the_last_axis_runs_fastest_and_systems_slowest():
     text = LORENZ.replace('"lorenz"', '["lorenz", "riccati"]') + 'axes = {eps = [1, 2], seed = "0..2"}'
@@ -63,9 +61,6 @@ def test_rows_of_a_zip_may_not_repeat_nor_values_of_other_axes(line, message):
         only(LORENZ + f"{line}\naxes = {{eps = 1, parameters = {{s = [1, 1, 2], r = [5, 5, 6]}}}}")
 
 
-# Systems
-
-
 def test_paths_of_systems_are_relative_to_the_folder_of_the_spec(folder, tmp_path_factory, monkeypatch):
     monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
     (folder / "study.toml").write_text(LORENZ.replace("lorenz", "members/../rotor.toml") + "axes = {eps = 1}")
@@ -94,9 +89,6 @@ def test_a_second_system_is_a_recipe_like_the_first(folder):
     named = {task.options["other"]["document"] for task in found}
     assert named | {task.system["document"] for task in found} == set(spec.documents)
     assert all(isinstance(json.loads(text), dict) for text in spec.documents.values())
-
-
-# Keys
 
 
 SAME_KEYS = [
@@ -157,9 +149,6 @@ def test_keys_depend_on_what_a_system_file_says_and_not_on_how(folder, rewritten
     assert (task_of(text, folder=folder).key == before) is is_same
 
 
-# Definitions
-
-
 BOTH = LORENZ + 'axes = {eps = [1, 2], seed = "0..2"}'
 DEFINITIONS = [
     (LORENZ + "axes = {eps = [0.1, 1]}", LORENZ + "axes = {time_step = [0.2, 2]}", True),
@@ -190,9 +179,6 @@ def test_a_range_and_the_list_of_its_values_are_two_definitions_of_the_same_task
     assert list(one.tasks()) == list(other.tasks())
 
 
-# Limits
-
-
 @pytest.mark.parametrize(
     ("name", "written", "limit"),
     [
@@ -212,9 +198,6 @@ def test_the_limits_of_an_experiment_come_before_those_of_all():
     spec = parse_spec(common + LORENZ + "axes = {eps = 1}\nlimits = {time = 7}")
     assert spec.experiments[0].limits == TaskLimits(7.0, 1_000_000)
     assert spec.experiments[0][0].options["max_digits"] == 50
-
-
-# Sizes
 
 
 @pytest.mark.parametrize(
@@ -249,9 +232,6 @@ def drawn(**values: object) -> SystemFile:
     )
 
 
-# Random members
-
-
 @pytest.mark.parametrize(
     ("values", "member"),
     [
@@ -269,9 +249,6 @@ def test_a_random_member_is_the_one_that_the_library_draws(values, member):
 def test_signs_pick_an_associated_system():
     plain, other = drawn(m=2, seed=1).member, drawn(m=2, seed=1, signs="1,-1").member
     assert (other.A, other.H, other.signs) == (plain.A, plain.H, (1, -1))
-
-
-# Files
 
 
 def test_every_system_of_the_catalogue_reads_back_equal():

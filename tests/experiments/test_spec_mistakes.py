@@ -18,9 +18,6 @@ from kahanmaps.experiments.results.store import Store
 from kahanmaps.experiments.running.run import plan
 from kahanmaps.experiments.spec import Spec, SpecError, parse_spec, read_spec
 
-# Mistakes
-
-
 TEN = """
 name = 5
 [experiments.first]
@@ -76,9 +73,6 @@ def test_nothing_in_a_message_is_obeyed_by_a_terminal():
     with pytest.raises(SpecError) as caught:
         parse_spec(text)
     assert all(c.isprintable() or c == "\n" for c in str(caught.value))
-
-
-# Texts that are no spec
 
 
 @pytest.mark.parametrize(

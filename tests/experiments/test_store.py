@@ -17,8 +17,6 @@ from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, seeds, sm
 from kahanmaps.experiments.results.records import Outcome, Record, Row, Task, TaskLimits, canonical, digest
 from kahanmaps.experiments.results.store import Merged, Planned, Store, StoreError
 
-# Records
-
 
 def test_a_stored_record_is_read_back_unchanged(store):
     record = Record(
@@ -71,9 +69,6 @@ def test_the_later_record_counts_but_no_failure_replaces_a_result(store, records
     store.add(records)
     (found,) = store.find(task(1).key)
     assert (found.record, found.attempts) == (kept, 2 * attempts)
-
-
-# Plans
 
 
 def test_the_same_definition_is_resumed_without_making_a_single_task(store):
@@ -142,9 +137,6 @@ def test_documents_are_kept_and_may_come_up_while_tasks_are_made(store):
     assert [one.name for one in store.experiments()] == ["a"]
 
 
-# What is pending
-
-
 def test_each_task_is_handed_out_once_whatever_is_added_meanwhile(store):
     with small_chunks():
         store.plan("a", "1", LIMITS, tasks(*range(8), *range(8)), {})
@@ -210,9 +202,6 @@ def test_pending_rows_and_status_agree_with_a_model(plans, done, parts, data):
         assert store.unplanned() == len(set(done) - left)
 
 
-# Finding a task
-
-
 def test_a_task_is_found_by_the_beginning_of_its_key(store):
     store.plan("a", "1", LIMITS, tasks(1, 2, 1), {})
     store.plan("b", "1", LIMITS, tasks(1), {})
@@ -228,9 +217,6 @@ def test_a_task_is_found_by_the_beginning_of_its_key(store):
 def test_what_is_no_beginning_of_a_key_is_refused(store, prefix):
     with pytest.raises(StoreError, match="at least 4 of its 32 hexadecimal digits"):
         store.find(prefix)
-
-
-# Merging
 
 
 def contents(path: Path) -> list[object]:

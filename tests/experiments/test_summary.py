@@ -41,9 +41,6 @@ def test_tasks_are_counted_by_outcome_and_verdict():
     assert group["verdicts"] == {"proved": 2, "supported": 0, "refuted": 1, "undecided": 0, "own word": 1}
 
 
-# Quantiles
-
-
 @given(st.lists(st.integers(-20, 20) | st.floats(-1e9, 1e9) | st.fractions().map(str), min_size=1, max_size=30))
 def test_quantiles_are_values_that_occur_at_their_rank(values):
     found = numbers_of([row({"x": value}) for value in values], stable=True)["x"]
@@ -61,9 +58,6 @@ def test_numbers_beyond_the_range_of_doubles_are_counted_at_the_ends():
 @pytest.mark.parametrize("text", ["", "1/0", "1e99999", "0x10", "1_000", "nan", "1" * 2001, "١", None, [1]])
 def test_what_is_no_exact_number_is_not_summed_up(text):
     assert list(numbers_of([row({"x": text, "y": 1})], stable=True)) == ["y"]
-
-
-# Groups
 
 
 def test_groups_are_in_the_order_of_numbers_then_flags_then_texts_then_nothing():
@@ -89,9 +83,6 @@ def test_rows_are_grouped_by_options_parts_of_the_recipe_and_results():
         ("failed", "no"),
         ("ok", None),
     ]
-
-
-# What is made of it
 
 
 def test_the_tables_have_tabs_or_bars_between_their_cells():

@@ -93,9 +93,6 @@ def test_the_dimension_is_4m_for_jordan_blocks_and_larger_only_for_a_derogatory_
     assert ("larger than 4m" in diagnosis(A)) is (degree < m)
 
 
-# The matrices B_s.
-
-
 @over_members
 def test_a_sign_matrix_is_the_sign_on_the_part_that_belongs_to_the_factor(member):
     for g in member.associated():

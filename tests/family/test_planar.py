@@ -43,9 +43,6 @@ over_members = pytest.mark.parametrize(
 )
 
 
-# The system.
-
-
 @over_members
 def test_the_planar_step_is_the_kahan_map(member, form):
     for eps in ("1/3", -2):
@@ -71,9 +68,6 @@ def test_the_planar_step_is_singular_with_the_kahan_map_and_names_the_factor(mem
         form.step(*form.coordinates(x), 1)
     assert (caught.value.point, caught.value.eps) == (form.coordinates(x), 1)
     form.step(*form.coordinates(x), "1/3")
-
-
-# What is not a normal form.
 
 
 def swapped(S: fmpq_mat) -> fmpq_mat:

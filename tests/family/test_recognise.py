@@ -161,9 +161,6 @@ def steps_like(normal_form: SystemNormalForm, system: QuadraticSystem) -> bool:
     return splitting.point(images) == KahanMap(system, "1/10").step(x)
 
 
-# Found.
-
-
 def test_a_declared_member_keeps_its_a():
     member = random_member_with_eigenvalues(["1/2", -7], 3)
     found = system_normal_form(member.chosen.system, member=member)

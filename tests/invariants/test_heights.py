@@ -151,9 +151,6 @@ def test_the_level_cubic_of_a_plane_decides_how_heights_grow(name, kind):
     assert growth(system, start, 64, "1/2", normal_form=normal_form).kind is kind
 
 
-# Constants
-
-
 @pytest.mark.parametrize(
     ("rhs", "eps", "expected"),
     [
@@ -203,9 +200,6 @@ def test_the_constant_of_a_parabola_is_its_leading_coefficient(a, b, c, n, every
     found = of_heights([a * k * k + b * k + c for k in range(n + 1)], every)
     assert found.kind is Q
     assert found.constant == Fraction(a, every**2)
-
-
-# Decisions
 
 
 @pytest.mark.parametrize(

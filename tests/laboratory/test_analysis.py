@@ -57,9 +57,6 @@ def results(found):
     return {key: value for key, value in found.to_json().items() if key != "document"}
 
 
-# What a file claims is not read
-
-
 @pytest.mark.parametrize(("symbols", "eps"), [((), None), (("b",), "1/3")])
 def test_the_claims_and_facts_of_a_file_are_not_read(symbols, eps):
     found = [
@@ -67,9 +64,6 @@ def test_the_claims_and_facts_of_a_file_are_not_read(symbols, eps):
     ]
     assert found[0] == found[1]
     assert found[0]["verdict"]["integrals"] == 1
-
-
-# One eps says nothing of others
 
 
 def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
@@ -83,9 +77,6 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
     assert generic.conclusion.growth == "quadratic"
     assert "only" not in generic.conclusion.sentence
     assert generic.integrals.profile.period is None
-
-
-# What was not done
 
 
 def test_where_the_budget_is_spent_steps_are_skipped_and_reported():
@@ -125,17 +116,11 @@ def test_mistakes_and_interrupts_are_not_swallowed(monkeypatch, error):
         analyze(load("nahm_tetrahedral"), analyses=[step for step in ANALYSES if step.name == "symmetries"])
 
 
-# The flow beside the map
-
-
 def test_the_flow_of_a_polarised_map_is_part_of_the_report():
     steps = [step for step in ANALYSES if step.name in ("integrals", "densities", "the flow")]
     found = analyze(load("duffing_polarised"), analyses=steps)
     assert dict(found.sections)["the flow"]
     assert [line for line in found.skipped if "flow" in line] == []
-
-
-# Degenerate systems
 
 
 def lines_of(found, title):
@@ -221,9 +206,6 @@ def test_where_an_iterate_is_constant():
     assert linear.conclusion.sentence.startswith(
         "The system is linear, and so is its Kahan map; the integrals were not counted."
     )
-
-
-# Form
 
 
 @pytest.mark.parametrize(

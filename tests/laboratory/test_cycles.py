@@ -113,9 +113,6 @@ def test_more_points_than_one_portion_holds_are_those_of_random_walks():
     assert some != cycle_census(load("weierstrass").system, "1/7", 257, samples=2000, seed=4)
 
 
-# --- known lengths ---------------------------------------------------------------------------------------------------
-
-
 def test_a_translation_has_one_cycle_of_p_points_and_a_multiplication_one_of_p_minus_1():
     assert dict(cycle_census(map_of("x + 1"), 1, 101).lengths) == {1: 1, 101: 1}
     assert dict(cycle_census(map_of("2*x"), 1, 101).lengths) == {1: 2, 100: 1}  # 2 is a primitive root modulo 101
@@ -134,9 +131,6 @@ def test_a_map_that_degenerates_modulo_the_prime_is_a_constant():
     """For x' = x^2 + x - 1 that is where 5 eps^2 = 1, as 2/11 modulo 101."""
     found = cycle_census(load("riccati").system, "2/11", 101)
     assert (found.lengths, found.preperiodic) == ({1: 1}, 101)
-
-
-# --- limits ----------------------------------------------------------------------------------------------------------
 
 
 def test_a_time_limit_keeps_the_complete_steps_of_random_points():

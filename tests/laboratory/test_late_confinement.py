@@ -110,9 +110,6 @@ def test_degrees_that_contradict_the_singularities_are_no_result():
     assert "the measured degree of iterate 8 contradicts" in other.unconfirmed
 
 
-# The patterns themselves
-
-
 def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
     k = 13
     run = singularities(resonant(k), "1/7")
@@ -146,9 +143,6 @@ def test_a_recurrence_needs_terms_beyond_all_patterns():
     # 13 terms, no hypersurface that could lower a degree, and yet the degrees are not 2^n
     assert "degrees drop although" in growth_with(Patterns((), 100, False), *linear).unconfirmed
     assert growth_with(Patterns((), 100, False), *(2**n for n in range(8))).dynamical_degree.text == "2"
-
-
-# The report
 
 
 LATE = [

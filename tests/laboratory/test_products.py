@@ -118,9 +118,6 @@ def test_maps_without_structure_have_no_products(file):
     assert found.density is None or file.name == "henon_heiles"  # whose density is det(I - eps f')
 
 
-# Lattices
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_relations_are_all_relations(seed):
     assert relations([]) == []

@@ -111,9 +111,6 @@ def test_a_time_limit_keeps_the_hypersurfaces_that_were_followed():
         singularities(top, "1/7", effort=Budget(1e9), progress=stop)
 
 
-# --- the series ------------------------------------------------------------------------------------------------------
-
-
 def follow(equation, point, direction, tangents, steps, precision):
     return list(islice(images_of_curve([equation], point, direction, precision, tangents), steps))
 

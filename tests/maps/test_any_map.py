@@ -79,9 +79,6 @@ def generic_orbit(over, start, steps):
     return found
 
 
-# Over the rationals.
-
-
 @every_map
 def test_integers_over_one_denominator_step_as_rationals_do(name):
     over = MAPS[name].at("1/10")
@@ -133,9 +130,6 @@ def test_the_jacobi_matrix_is_that_of_dual_numbers(name):
         assert [entry.slope for entry in image] == [found[i, k] for i in range(n)]
 
 
-# Machine numbers.
-
-
 @pytest.mark.parametrize(("name", "backward"), [*((name, False) for name in MAPS), *((n, True) for n in WITH_INVERSE)])
 def test_machine_numbers_follow_the_exact_orbit(name, backward):
     map_ = MAPS[name]
@@ -156,9 +150,6 @@ def test_kernels_for_machine_numbers_agree_to_the_last_bit(name):
         ensemble.advance(5)
         found.append(ensemble.x[:1])
     assert all(np.array_equal(found[0], other, equal_nan=True) for other in found[1:])
-
-
-# The same map, written in two ways.
 
 
 @given(points(2), rationals().filter(bool))
@@ -185,9 +176,6 @@ def test_a_polarised_map_solves_its_defining_equation(x, eps):
     again, c = over.step(x)
     assert again == b
     assert (c - a) / (4 * eps) == a * b * c + (a * b + b * c + c * a) / 3 + eps
-
-
-# The door.
 
 
 @pytest.mark.parametrize("name", ["kahan", "adjusted", "polarised", "explicit", "word"])

@@ -72,9 +72,6 @@ def ensemble(name: str, starts: np.ndarray, **options: object) -> FloatEnsemble:
     return FloatEnsemble(MEMBERS[name].chosen.system, EPS, starts, form=FORMS[name], **options)
 
 
-# Drift.
-
-
 @over_members
 def test_block_integrals_do_not_drift(name):
     starts = starts_of(MEMBERS[name].chosen.system.dim, 20) / 40

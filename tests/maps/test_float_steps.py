@@ -83,9 +83,6 @@ def same(one: FloatEnsemble, other: FloatEnsemble, some=slice(None)) -> None:
         assert np.array_equal(left.last[some], right.last, equal_nan=True), left.name
 
 
-# Right numbers.
-
-
 # Operations that may be written out: of the chain of variables 237 in a fast step, 1167 in a careful one.
 NONE_WRITTEN, FAST_WRITTEN = 1, 300
 
@@ -126,9 +123,6 @@ def test_an_orbit_in_normal_form_follows_the_exact_one(name):
     back = FloatEnsemble(system, "1/10", x[None], form=form, backward=True, kernel="numpy")
     back.advance(30)
     assert abs(back.x - to_floats(start)).max() <= 1e5 * 2.0**-53 * condition * largest
-
-
-# The same numbers, to the last bit.
 
 
 # The others are walked alike; machine code of a dense system takes seconds to be compiled.
@@ -185,9 +179,6 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
     assert (one.near_singular[20 : 20 + len(lines)] > 0).tolist() == lines
 
 
-# Ends.
-
-
 @over_kernels
 def test_each_way_to_end_has_its_status_and_step(kernel):
     # x~ = x/(1 - x): 1/3, 1/2, 1, and no more; from 1 - 2^-45 the pivot is 2^-45, and the image 2^45
@@ -227,9 +218,6 @@ def test_an_overflow_ends_one_orbit_and_leaves_the_others(kernel):
     assert np.isnan(orbits.x[0]).all()
     orbits.advance(10)
     assert orbits.failed_at[0] == 18
-
-
-# Choices and refusals.
 
 
 def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):

@@ -61,9 +61,6 @@ def walk(system: QuadraticSystem, eps: str, steps: int) -> list[IntegerPoint]:
     return found
 
 
-# Steps.
-
-
 @pytest.mark.parametrize(("system", "eps", "steps"), ORBITS)
 @pytest.mark.parametrize("threshold", [0, 10**9])
 def test_an_orbit_on_integers_is_the_orbit_on_fractions(system, eps, steps, threshold, monkeypatch):
@@ -125,9 +122,6 @@ def test_a_step_of_a_map_is_that_of_fractions_and_so_is_its_determinant(name, da
     assert image == IntegerPoint.from_rationals(expected)
     for one, point in map_over.stages(x):
         assert one.determinant(point) == det(one.denominator_matrix(point))
-
-
-# The plane itself, over any numbers.
 
 
 rational = st.integers(-4, 4)

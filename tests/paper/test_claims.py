@@ -26,9 +26,6 @@ RIGHT = [found for found in CLAIMS if not found.misprint]
 MISPRINTS = [found for found in CLAIMS if found.misprint]
 
 
-# The list
-
-
 def test_every_claim_names_a_control_that_applies_to_the_least_m_for_which_it_makes_sense():
     def applies(claim):
         return any(CONTROLS[name].least_m <= (claim.only_m or claim.least_m) for name in claim.breaks)
@@ -50,9 +47,6 @@ def test_the_misprints_are_those_documented():
         "last-display-as-printed",
         "linear-system-as-printed",
     }
-
-
-# Claims hold
 
 
 def compared(claim, o):
@@ -92,9 +86,6 @@ def test_a_misprint_fails_as_printed(claim):
     names = members_of(claim, SPECTRA)
     assert names
     assert failing(claim, SPECTRA) == names
-
-
-# Negative controls
 
 
 def outcome(claim, name, control):

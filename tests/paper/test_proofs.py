@@ -72,9 +72,6 @@ def nothing(o):
     return iter(())
 
 
-# Proofs
-
-
 def test_a_false_claim_is_a_contradiction(only):
     only(fabricated(false_claim))
     with pytest.raises(Contradiction, match="different rational functions in normal form"):
@@ -156,9 +153,6 @@ def test_a_display_with_a_sign_or_a_letter_changed_is_refuted_with_a_witness(fun
     assert finding.verdict is Certainty.REFUTED
     assert finding.evidence.method == "exact rational point"
     assert finding.witness.left != finding.witness.right
-
-
-# Examination
 
 
 def test_a_true_claim_is_proved_with_points_beside(examine):

@@ -77,9 +77,6 @@ def misprints(m):
     return {claim.key for claim in claims() if claim.misprint and claim.makes_sense(m)}
 
 
-# Whole members
-
-
 @over_members
 def test_every_claim_but_misprints_is_proved_for_a_member_with_distinct_roots(name):
     # One report, and what it has to be: neighbours would compute it again in another process.
@@ -143,9 +140,6 @@ def test_the_series_of_the_integrals_is_proved_to_the_order_asked_for(order):
     assert report.context["order"] == order
 
 
-# Controls
-
-
 @over_members
 def test_every_control_is_refuted_at_a_witness(name):
     report = verify(file(name), options=VerifyOptions(controls=True))
@@ -193,9 +187,6 @@ def test_claims_that_need_distinct_roots_are_undecided_and_nothing_is_refuted_bu
             found = by_key(report)[claim.key]
             assert (found.verdict, found.evidence.method) == (UNDECIDED, "outside the hypotheses")
             assert "repeated roots" in found.evidence.summary
-
-
-# Special members
 
 
 def of_two_planes(H):
@@ -269,9 +260,6 @@ def test_the_zero_hamiltonian_refutes_nothing():
     assert not any(finding.applies for finding in [*silent, *special])
 
 
-# Systems of files
-
-
 def test_the_signs_of_a_file_choose_the_system_that_is_examined(monkeypatch):
     examined = []
     original = Verifier.__init__
@@ -286,9 +274,6 @@ def test_the_signs_of_a_file_choose_the_system_that_is_examined(monkeypatch):
     assert verify(SystemFile.from_member(signed), options=VerifyOptions(sections=(4,))).verdict is PROVED
     assert (examined[0].H, examined[0].A) == (signed.chosen.K, plain.A)
     assert examined[0].H != plain.H
-
-
-# The member in general
 
 
 @pytest.mark.parametrize("m", quick([1, 2, 3], [1]))

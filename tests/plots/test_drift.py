@@ -34,9 +34,6 @@ def only(found):
     return curve
 
 
-# Functions
-
-
 def test_integrals_with_the_image_in_them_have_their_exact_values():
     file = load("paper_m2")
     start = [fmpq(1, 3), fmpq(-1, 5), fmpq(2, 7), fmpq(1, 2)]
@@ -76,9 +73,6 @@ def test_expressions_may_contain_eps_and_have_a_name_each():
     for requests in ([("", "x"), ("", "x")], [("E", "x"), ("E", "y")]):
         with pytest.raises(InputError, match="found two functions of the name"):
             requested_functions(CIRCLE, EPS, requests)
-
-
-# Errors
 
 
 @pytest.mark.parametrize(("text", "k", "scale"), [("x", 0, 2), ("y", 1, None)])
@@ -130,9 +124,6 @@ def test_a_pole_at_the_start_is_refused_and_points_without_a_value_are_counted()
     assert only(found).steps.tolist() == list(range(2, 11))
 
 
-# Bins
-
-
 @pytest.mark.parametrize("linear", [False, True])
 @pytest.mark.parametrize("portion", [1, 7, 1000, 5000])
 def test_the_largest_of_every_bin_is_kept_however_errors_come(linear, portion):
@@ -152,9 +143,6 @@ def test_a_random_start_is_the_same_for_the_same_seed_and_small_enough_for_rk4()
     assert first == second != other
     found = survey(load("paper_m2"), small_start(load("paper_m2").system, EPS), 1000, [("", "I1")], ("rk4",))
     assert found.ends["rk4"].is_whole
-
-
-# The picture
 
 
 def drawn(found, **how):

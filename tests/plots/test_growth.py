@@ -132,9 +132,6 @@ def test_undecided_heights_have_no_fit_and_orbits_that_disagree_are_counted():
     assert labels(figure)[0].endswith(": 1 undecided, 2 bounded")
 
 
-# Records
-
-
 def test_a_record_has_fewer_heights_and_the_same_constants(survey):
     full, read = height_curves(survey), curves_of_record({"command": "heights", **survey.to_json()})
     assert [curve.steps.tolist() for curve in read] == [[0, 1, 2, 4, 8, 16, 32, 40]] * 2

@@ -171,9 +171,6 @@ def test_a_system_without_normal_form_is_refused_with_the_reason():
             find_invariant_curves(file, [[1] * file.dim], "1/20", 5)
 
 
-# The picture
-
-
 def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_color_in_all_panels(curves):
     found = curves("m = 3")
     figure = plot_invariant_curves(found, STYLE, original=(0, 1))

@@ -100,9 +100,6 @@ def test_no_line_goes_through_a_missing_point_and_no_points_at_all_are_an_empty_
     assert picture_bytes(plot_portrait(portrait_of(found, AXES, color="step"), STYLE), "png", STYLE)
 
 
-# Neighbours on a curve
-
-
 def circle(turn):
     return np.stack([np.cos(turn), np.sin(turn)], axis=1)
 
@@ -231,9 +228,6 @@ def test_a_solution_passes_what_is_a_pole_in_time_and_ends_after_its_time():
     short, past = (solution(rotation, start, BOX, time) for time in (1.0, -1.0))
     assert short[-1] == pytest.approx([np.cos(1), -np.sin(1)], abs=2 / 400 * 6)
     assert past[-1, 1] > 0 > short[-1, 1]
-
-
-# Starts
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "henon_heiles", "euler_top"])

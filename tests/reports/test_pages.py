@@ -234,9 +234,6 @@ def test_a_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch, volterra):
     assert [one.name for one in tmp_path.iterdir()] == ["page.html"]
 
 
-# -- the font of formulas
-
-
 def test_the_font_has_every_letter_of_formulas():
     names = [*string.ascii_letters, *GREEK_NAMES.split("|"), "eps", "my_name12"]
     polynomial = km.parse_polynomial("123456789/70" + "".join(f"+{name}^2-{name}" for name in names), names)

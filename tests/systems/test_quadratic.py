@@ -27,9 +27,6 @@ def plane(first: str, second: str, **parameters) -> QuadraticSystem:
     return QuadraticSystem.from_text(["x", "y"], [first, second], parameters)
 
 
-# Coefficients.
-
-
 def test_the_coefficients_are_the_ones_read_off_by_hand():
     system = plane("3*x^2 + x*y - 2*y + 5", "y^2/7")
     assert system.Q == (
@@ -57,9 +54,6 @@ def test_the_divergence_is_the_trace_of_the_jacobi_matrix(pair):
     assert evaluate(system.divergence, QQ, x) == trace(system.over(QQ).jacobian(x))
 
 
-# Values.
-
-
 @over_all_fields
 @some
 @given(pair=systems_with_points(entries=integers))
@@ -74,16 +68,10 @@ def test_the_value_follows_from_the_coefficients(field, pair):
     assert agree(field, value, [field.convert(entry) for entry in by_hand])
 
 
-# The polarisation in Kahan's equation.
-
-
 def test_there_is_no_polarisation_modulo_two():
     K = GF(2)
     with pytest.raises(BadPrime):
         EULER_TOP.over(K).polarised([K.one] * 3, [K.one] * 3)
-
-
-# What is refused.
 
 
 def test_a_right_hand_side_of_degree_three_is_refused_by_its_variable():
