@@ -77,7 +77,7 @@ def test_members_are_printed_as_system_files(kahanmaps):
 
 
 def test_verdicts_are_asked_for(kahanmaps, plane):
-    assert "verdict\t" in kahanmaps(f"scan {QUICK} --analyze -4").out
+    assert "verdict\t" in kahanmaps(f"scan {QUICK} --analyze -10").out
     assert "verdict" not in plane.out
 
 
