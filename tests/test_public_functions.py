@@ -200,6 +200,7 @@ def test_orbits_go_over_every_field_that_has_numbers_to_print():
 EXPRESSIONS = """
 km.period("x' = 2*x*y; y' = -x^2 - y^2", [1, 2], "1/10").status
 km.period("paper_m2", [1, 2, 0, 1], time_step="1/5", prime=10007).period
+km.geometry("paper_m2", [1, 2, 3, 5], time_step="1/5").planes[0].rotations
 km.ensemble("henon_heiles", np.full((5, 4), 0.1), "1/20", 50, kernel="numpy").x
 km.ensemble("euler_top", [[1, 2, 3]], time_step="1/5", steps=3, kernel="numpy").x
 km.ensemble(system="euler_top", starts=[[1, 2, 3]], eps="1/10", steps=3, kernel="numpy").x

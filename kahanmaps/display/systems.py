@@ -30,6 +30,7 @@ from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import ImplicitMap, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap
+from kahanmaps.maps.normal_form.geometry import LevelGeometry
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -250,3 +251,18 @@ def period_text(found: OrbitPeriod) -> str:
 
 def _period_word(found: OrbitPeriod | PlanePeriod) -> str:
     return "none" if found.status == "aperiodic" else found.status if found.period is None else str(found.period)
+
+
+@text_form.register
+def geometry_text(geometry: LevelGeometry) -> str:
+    """Return the curves, translations and rotation numbers in the planes of an orbit."""
+    return geometry.text
+
+
+@html_form.register
+def geometry_html(geometry: LevelGeometry) -> str:
+    """Return the same as a list."""
+    lines = (
+        markup.escape(markup.shortened(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
+    )
+    return markup.titled("geometry of the level set", markup.listed(lines))

@@ -169,7 +169,7 @@ def plane_period(
             if same_point(image, point):
                 return PlanePeriod(name, q, kind, "periodic", step, passed)
         return PlanePeriod(name, q, kind, "undecided", None, passed or None, "the start did not come back")
-    kind, gamma = _classify(block, point)
+    kind, gamma = classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
     if kind is PeriodKind.ADDITIVE:
@@ -206,7 +206,7 @@ def plane_period(
     return PlanePeriod(name, q, kind, "periodic", order, answers[-1])
 
 
-def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
+def classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
     """The kind of a point (U : V : 1) outside characteristics 2 and 3, and gamma if the level is smooth."""
     numerator, denominator = block.level(point)
     if block.is_zero or (point[0] == 0 and point[1] == 0):
@@ -344,7 +344,7 @@ def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str 
     >>> plane_period_over_rationals(block, (fmpq(-1, 3), fmpq(-1, 3), fmpq(1))).text
     'the plane: period 5 (a smooth level cubic; 5 T = 0)'
     """
-    kind, gamma = _classify(block, point)
+    kind, gamma = classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, 0, kind, *_KNOWN[kind])
     if kind is not PeriodKind.SMOOTH:
