@@ -108,7 +108,7 @@ class Finding(HtmlDisplay, WithoutTruthValue):
             "witness": self.witness.to_json() if self.witness else None,
         }
         if self.also:
-            plain["also"] = [evidence.to_json() for evidence in self.also]
+            plain["further_evidence"] = [evidence.to_json() for evidence in self.also]
         if self.formula:
             plain["formula"] = self.formula
         if self.source:

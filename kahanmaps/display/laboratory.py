@@ -230,11 +230,11 @@ def _heights(found: HeightSurvey) -> Iterator[Line]:
 @lines_of.register
 def _census(census: Census) -> Iterator[Line]:
     """The counts, and the longest cycles."""
-    if not census.looked_at:
+    if not census.examined:
         yield "points", census.points
         yield "stopped", "time limit, before the images of all points were known"
         return
-    yield "points", str(census.points) if census.complete else f"{census.points}, sampled {census.looked_at}"
+    yield "points", str(census.points) if census.complete else f"{census.points}, sampled {census.examined}"
     yield "indeterminate", census.indeterminate
     yield "pre-indeterminate", census.pre_indeterminate
     if census.complete:
@@ -259,7 +259,7 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
         yield (f"# {run.word.text}",)
     yield "denominator", run.denominator
     for found in run.hypersurfaces:
-        kind = f"degree {found.degree}" + (", factor of the denominator" if found.is_pole else "")
+        kind = f"degree {found.degree}" + (", factor of the denominator" if found.divides_denominator else "")
         kind += " in all" if found.polynomial == "?" else ""
         kind += "" if found.stage is None else f", of map {found.stage + 1}"
         outcome = found.status + (f": {found.note}" if found.note else "")

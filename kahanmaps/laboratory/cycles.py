@@ -44,7 +44,7 @@ class Census(PrintableResult):
     points that are periodic, by their period. A point is `indeterminate` where the map is not defined,
     `pre_indeterminate` if its orbit gets to such a point, `preperiodic` if its orbit gets to a cycle without being on
     it, and `open` if none of this was seen in `steps` steps (samples only). Where a time limit `stopped` the work
-    before the images of all points were known, `looked_at` is 0.
+    before the images of all points were known, `examined` is 0.
     """
 
     prime: int
@@ -53,7 +53,7 @@ class Census(PrintableResult):
     points: int
     complete: bool = False
     stopped: bool = False
-    looked_at: int = 0
+    examined: int = 0
     indeterminate: int = 0
     pre_indeterminate: int = 0
     preperiodic: int = 0
@@ -153,7 +153,7 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
     kinds = dict[str, Any](
         indeterminate=indeterminate, pre_indeterminate=ended - indeterminate, preperiodic=count - ended - len(cyclic)
     )
-    return replace(census, complete=True, looked_at=count, lengths=dict(sorted((+lengths).items())), **kinds)
+    return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **kinds)
 
 
 def _of_samples(
@@ -163,7 +163,7 @@ def _of_samples(
 
     drawn = np.random.default_rng(seed).integers(0, census.prime, (census.dim + 1, 2 * samples + 20))
     start = points = space.normalized(drawn[:, drawn.any(axis=0)][:, :samples])
-    looked_at, lengths, ended, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
+    examined, lengths, ended, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
     try:
         while done < steps and start.shape[1]:
             progress(f"p = {census.prime}: step {done} of at most {steps}")
@@ -178,7 +178,7 @@ def _of_samples(
             points, start = points[:, goes_on], start[:, goes_on]
     except TimeLimit:
         stopped = True
-    census = replace(census, stopped=stopped, looked_at=looked_at, steps=done, lengths=lengths)
+    census = replace(census, stopped=stopped, examined=examined, steps=done, lengths=lengths)
     return replace(census, indeterminate=ended[0], pre_indeterminate=ended[1], open=start.shape[1])
 
 

@@ -486,7 +486,7 @@ class Verifier:
                 verdict, what = Certainty.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
             evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
-            place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
+            place = {**finding.place, "violated_hypothesis": name, "violation": CONTROLS[name].breaks}
             controls.append(replace(finding, control=True, place=place))
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
         return [finding for finding in controls if finding.is_as_expected] or controls

@@ -67,7 +67,7 @@ def test_the_json_of_a_refuted_control_shows_the_witness_and_what_was_expected()
             "left": {"is": "I(x~)", "value": ["1"]},
             "right": {"is": "I(x)", "value": ["2"]},
         },
-        "also": [{"method": "orbit", "summary": "too"}],
+        "further_evidence": [{"method": "orbit", "summary": "too"}],
         "formula": "a = b",
         "source": "somebody",
         "control": True,

@@ -64,4 +64,4 @@ def test_what_survives_of_variations_is_a_table(kahanmaps):
     answer = kahanmaps("verify --beyond --m 2 -q")
     assert answer.status == 0
     assert "| `dx/det(I - eps f') is invariant for f` | proved | proved | proved | | proved | proved |" in answer.out
-    assert "fails for m = 1, H = u1^3 + v1 at x = (0, 0)" in answer.out
+    assert "fails for `m = 1, H = u1^3 + v1` at `x = (0, 0)`" in answer.out

@@ -5,7 +5,7 @@ from flint import Ordering, fmpq_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.singular.contracted import components
+from kahanmaps.laboratory.singular.exceptional import components
 
 NAMES = ("x1", "x2", "x3", "z")
 X1, X2, X3, Z = fmpq_mpoly_ctx.get(NAMES, Ordering.degrevlex).gens()

@@ -95,7 +95,7 @@ def test_the_counts_are_those_of_a_walk_by_hand(name, prime, eps):
     found = cycle_census(map_, "1/6" if prime == 5 else eps, prime)
     expected = census_by_hand(images_by_hand(map_, found.eps, prime))
     assert counts_of(found) == expected
-    assert found.points == found.looked_at == (prime ** (found.dim + 1) - 1) // (prime - 1)
+    assert found.points == found.examined == (prime ** (found.dim + 1) - 1) // (prime - 1)
     assert found.indeterminate + found.pre_indeterminate + found.preperiodic + found.periodic == found.points
     assert found.cycles == sum(found.lengths.values())
 

@@ -1,4 +1,4 @@
-"""What a map makes of the integrals of its differential equation: keeps, deforms, loses."""
+"""What a map makes of the integrals of its differential equation: conserves, deforms, loses."""
 
 from dataclasses import replace
 from functools import cache
@@ -51,8 +51,8 @@ def with_integrals(search, *texts):
 def test_integrals_of_the_map_tend_to_integrals_of_the_flow(name, leading, kept):
     found = beside(name)
     assert [format_rational_function(one.leading) for one in found.limits] == leading
-    assert [one.kept.holds for one in found.limits] == kept
-    assert (found.others, found.lost, found.without_limit) == ((), 0, 0)
+    assert [one.conserved.holds for one in found.limits] == kept
+    assert (found.other_integrals, found.lost, found.without_limit) == ((), 0, 0)
     system = load(name).system
     assert all(is_kept_by_flow(system, one.leading) for one in found.limits)
 
@@ -81,7 +81,7 @@ def test_the_combination_has_the_reported_series(name):
 def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured():
     for search, formula in ((find_integrals(THREE_LINES), "x*y^3*(x + 2*y)^3"), (integrals_of("zander_120"), "x*y^2")):
         found = flow_and_map(search)
-        assert [one.text for one in found.others] == [formula]
+        assert [one.text for one in found.other_integrals] == [formula]
         assert found.lost == 1
         assert ("measured", "F1 is lost up to degree 14: the map shows no integral") in found.lines()
 
@@ -89,17 +89,17 @@ def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured(
 def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
     search = integrals_of("euler_top")
     known = flow_and_map(replace(search, integrals=search.integrals[:1]))
-    assert (len(known.limits), len(known.others), known.without_limit, known.lost) == (1, 1, 1, 0)
+    assert (len(known.limits), len(known.other_integrals), known.without_limit, known.lost) == (1, 1, 1, 0)
     assert ("undecided", "what the map makes of F2: the limits of 1 integral are not known") in known.lines()
     uncounted = replace(search.profile, nullities=(), codimensions=(), with_known=0)
     uncounted = flow_and_map(replace(search, integrals=(), profile=uncounted, by_theorems=0))
-    assert (len(uncounted.others), uncounted.lost) == (2, 0)
+    assert (len(uncounted.other_integrals), uncounted.lost) == (2, 0)
     assert ("undecided", "what the map makes of F1, F2: its integrals were not counted") in uncounted.lines()
 
 
 def test_a_transcendental_integral_is_neither_seen_nor_lost():
     found = beside("lotka_volterra")
-    assert (found.limits, found.others, found.lost) == ((), (), 0)
+    assert (found.limits, found.other_integrals, found.lost) == ((), (), 0)
     assert not any("lost" in text for _, text in found.lines())
     assert found.lines()[0] == (
         "measured",
@@ -115,7 +115,7 @@ def test_leading_terms_that_depend_on_each_other_are_combined(second):
     search = with_integrals(integrals_of("volterra_periodic_3"), f"1 + eps*{SUM}", second)
     found = flow_and_map(search)
     assert format_rational_function(found.limits[0].leading) == "x1 + x2 + x3"
-    assert (len(found.limits), found.others, found.without_limit) == (2, (), 0)
+    assert (len(found.limits), found.other_integrals, found.without_limit) == (2, (), 0)
 
 
 def test_a_function_that_is_no_integral_has_no_limit_among_those_of_the_flow():
@@ -158,15 +158,15 @@ def test_a_polarised_map_deforms_the_energy_of_a_cubic_field():
     """Its integral depends on two points, and tends to the energy where they are those of a solution (cmoq-2015)."""
     found = flow_and_map(integrals_of_duffing())
     [one] = found.limits
-    assert (format_rational_function(one.leading), one.kept.holds) == ("x^4 + 2*y^2", False)
+    assert (format_rational_function(one.leading), one.conserved.holds) == ("x^4 + 2*y^2", False)
     assert one.text.endswith("the map deforms: I1/3 tends to L1 at successive points of one solution")
-    assert (found.others, found.lost, found.density.text) == ((), 0, "1")
+    assert (found.other_integrals, found.lost, found.density.text) == ((), 0, "1")
 
 
 def test_a_polarised_map_may_lose_an_integral():
     """x y^2 (x + y)^3/(x - y + 1), a product of lines that the field keeps zero."""
     found = flow_and_map(find_integrals(polarised(*FOUR_LINES)))
-    assert [one.text for one in found.others] == ["x*y^2*(x + y)^3/(x - y + 1)"]
+    assert [one.text for one in found.other_integrals] == ["x*y^2*(x + y)^3/(x - y + 1)"]
     assert (found.limits, found.lost) == ((), 1)
-    assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, found.others[0].function)
-    assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, found.others[0].function)
+    assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, found.other_integrals[0].function)
+    assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, found.other_integrals[0].function)

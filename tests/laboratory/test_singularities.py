@@ -69,15 +69,15 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
         return {
             (h.multiplicity, h.status, h.contracted_at, h.confined_at, tuple(step.rank for step in h.steps))
             for h in run.hypersurfaces
-            if not h.is_pole and h.polynomial != "Z"
+            if not h.divides_denominator and h.polynomial != "Z"
         }
 
     assert outcomes(unwritten) == outcomes(written)
-    assert {h.polynomial for h in unwritten.hypersurfaces if h.is_pole} == {
-        h.polynomial for h in written.hypersurfaces if h.is_pole
+    assert {h.polynomial for h in unwritten.hypersurfaces if h.divides_denominator} == {
+        h.polynomial for h in written.hypersurfaces if h.divides_denominator
     }
     degrees = sum(h.degree for h in unwritten.hypersurfaces if h.polynomial == "?")
-    assert degrees == sum(h.degree for h in written.hypersurfaces if not h.is_pole and h.polynomial != "Z")
+    assert degrees == sum(h.degree for h in written.hypersurfaces if not h.divides_denominator and h.polynomial != "Z")
 
 
 def test_a_budget_that_is_spent_stops_it():

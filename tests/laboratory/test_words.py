@@ -30,7 +30,7 @@ def derived(map_, terms, eps=None):
     """The word of a composition, and its degrees as its maps give them, followed one by one."""
     limits = Range(12, 60, 40, Budget(), 40)
     found, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
-    pairs = [(h.degree, h.orders) for h in hypersurfaces]
+    pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
     series = degree_series(found.degrees, pairs, [h.stage for h in hypersurfaces])
     return found, coefficients(every_nth(series, found.length), terms + 1)
 
@@ -61,7 +61,7 @@ def test_a_hypersurface_of_another_map_gives_other_degrees():
     map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
     limits = Range(12, 60, 40, Budget(), 40)
     found, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
-    pairs = [(h.degree, h.orders) for h in hypersurfaces]
+    pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
     right, wrong = (
         coefficients(every_nth(degree_series(found.degrees, pairs, stages), 2), 6)
         for stages in ([h.stage for h in hypersurfaces], [1 - h.stage for h in hypersurfaces])

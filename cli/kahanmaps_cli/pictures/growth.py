@@ -138,7 +138,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
             raise click.UsageError("give a SYSTEM or --from FILE, not both")
         record = read_record(options["record"])
         curves = lib.curves_of_record(record, options["record"])
-        is_complete, digits = record.get("whole") is not False, record.get("max_digits", digits)
+        is_complete, digits = record.get("complete") is not False, record.get("max_digits", digits)
     else:
         file = opt.load_system(options["system"], options)
         eps = opt.the_eps(options["eps"], options["time_step"], required=False)

@@ -141,7 +141,7 @@ def of_densities(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_flow(result: AnalysisResult) -> Iterator[Statement]:
-    """A line for each structure of the flow that the map keeps, deforms or loses."""
+    """A line for each structure of the flow that the map conserves, deforms or loses."""
     if result.flow is not None:
         yield from (Statement(Certainty(known), text) for known, text in result.flow.lines())
 

@@ -389,10 +389,10 @@ class _Search:
         if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
             self._compute_patterns()
         found = self.result(ended, message)
-        contracted = self.patterns
-        if contracted is not None and contracted.at and self.eps is None and not self.budget.is_spent:
-            named = with_eps(self.map, rational(contracted.at), contracted.contracted)  # polynomials over Q[eps]
-            found = replace(found, patterns=replace(contracted, contracted=named))
+        patterns = self.patterns
+        if patterns is not None and patterns.at and self.eps is None and not self.budget.is_spent:
+            named = with_eps(self.map, rational(patterns.at), patterns.exceptional)  # polynomials over Q[eps]
+            found = replace(found, patterns=replace(patterns, exceptional=named))
         period = next((n for n, degree in enumerate(self.degrees) if n and degree == 1), None)
         if period is not None:
             found = replace(found, proof=linear_iterate(self.map, self.eps, period))

@@ -113,7 +113,7 @@ class HeightSurvey(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return attributes(self, "kind", "kinds", "text", whole="is_whole", orbits="orbits")
+        return attributes(self, "kind", "kinds", "text", complete="is_whole", orbits="orbits")
 
 
 def height_survey(

@@ -96,20 +96,21 @@ def degree_series(
 def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
     """The hypersurfaces whose preimages have to be counted for the degrees; None if their multiplicities are unknown.
 
-    These are the hypersurfaces that lower the degree, and those with images in one of these, and so on. Multiplicities
-    `beyond` the known ones matter only for hypersurfaces that are needed.
+    These are the hypersurfaces that lower the degree, and those with images in one of these, and so on. Unknown
+    multiplicities, in hypersurfaces `eventually_in` which images lie, matter only where these are needed.
 
-    >>> attracted = OrbitData(((0, 2),), (), 9, True, beyond=(0,))
-    >>> needed([attracted]), needed([OrbitData(((1, 0),), (), 9, True), OrbitData(((0, 1),), (), 9, True, beyond=(0,))])
+    >>> attracted = OrbitData(((0, 2),), (), 9, True, eventually_in=(0,))
+    >>> lowering = OrbitData(((1, 0),), (), 9, True)
+    >>> needed([attracted]), needed([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))])
     ([], None)
     """
     chains = [[k] for k in range(len(patterns))]  # each with those that it becomes, in this order
     for chain in chains:
-        while (returns := patterns[chain[-1]].returns) is not None and returns[1] not in chain:
-            chain.append(returns[1])
+        while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:
+            chain.append(continuation[1])
     found = [k for k, chain in enumerate(chains) if any(row[0] for j in chain for row in patterns[j].rows)]
     for i in found:
-        if any(i in patterns[j].beyond for chain in chains for j in chain):
+        if any(i in patterns[j].eventually_in for chain in chains for j in chain):
             return None
         met_by = (k for k, chain in enumerate(chains) if any(row[i + 1] for j in chain for row in patterns[j].rows))
         found += [k for k in met_by if k not in found]
@@ -169,11 +170,11 @@ def _through_returns(patterns: Sequence[OrbitData], start: int, column: int) -> 
     while k not in seen:
         seen[k] = shift, numerator
         part, denominator = patterns[k].generating_function(column)
-        returns = patterns[k].returns
-        if returns is None:
+        continuation = patterns[k].continues_as
+        if continuation is None:
             return numerator * denominator + z**shift * part, denominator
         numerator += z**shift * part
-        shift, k = shift + returns[0], returns[1]
+        shift, k = shift + continuation[0], continuation[1]
     begin, before = seen[k]
     around = 1 - z ** (shift - begin)
     return before * around + numerator - before, around

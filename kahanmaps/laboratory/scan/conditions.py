@@ -39,7 +39,7 @@ def conditions(
             if one.on_lines is on_lines and degrees in one.classes:
                 rest = points_outside(one.classes[degrees], found, one.prime)
                 smallest = 0 if one.complete else count - one.width
-                parts += [find_components(rest, one.prime, one.seen, smallest, rng, check)] if rest else []
+                parts += [find_components(rest, one.prime, one.measured, smallest, rng, check)] if rest else []
         if count > 1:  # a hyperplane by its coefficients in the order of those of other hypersurfaces
             hypersurfaces = {
                 part.prime: [

@@ -276,7 +276,7 @@ class _ScanRun:
         self.total += _count_members(len(self.family.names), plan)
 
         def on_progress(done: int, _: int) -> None:
-            self.report(f"scan: {done + sum(sweep.seen for sweep in self.sweeps)} of {self.total} members")
+            self.report(f"scan: {done + sum(sweep.measured for sweep in self.sweeps)} of {self.total} members")
 
         for k, (p, lines, width) in enumerate(plan):
             try:
@@ -309,8 +309,8 @@ class _ScanRun:
         it needs more than `most` members.
         """
         lines = [sweep for sweep in self.sweeps if sweep.on_lines]
-        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.seen / sweep.prime), 1) for sweep in lines]
-        is_lacking = any(_count_unassigned(sweep, known) >= 0.5 * sweep.seen / sweep.prime for sweep in lines)
+        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in lines]
+        is_lacking = any(_count_unassigned(sweep, known) >= 0.5 * sweep.measured / sweep.prime for sweep in lines)
         if not is_lacking or _count_members(len(self.family.names), plan) > most:
             return []
         self.sweeps[:] = [sweep for sweep in self.sweeps if not sweep.on_lines]
@@ -322,7 +322,7 @@ class _ScanRun:
         Points are missed if there are unassigned members, but fewer than a curve has, or a hypersurface on random
         lines. The plan is empty if none were, or if the user gave the primes.
         """
-        sizes = ((sweep, sweep.prime if sweep.complete else sweep.seen / sweep.prime) for sweep in self.sweeps)
+        sizes = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
         if primes is not None or not any(0 < _count_unassigned(sweep, known) < 0.5 * size for sweep, size in sizes):
             return []
         plan: list[Choice] = [(p, None, 1) for p in _FURTHER_PRIMES.get(len(self.family.names), ())]

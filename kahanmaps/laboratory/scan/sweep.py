@@ -35,18 +35,19 @@ class TimeOver(Exception):
 
 @dataclass(frozen=True)
 class Sweep:
-    """The special members modulo one prime: `classes` maps degrees to points, and `seen` members were measured.
+    """The special members modulo one prime: `classes` maps degrees to points, and `measured` is the number of
+    members measured.
 
     `generic` are the degrees of the other members. If not `complete`, only members on random affine subspaces of
-    dimension `width` were measured. `accidents` counts generic members that looked special on their first line.
+    dimension `width` were measured. `false_alarms` counts generic members that looked special on their first line.
     """
 
     prime: int
     generic: Degrees
     classes: dict[Degrees, list[Point]]
-    seen: int
+    measured: int
     complete: bool
-    accidents: int
+    false_alarms: int
     width: int = 1
 
     @property

@@ -47,23 +47,23 @@ class OrbitData:
     """A singularity pattern: the rows (mu, nu_1, nu_2, ...) of the steps 1, 2, ..., and their continuation.
 
     `is_settled`: the rows are known for all steps. There are three cases. The columns satisfy the `recurrences`, given
-    by their characteristic polynomials. Or `returns` is (T, j): after T steps the image is the j-th hypersurface, and
-    its pattern continues this one. Or all later rows are zero, as far as they were computed (`followed` steps), except
-    for the multiplicities of the hypersurfaces in `beyond`, in which the images lie again and again: these are not
-    known.
+    by their characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the j-th hypersurface,
+    and its pattern continues this one. Or all later rows are zero, as far as they were computed (`followed` steps),
+    except for the multiplicities of the hypersurfaces in `eventually_in`, in which the images lie again and again:
+    these are not known.
     """
 
     rows: tuple[tuple[int, ...], ...]
     recurrences: tuple[fmpz_poly, ...] = ()
     followed: int = 0
     is_settled: bool = False
-    returns: tuple[int, int] | None = None
-    beyond: tuple[int, ...] = ()
+    continues_as: tuple[int, int] | None = None
+    eventually_in: tuple[int, ...] = ()
 
     @property
     def known(self) -> tuple[object, ...]:
         """The data in which two points on one hypersurface have to agree."""
-        return self.rows[: 2 * self.settled_at], self.is_settled, self.returns, self.beyond
+        return self.rows[: 2 * self.settled_at], self.is_settled, self.continues_as, self.eventually_in
 
     @cached_property
     def settled_at(self) -> int:
@@ -83,8 +83,8 @@ class OrbitData:
             for j, nu in enumerate(row[1:], 1)
             if nu
         ]
-        if self.beyond:
-            names = ", ".join(f"C{k + 1}" for k in self.beyond)
+        if self.eventually_in:
+            names = ", ".join(f"C{k + 1}" for k in self.eventually_in)
             incidences.append(f"{names} at all later steps, which lowers no degree")
         lowers = f"lowers the degree by {_shortened(drops)}" if drops else "lowers no degree"
         return [lowers, f"its image lies in {_shortened(incidences) or 'no exceptional hypersurface'}"]
@@ -92,12 +92,14 @@ class OrbitData:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "divided": [row[0] for row in self.rows],
-            "met": [list(row[1:]) for row in self.rows],
+            "degree_drops": [row[0] for row in self.rows],
+            "incidences": [list(row[1:]) for row in self.rows],
             "recurrences": [[str(c) for c in characteristic.coeffs()] for characteristic in self.recurrences],
-            "settled": self.is_settled,
-            "beyond": [f"C{k + 1}" for k in self.beyond],
-            "returns": None if self.returns is None else {"after": self.returns[0], "as": f"C{self.returns[1] + 1}"},
+            "is_settled": self.is_settled,
+            "eventually_in": [f"C{k + 1}" for k in self.eventually_in],
+            "continues_as": None
+            if self.continues_as is None
+            else {"steps": self.continues_as[0], "hypersurface": f"C{self.continues_as[1] + 1}"},
         }
 
     def of(self, hypersurfaces: Sequence[int]) -> OrbitData:
@@ -259,7 +261,7 @@ class TestCurve:
                 return OrbitData(rows[:up], (), reached, True)
             steps = hit
 
-    def orders(self, first: int) -> OrbitData:
+    def orbit_data(self, first: int) -> OrbitData:
         """The orders along the curve, for as many steps as it takes until they are known for all, or the limits end it.
 
         `first` is the number of steps to begin with. The image may move on a critical hypersurface until something

@@ -160,22 +160,22 @@ POINTS_DIFFER = "its multiplicities along two curves modulo different primes dif
 class Hypersurface:
     """An irreducible hypersurface over Q and its singularity pattern, at one exact eps.
 
-    `is_pole`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian determinant of
-    the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?" where it is
-    too large: then `degree` is that of all components of this multiplicity together. It is contracted by the step
-    `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not happen). `steps`
-    tells the first steps, at the first of two points, modulo the first of the `primes`.
+    `divides_denominator`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian
+    determinant of the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?"
+    where it is too large: then `degree` is that of all components of this multiplicity together. It is contracted by
+    the step `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not
+    happen). `steps` tells the first steps, at the first of two points, modulo the first of the `primes`.
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
-    cannot be said: its pattern has not settled. `orders` are those of this pattern. In a composition that is
+    cannot be said: its pattern has not settled. `orbit_data` is this pattern. In a composition that is
     followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
     `generic` is its polynomial over Q[eps], empty where it is not known.
     """
 
     polynomial: str = "?"
     degree: int = 0
-    is_pole: bool = False
+    divides_denominator: bool = False
     multiplicity: int | None = None
     status: SingularityOutcome = UNDECIDED
     contracted_at: int | None = None
@@ -185,7 +185,7 @@ class Hypersurface:
     note: str = ""
     followed: int = 0
     settled_at: int | None = None
-    orders: OrbitData = field(default=NO_ORBIT_DATA, repr=False)
+    orbit_data: OrbitData = field(default=NO_ORBIT_DATA, repr=False)
     stage: int | None = None
     generic: str = ""
 
@@ -197,27 +197,33 @@ class Hypersurface:
         text, most = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
         cut = text if len(text) <= most else f"{text[:most]} ..."
         name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
-        if self.orders.returns:
-            after, other = self.orders.returns
+        if self.orbit_data.continues_as:
+            after, other = self.orbit_data.continues_as
             outcome = f"mapped onto C{other + 1} after {counted(after, 'step')}"
         elif self.confined_at is not None:
             outcome = f"confined after {counted(self.confined_at, 'step')}"
-        elif self.orders.recurrences:
-            outcome = f"its multiplicities satisfy a recurrence of order {self.orders.settled_at}"
+        elif self.orbit_data.recurrences:
+            outcome = f"its multiplicities satisfy a recurrence of order {self.orbit_data.settled_at}"
         else:
             outcome = f"not confined within {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
-        parts = [
-            f"{name}, degree {self.degree}{', a factor of the denominator' if self.is_pole else ''}: contracted{by}",
-            outcome,
-        ]
-        return "; ".join([", ".join(parts), *self.orders.sentences])
+        factor = ", a factor of the denominator" if self.divides_denominator else ""
+        parts = [f"{name}, degree {self.degree}{factor}: contracted{by}, {outcome}", *self.orbit_data.sentences]
+        return "; ".join(parts)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, without the first steps."""
-        names = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
+        names = (
+            "polynomial",
+            "degree",
+            "divides_denominator",
+            "multiplicity",
+            "status",
+            "contracted_at",
+            "confined_at",
+        )
         found = attributes(self, *names, "followed", "settled_at", "note", "stage", "generic")
-        return {**found, "orders": self.orders.to_json()}
+        return {**found, "orbit_data": self.orbit_data.to_json()}
 
 
 @dataclass(frozen=True)
@@ -229,7 +235,7 @@ class HypersurfaceForm:
     """
 
     form: Any
-    is_pole: bool
+    divides_denominator: bool
     multiplicity: int | None
     excess: int = 0
     stage: int = 0
@@ -315,13 +321,21 @@ def outcome_of(
     if len(outcomes) == _POINTS:
         first, second = outcomes.values()
         found, note = _agreed(first, second, limits.budget.is_spent)
-    known = replace(found, polynomial=text, degree=int(form.form.total_degree()), is_pole=form.is_pole, note=note)
+    known = replace(
+        found,
+        polynomial=text,
+        degree=int(form.form.total_degree()),
+        divides_denominator=form.divides_denominator,
+        note=note,
+    )
     return replace(known, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
 
 def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hypersurface, str]:
     """The outcome at two points, with a note if they differ; a spent budget (`is_over`) may be the reason."""
-    first, second = ((each.status, each.contracted_at, each.confined_at, each.orders.known) for each in (one, other))
+    first, second = (
+        (each.status, each.contracted_at, each.confined_at, each.orbit_data.known) for each in (one, other)
+    )
     if first == second:
         return one, ""
     return Hypersurface(steps=one.steps), BUDGET_SPENT if is_over else POINTS_DIFFER
@@ -385,7 +399,9 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
                 outcome = _UNKNOWN
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
             known.append(key)
-            one = replace(outcome, degree=seen[key[0]], is_pole=poles, multiplicity=key[0], primes=(field.prime,))
+            one = replace(
+                outcome, degree=seen[key[0]], divides_denominator=poles, multiplicity=key[0], primes=(field.prime,)
+            )
             if key in found:  # of two points with the same outcome the one that was followed less counts
                 before = found[key]
                 settled = [k for k in (before.settled_at, one.settled_at) if k is not None]
@@ -429,35 +445,34 @@ def _outcome_at(
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
         return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
-    orders = NO_ORBIT_DATA
+    data = NO_ORBIT_DATA
     if up is None:
-        orders = curve.orders(limits.shown)
+        data = curve.orbit_data(limits.shown)
         # Beyond the steps that are shown it may be a hypersurface again, whose orders go on as those of another one do.
         longest = min(limits.along, limits.reach)
-        while up is None and is_complete and not orders.is_settled and len(run) < longest:
+        while up is None and is_complete and not data.is_settled and len(run) < longest:
             run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)
             status, down, up = _by_ranks([step.rank for step in run], full)
     if up is None:
-        if (
-            not is_complete and not orders.is_settled
-        ):  # what grows by a recurrence, as at superattracting points, is known
+        # At a superattracting point the multiplicities grow too fast for the precision, and yet satisfy a recurrence.
+        if not is_complete and not data.is_settled:
             raise PrecisionTooLow
     else:
-        orders = curve.orbit_data_until_return(up)
-    if is_complete and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = list(curve.all_steps(orders.settled_at + 2, tangents))
+        data = curve.orbit_data_until_return(up)
+    if is_complete and data.is_settled and not data.continues_as and len(run) < data.settled_at + 2 <= limits.reach:
+        run = list(curve.all_steps(data.settled_at + 2, tangents))
         status, down, up = _by_ranks([step.rank for step in run], full)
-    settled = max(up or 0, orders.settled_at) if orders.is_settled else None
+    settled = max(up or 0, data.settled_at) if data.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
-        orders = replace(NO_ORBIT_DATA, followed=orders.followed)
+        data = replace(NO_ORBIT_DATA, followed=data.followed)
     return Hypersurface(
         status=status,
         contracted_at=down,
         confined_at=up,
         steps=tuple(run),
-        followed=orders.followed,
+        followed=data.followed,
         settled_at=settled,
-        orders=orders,
+        orbit_data=data,
     )
 
 

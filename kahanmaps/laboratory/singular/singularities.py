@@ -31,7 +31,7 @@ from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
-from kahanmaps.laboratory.singular.contracted import OrbitDataUnknown, contracted
+from kahanmaps.laboratory.singular.exceptional import OrbitDataUnknown, exceptional_hypersurfaces
 from kahanmaps.laboratory.singular.following import Fraction, Range
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
@@ -159,7 +159,7 @@ class SingularityRun(PrintableResult):
     def shape(self) -> tuple[Any, ...]:
         """Data that are the same for all generic eps: degrees, kinds and patterns."""
         patterns = sorted(
-            (h.degree, h.is_pole, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
+            (h.degree, h.divides_denominator, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
             for h in self.hypersurfaces
         )
         return (self.is_undefined, self.is_dominant, *patterns)
@@ -284,7 +284,7 @@ class Patterns:
     after which patterns have settled; `searched` is the number of steps for which unconfined hypersurfaces were
     followed (None if all are confined); `some_confined` says whether others are confined (None: not known). `running`
     is empty, or the reason why the patterns are not known for all steps. `series` has the coefficients of the numerator
-    and the denominator of the generating function of the degrees, and is empty where it does not follow. `contracted`
+    and the denominator of the generating function of the degrees, and is empty where it does not follow. `exceptional`
     are the exceptional hypersurfaces `at` one of the eps that were tried. Steps are those of the map, except for the
     hypersurfaces of a `word` of maps that is followed map by map.
     """
@@ -294,7 +294,7 @@ class Patterns:
     some_confined: bool | None
     running: str = ""
     series: tuple[tuple[int, ...], ...] = ()
-    contracted: tuple[Hypersurface, ...] = field(default=(), compare=False, repr=False)
+    exceptional: tuple[Hypersurface, ...] = field(default=(), compare=False, repr=False)
     at: str = field(default="", compare=False)
     word: Word | None = field(default=None, compare=False)
 
@@ -321,7 +321,7 @@ class Patterns:
     def sentences(self) -> list[str]:
         """A sentence on the singularity pattern of each exceptional hypersurface, where the degrees are derived."""
         at = f" at eps = {self.at}" if self.at else ""
-        return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
+        return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.exceptional, 1) if self.series]
 
     @property
     def word_text(self) -> str:
@@ -349,9 +349,13 @@ class Patterns:
         found = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
-        contracted = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.contracted, strict=False)]
+        exceptional = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.exceptional, strict=False)]
         maps = self.word.length if self.word_text and self.word else None
-        known = {"generating_function": series or None, "contracted": contracted, "eps": self.at or None}
+        known = {
+            "generating_function": series or None,
+            "exceptional_hypersurfaces": exceptional,
+            "eps": self.at or None,
+        }
         return {**found, **known, "maps_a_step": maps}
 
 
@@ -426,7 +430,7 @@ def patterns(
                     known = _unknown(_STOPPED) if limits.budget.is_spent else _patterns(0, outcomes)
                 else:
                     try:
-                        degree, hypersurfaces = contracted(map_, value, rng, limits)
+                        degree, hypersurfaces = exceptional_hypersurfaces(map_, value, rng, limits)
                         known = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
                     except OrbitDataUnknown as error:
                         known = _unknown(_STOPPED if limits.budget.is_spent else str(error))
@@ -473,13 +477,15 @@ def _patterns(
     lengths = {h.settled_at for h in critical if h.settled_at}
     open_ones = [h.followed for h in critical if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
-    if all(h.orders.is_settled and h.degree for h in critical) and map_degree > 0:
-        if needed([h.orders for h in critical]) is None:
+    if all(h.orbit_data.is_settled and h.degree for h in critical) and map_degree > 0:
+        if needed([h.orbit_data for h in critical]) is None:
             return _unknown(
                 "some images lie in a hypersurface that lowers the degree at all steps, with unknown multiplicities"
             )
         degrees = (map_degree,) if word is None else word.degrees
-        fraction = degree_series(degrees, [(h.degree, h.orders) for h in critical], [h.stage or 0 for h in critical])
+        fraction = degree_series(
+            degrees, [(h.degree, h.orbit_data) for h in critical], [h.stage or 0 for h in critical]
+        )
         if maps > 1:
             try:
                 fraction = every_nth(fraction, maps)

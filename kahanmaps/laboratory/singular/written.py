@@ -74,7 +74,7 @@ def written(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
     critical = _critical_factors(forms, critical_degree)
     if critical is None:
         infinity = forms[0].context().gens()[-1]
-        poles = [HypersurfaceForm(one.form, one.is_pole, None) for one in found.values()]
+        poles = [HypersurfaceForm(one.form, one.divides_denominator, None) for one in found.values()]
         return [*poles, HypersurfaceForm(infinity, False, None)], None
     for factor, multiplicity in critical:
         found[str(factor)] = HypersurfaceForm(factor, str(factor) in found, multiplicity)

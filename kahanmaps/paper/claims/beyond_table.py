@@ -72,7 +72,12 @@ def table(report: Report) -> str:
         if finding.witness is not None:
             left, right = finding.witness.left[0], finding.witness.right[0]
             point = ", ".join(finding.witness.point)
-            lines.append(f"* {finding.claim}: {finding.evidence.summary} at x = ({point}), eps = 1: {left} and {right}")
+            data = finding.evidence.summary.removeprefix("fails for ")
+            variation = VARIATIONS[finding.place["variation"]].title
+            # Formulas are code: * and _ of plain text would become emphasis in Markdown.
+            case = f"`{data}` at `x = ({point})`, `eps = 1`"
+            statement = finding.place["statement"]
+            lines.append(f"* `{statement}`, {variation}: fails for {case}; the sides are `{left}` and `{right}`")
     return "\n".join(lines)
 
 

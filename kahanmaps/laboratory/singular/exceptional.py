@@ -282,7 +282,9 @@ class _Resolved:
         return nu
 
 
-def contracted(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> tuple[int, list[Hypersurface]]:
+def exceptional_hypersurfaces(
+    map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range
+) -> tuple[int, list[Hypersurface]]:
     """The degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
     Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
@@ -364,14 +366,14 @@ def _followed(
     for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
             by_prime = {curve.prime: (curve, tracked) for curve, tracked in pairs}
-            orders = [curve.test_curve(tracked).orders(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
+            orders = [curve.test_curve(tracked).orbit_data(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
             if len(orders) < 2:
                 raise OrbitDataUnknown("a hypersurface has points modulo one prime only")
             if orders[0].known != orders[1].known:
                 raise OrbitDataUnknown(POINTS_DIFFER)
             along = orders[0].of(columns)
             status = CONFINED if any(row[0] for row in along.rows) else NOT_CONFINED
-            known = Hypersurface("Z" if key[2] else "?", size, any(key[1]), 1, status, 1, orders=along)
+            known = Hypersurface("Z" if key[2] else "?", size, any(key[1]), 1, status, 1, orbit_data=along)
             settled = along.settled_at if along.is_settled else None
             found.append(replace(known, primes=tuple(by_prime)[:2], followed=along.followed, settled_at=settled))
     return found
