@@ -135,7 +135,7 @@ def verify(
 
     >>> report = verify(m=2, options=VerifyOptions(sections=(6,)))
     >>> str(report.verdict), report.findings[1].claim
-    ('proved', 'Theorem 9: The Kahan maps of associated vector fields commute, all pairs of the class')
+    ('proved', 'Theorem 9: The Kahan maps of any two associated vector fields commute')
     >>> report.findings[1].also[0].data["error_bound"]
     '2^-145'
     """

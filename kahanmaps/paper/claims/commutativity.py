@@ -19,7 +19,7 @@ def associated_pairs(o: PaperObjects) -> Iterator[tuple[Any, SystemOver, Any]]:
 
 @claim("Theorem 9 (51), (52)", "eq: Phi1", "eps inhomogeneous", blockwise=True)
 def both_maps(o: PaperObjects) -> Pairs:
-    """Both maps in the forms of Section 2
+    """Both maps have the forms of Section 2
     x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, the same for g"""
     yield o.x_tilde, o.solve(o.minus_eps_jac(o.f, o.x), o.x)
     yield o.x_tilde, o.plus_eps_jac(o.f, o.x_tilde) * o.x
@@ -30,7 +30,7 @@ def both_maps(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 9", "th commute", "B H map", blockwise=True)
 def commutativity(o: PaperObjects) -> Pairs:
-    """The Kahan maps of associated vector fields commute, all pairs of the class
+    """The Kahan maps of any two associated vector fields commute
     Phi_f o Phi_g = Phi_g o Phi_f"""
     fields = [(o.f, o.x_tilde), *((g, x_hat) for _, g, x_hat in associated_pairs(o))]
     if len(fields) > 8:  # pairs (f_s, f_t) are pairs (f, f_{st}) of another member: f with all, and neighbours
@@ -44,7 +44,7 @@ def commutativity(o: PaperObjects) -> Pairs:
 
 @claim("(53), (54)", "eq: hat tilde", "map eps inhomogeneous", blockwise=True)
 def compositions(o: PaperObjects) -> Pairs:
-    """The two compositions as products of matrices
+    """The two compositions are products of these matrices
     Phi_g(Phi_f(x)) = (I - eps g'(x~))^{-1} (I + eps f'(x~)) x"""
     for _, g, x_hat in associated_pairs(o):
         first = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde) * o.x)
@@ -55,7 +55,7 @@ def compositions(o: PaperObjects) -> Pairs:
 
 @claim("(55)", "det", "B H", blockwise=True)
 def matrix_equation(o: PaperObjects) -> Pairs:
-    """Commutativity as an identity of matrices, stronger than that of vectors
+    """Commutativity holds as an identity of matrices, which is stronger than that of vectors
     (I - eps g'(x~))^{-1} (I + eps f'(x~)) = (I - eps f'(x^))^{-1} (I + eps g'(x^))"""
     for _, g, x_hat in associated_pairs(o):
         left = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde))
@@ -64,7 +64,7 @@ def matrix_equation(o: PaperObjects) -> Pairs:
 
 @claim("(56)", "det 1", "B H", blockwise=True)
 def matrix_equation_sorted(o: PaperObjects) -> Pairs:
-    """The matrix equation sorted by points
+    """The matrix equation holds with the points sorted
     (I - eps f'(x^)) (I - eps g'(x~))^{-1} = (I + eps g'(x^)) (I + eps f'(x~))^{-1}"""
     for _, g, x_hat in associated_pairs(o):
         left = o.minus_eps_jac(o.f, x_hat) * o.inverse(o.minus_eps_jac(g, o.x_tilde))
