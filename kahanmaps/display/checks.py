@@ -113,7 +113,7 @@ def report_html(report: Report) -> str:
     chosen = list(report.findings)
     if len(chosen) > _MAX_CLAIMS:
         sections = sections_of(report.findings).items()
-        rows = [(_text(title or "claims"), _text(counts(found))) for title, found in sections]
+        rows = [(_text(title or "claims"), _text(counts(findings))) for title, findings in sections]
         pieces.append(markup.table(["section", "claims"], rows))
         chosen = [f for f in chosen if str(f.verdict) != "proved" and not f.control and f.applies]
     if chosen:

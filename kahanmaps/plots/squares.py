@@ -386,5 +386,5 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
 def _table(lattice: Lattice) -> Floats:
     """The points as floating-point numbers, nan where there is none or it is too large for them."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
-    found = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
-    return np.where(np.abs(found) < _LARGEST, found, np.nan)
+    table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
+    return np.where(np.abs(table) < _LARGEST, table, np.nan)

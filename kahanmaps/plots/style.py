@@ -50,8 +50,8 @@ class Style:
         ):
             if value is not None and not low <= value <= high:
                 # An integer may be beyond the range of floating-point numbers.
-                found = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
-                raise InputError(f"found {what.format(found)}, expected {low} to {high}")
+                given = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
+                raise InputError(f"found {what.format(given)}, expected {low} to {high}")
         self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
@@ -61,10 +61,10 @@ class Style:
 
     def require_pixels(self, width: float, height: float) -> None:
         """Raise InputError where a picture of so many inches would not fit into memory, at so many dots per inch."""
-        found = width * height * self.dpi**2
-        if found > _MAX_PIXELS:
+        given = width * height * self.dpi**2
+        if given > _MAX_PIXELS:
             raise InputError(
-                f"found {found:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
+                f"found {given:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
                 f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MAX_PIXELS:.2g}: take fewer dots per "
                 f"inch than {self.dpi}"
             )

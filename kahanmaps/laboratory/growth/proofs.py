@@ -129,8 +129,8 @@ def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> Grow
     order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == one), None)
     periods = [] if order is None else [order, 2 * order]
     proofs = (linear_iterate(map_, eps, period) for period in periods)
-    found = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
-    return None if found is None or found.period == 1 else found
+    periodic = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
+    return None if periodic is None or periodic.period == 1 else periodic
 
 
 def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
@@ -155,7 +155,7 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
         with flint.ctx.workprec(bits):
             isolated: list[tuple[fmpz_poly, Any]] = [(g, g.complex_roots()) for g in numbers]
             reals = [(root.real, g) for g, roots in isolated for root, _ in roots if root.imag == 0]
-            (radius, polynomial), *others = sorted(reals, key=lambda one: one[0].mid().fmpq(), reverse=True)
+            (radius, polynomial), *others = sorted(reals, key=lambda pair: pair[0].mid().fmpq(), reverse=True)
             eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal]
             moduli = [(abs(root), k) for roots, k in eigenvalues for root, _ in roots]
             largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(radius)]

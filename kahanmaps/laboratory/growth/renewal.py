@@ -108,13 +108,13 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
     for chain in chains:
         while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:
             chain.append(continuation[1])
-    found = [k for k, chain in enumerate(chains) if any(row[0] for j in chain for row in patterns[j].rows)]
-    for i in found:
+    indices = [k for k, chain in enumerate(chains) if any(row[0] for j in chain for row in patterns[j].rows)]
+    for i in indices:
         if any(i in patterns[j].eventually_in for chain in chains for j in chain):
             return None
         met_by = (k for k, chain in enumerate(chains) if any(row[i + 1] for j in chain for row in patterns[j].rows))
-        found += [k for k in met_by if k not in found]
-    return sorted(found)
+        indices += [k for k in met_by if k not in indices]
+    return sorted(indices)
 
 
 def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:

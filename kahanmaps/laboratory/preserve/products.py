@@ -408,8 +408,10 @@ def _assembled(
             if cost(best) >= cost(vector):
                 density = product(vector, constant)
             vector = best
-    one = of_densities[0][0]
-    return Products(tuple(product(v, one) for v in integrals), density, tuple(product(v, c) for v, c in time_dependent))
+    first_density = of_densities[0][0]
+    return Products(
+        tuple(product(v, first_density) for v in integrals), density, tuple(product(v, c) for v, c in time_dependent)
+    )
 
 
 def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:

@@ -46,9 +46,9 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
     height = _HEIGHTS[all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))]
     for _ in range(_TRIES if len(equations) < count else 1):
         count_work(10 + 20 * sum(map(len, equations)))
-        found = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))
-        if found:
-            return rng.choice(found)
+        points = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))
+        if points:
+            return rng.choice(points)
     return None
 
 
@@ -118,13 +118,13 @@ class Scanned:
         else:
             return None
         line = Line(over, rng, Budget(), most)
-        found: list[int] = []
+        degrees: list[int] = []
         try:
             for degree in expected:
                 line.step(max(1, degree))
-                found.append(line.degree)
+                degrees.append(line.degree)
         except Stopped:
             pass
         except ZeroDivisionError:
-            found += [-1] * (len(expected) - len(found))
-        return tuple(found)
+            degrees += [-1] * (len(expected) - len(degrees))
+        return tuple(degrees)

@@ -67,20 +67,20 @@ def find_components(
 
     count = len(points[0])
     components = ModularComponents(prime)
-    rest = np.array(points, dtype=np.int64)
+    unassigned = np.array(points, dtype=np.int64)
 
     def affine_subspaces(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
         """Affine subspaces with so many of the points, and which of these are in them."""
         for _ in range(_TRIES if count <= 3 else _MANY):
             check()
-            if len(rest) < needed:
+            if len(unassigned) < needed:
                 return
-            count_work(10 + len(rest) * (count - dimension) / 100)
-            sample = [[*rest[i].tolist(), 1] for i in rng.sample(range(len(rest)), dimension + 1)]
+            count_work(10 + len(unassigned) * (count - dimension) / 100)
+            sample = [[*unassigned[i].tolist(), 1] for i in rng.sample(range(len(unassigned)), dimension + 1)]
             rows = null_space(sample, count + 1, prime)
             if len(rows) == count - dimension:
-                ones = np.ones((len(rest), 1), dtype=np.int64)
-                inside = ~(np.hstack([rest, ones]) @ np.array(rows).T % prime).any(axis=1)
+                ones = np.ones((len(unassigned), 1), dtype=np.int64)
+                inside = ~(np.hstack([unassigned, ones]) @ np.array(rows).T % prime).any(axis=1)
                 if inside.sum() >= needed:
                     yield tuple(map(tuple, rows)), inside
 
@@ -89,22 +89,22 @@ def find_components(
         needed = max(_SHARE * seen / prime ** (count - dimension), dimension + 3)
         for rows, inside in affine_subspaces(dimension, needed):
             components.linear.setdefault(dimension, []).append(rows)
-            rest = rest[~inside]
+            unassigned = unassigned[~inside]
         if dimension == count - 1:
-            for form, inside in _hypersurfaces(rest, needed, prime, rng, check):
+            for form, inside in _hypersurfaces(unassigned, needed, prime, rng, check):
                 components.hypersurfaces.setdefault((), []).append(form)
-                rest = rest[~inside]
+                unassigned = unassigned[~inside]
             continue
         for rows, inside in affine_subspaces(dimension + 1, needed):
             free = [k for k in range(count) if k not in pivots(rows)]
-            places, kept = np.flatnonzero(inside), np.ones(len(rest), dtype=bool)
-            for form, some in _hypersurfaces(rest[inside][:, free], needed, prime, rng, check):
+            places, kept = np.flatnonzero(inside), np.ones(len(unassigned), dtype=bool)
+            for form, some in _hypersurfaces(unassigned[inside][:, free], needed, prime, rng, check):
                 components.hypersurfaces.setdefault(rows, []).append(form)
                 kept[places[some]] = False
                 places = places[~some]
-            rest = rest[kept]
-    if not smallest and len(rest) <= _MOST_POINTS:
-        equations = ([[*(int(i == j) for j in range(count)), -y] for i, y in enumerate(x)] for x in rest.tolist())
+            unassigned = unassigned[kept]
+    if not smallest and len(unassigned) <= _MOST_POINTS:
+        equations = ([[*(int(i == j) for j in range(count)), -y] for i, y in enumerate(x)] for x in unassigned.tolist())
         single = [tuple(map(tuple, echelon(rows, prime))) for rows in equations]
         components.linear.setdefault(0, []).extend(single)
     return components
@@ -164,12 +164,12 @@ def _factors(form: Sequence[int], degree: int, count: int, prime: int) -> list[t
     """The irreducible factors of a polynomial and their degrees; of coefficients the first is 1 that is not 0."""
     context = nmod_mpoly_ctx.get([f"a{k}" for k in range(count)], modulus=prime, ordering=Ordering.degrevlex)
     terms = {e: c for e, c in zip(exponents_up_to(count, degree), form, strict=True) if c}
-    found = []
+    factors = []
     count_work(50 + 5 * len(terms))
     for factor, _ in context.from_dict(terms).factor()[1]:
         values = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
         power = max(map(sum, values))
         row = [values.get(e, 0) for e in exponents_up_to(count, power)]
         scale = pow(next(c for c in row if c), -1, prime)
-        found.append((tuple(c * scale % prime for c in row), power))
-    return found
+        factors.append((tuple(c * scale % prime for c in row), power))
+    return factors

@@ -38,7 +38,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     >>> symmetries([Sweep(7, (2,), {(1,): points}, 49, True, 0)], lines, ["a", "b"])
     [('b', 'a'), ('a', '-b')]
     """
-    complete = [(one.prime, one.special) for one in sweeps if one.complete]
+    complete = [(sweep.prime, sweep.special) for sweep in sweeps if sweep.complete]
     if not complete or not components:
         return []
     generators: list[Change] = []

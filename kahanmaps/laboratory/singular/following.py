@@ -277,12 +277,15 @@ class TestCurve:
                 hit, reached = self._next_hit(run[-1].limit, len(run), limits.reach)
                 if hit is None:
                     return OrbitData(rows[:last], (), reached, True)
-            found = [find_recurrence(column) for column in zip(*rows, strict=True)]
-            repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
+            recurrences = [find_recurrence(column) for column in zip(*rows, strict=True)]
+            repeats = all(
+                recurrence is not None and len(rows) >= max(_CONSTANT, 2 * recurrence.order + _CHECKED)
+                for recurrence in recurrences
+            )
             is_cut = not is_complete and not limits.budget.is_spent  # by the precision
             is_far = len(run) >= min(limits.reach, limits.along)
             if rows and repeats and (is_far or (is_cut and (most == _MOST_ALONG or len(rows) >= limits.enough))):
-                laws = tuple(one.characteristic for one in found if one is not None)
+                laws = tuple(recurrence.characteristic for recurrence in recurrences if recurrence is not None)
                 kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
                 return OrbitData(rows[:kept], laws, len(run), True)
             if is_cut and most < _MOST_ALONG:

@@ -108,7 +108,7 @@ def critical_points(
         value = value // shared
     if value.degree() < 1:
         return [], {}
-    found, degrees = [], dict[int, int]()
+    points, degrees = [], dict[int, int]()
     for part, exponent in value.factor_squarefree()[1]:
         power = int(exponent)
         degrees[power] = degrees.get(power, 0) + int(part.degree())
@@ -129,8 +129,8 @@ def critical_points(
             here, *there = (int(function(X, times)[terms - 1]) for X in moved)
             gradient = [(c - here) % p for c in there]
             if any(gradient):
-                found.append(CriticalPoint(tuple(point), tuple(gradient), power))
-    return found, degrees
+                points.append(CriticalPoint(tuple(point), tuple(gradient), power))
+    return points, degrees
 
 
 def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> nmod_poly:
@@ -222,8 +222,8 @@ class Hypersurface:
             "contracted_at",
             "confined_at",
         )
-        found = attributes(self, *names, "followed", "settled_at", "note", "stage", "generic")
-        return {**found, "orbit_data": self.orbit_data.to_json()}
+        data = attributes(self, *names, "followed", "settled_at", "note", "stage", "generic")
+        return {**data, "orbit_data": self.orbit_data.to_json()}
 
 
 @dataclass(frozen=True)
@@ -260,16 +260,16 @@ class Tracking:
         if self.stage is None:
             return equations
         letters = Letters([*equations[self.stage : self.period], *equations[: self.stage]])
-        letters.places = tuple(one.stage - self.stage for one in (*self.critical, *self.excess))
+        letters.places = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.excess))
         return letters
 
     def along(self, form: Any, field: PrimeField) -> Tracked:
         """What is tracked along a curve through the hypersurface of a form."""
         forms, stage = [*self.critical, *self.excess], self.stage or 0
         return Tracked(
-            tuple(form_order(one.form, field) for one in forms),
-            tuple(one.excess for one in forms),
-            tuple(int(one.form == form and one.stage == stage) for one in forms),
+            tuple(form_order(tracked.form, field) for tracked in forms),
+            tuple(tracked.excess for tracked in forms),
+            tuple(int(tracked.form == form and tracked.stage == stage) for tracked in forms),
             len(self.critical),
         )
 
@@ -292,7 +292,7 @@ def outcome_of(
     followed. Source: grammaticos-ramani-papageorgiou-1991.
     """
     outcomes: dict[int, Hypersurface] = {}  # by the primes
-    found, note = _UNKNOWN, BUDGET_SPENT
+    outcome, note = _UNKNOWN, BUDGET_SPENT
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.budget.is_spent:
             break
@@ -320,9 +320,9 @@ def outcome_of(
             break
     if len(outcomes) == _POINTS:
         first, second = outcomes.values()
-        found, note = _agreed(first, second, limits.budget.is_spent)
+        outcome, note = _agreed(first, second, limits.budget.is_spent)
     known = replace(
-        found,
+        outcome,
         polynomial=text,
         degree=int(form.form.total_degree()),
         divides_denominator=form.divides_denominator,
@@ -331,19 +331,20 @@ def outcome_of(
     return replace(known, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
 
-def _agreed(one: Hypersurface, other: Hypersurface, is_over: bool) -> tuple[Hypersurface, str]:
+def _agreed(first_outcome: Hypersurface, second_outcome: Hypersurface, is_over: bool) -> tuple[Hypersurface, str]:
     """The outcome at two points, with a note if they differ; a spent budget (`is_over`) may be the reason."""
     first, second = (
-        (each.status, each.contracted_at, each.confined_at, each.orbit_data.known) for each in (one, other)
+        (each.status, each.contracted_at, each.confined_at, each.orbit_data.known)
+        for each in (first_outcome, second_outcome)
     )
     if first == second:
-        return one, ""
-    return Hypersurface(steps=one.steps), BUDGET_SPENT if is_over else POINTS_DIFFER
+        return first_outcome, ""
+    return Hypersurface(steps=first_outcome.steps), BUDGET_SPENT if is_over else POINTS_DIFFER
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
     """As `unwritten`, with the poles and infinity; without any polynomial."""
-    found = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
+    hypersurfaces = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
         try:
@@ -355,8 +356,8 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: R
             continue
         except PrecisionTooLow:
             outcome = _UNKNOWN
-        return [*found, replace(outcome, polynomial="Z", degree=1, primes=(field.prime,))]
-    return found
+        return [*hypersurfaces, replace(outcome, polynomial="Z", degree=1, primes=(field.prime,))]
+    return hypersurfaces
 
 
 def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
@@ -365,11 +366,13 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
     At one exact `eps` (half the time step), on lines modulo random primes; the poles, or the others but for infinity.
     One with a multiplicity of which no point was found is undecided. Source: zander-2021.
     """
-    found: dict[tuple[Any, ...], Hypersurface] = {}
-    alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}  # the places in `found` of points with the same orders
+    hypersurfaces: dict[tuple[Any, ...], Hypersurface] = {}
+    alike: dict[
+        tuple[Any, ...], list[tuple[Any, ...]]
+    ] = {}  # the keys in `hypersurfaces` of points with the same orders
     degrees: dict[int, int] = {}
     for line in range(4 * _MIN_LINES):
-        if limits.budget.is_spent or (line >= _MIN_LINES and set(degrees) <= {key[0] for key in found}):
+        if limits.budget.is_spent or (line >= _MIN_LINES and set(degrees) <= {key[0] for key in hypersurfaces}):
             break
         field = GF(random_prime(rng))
         try:
@@ -388,8 +391,8 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             known = alike.setdefault(orders, [])
             if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
-                primes = dict.fromkeys((*found[known[0]].primes, field.prime))
-                found[known[0]] = replace(found[known[0]], primes=tuple(primes))
+                primes = dict.fromkeys((*hypersurfaces[known[0]].primes, field.prime))
+                hypersurfaces[known[0]] = replace(hypersurfaces[known[0]], primes=tuple(primes))
                 continue
             try:
                 outcome = _outcome_at(equations, critical.point, tangents, rng, limits)
@@ -399,23 +402,23 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
                 outcome = _UNKNOWN
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
             known.append(key)
-            one = replace(
+            hypersurface = replace(
                 outcome, degree=seen[key[0]], divides_denominator=poles, multiplicity=key[0], primes=(field.prime,)
             )
-            if key in found:  # of two points with the same outcome the one that was followed less counts
-                before = found[key]
-                settled = [k for k in (before.settled_at, one.settled_at) if k is not None]
-                found[key] = replace(
+            if key in hypersurfaces:  # of two points with the same outcome the one that was followed less counts
+                before = hypersurfaces[key]
+                settled = [k for k in (before.settled_at, hypersurface.settled_at) if k is not None]
+                hypersurfaces[key] = replace(
                     before,
-                    primes=tuple(dict.fromkeys((*before.primes, *one.primes))),
-                    followed=min(before.followed, one.followed),
+                    primes=tuple(dict.fromkeys((*before.primes, *hypersurface.primes))),
+                    followed=min(before.followed, hypersurface.followed),
                     settled_at=max(settled) if len(settled) == 2 else None,
                 )
             else:
-                found[key] = one
-    for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
-        found[(multiplicity,)] = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT)
-    return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
+                hypersurfaces[key] = hypersurface
+    for multiplicity in set(degrees) - {h.multiplicity for h in hypersurfaces.values()}:
+        hypersurfaces[(multiplicity,)] = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT)
+    return sorted(hypersurfaces.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
 
 def _by_ranks(ranks: Sequence[int], full: int) -> tuple[SingularityOutcome, int | None, int | None]:

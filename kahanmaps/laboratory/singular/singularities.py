@@ -110,7 +110,7 @@ class SingularityRun(PrintableResult):
     def rows(self) -> list[dict[str, Any]]:
         """A row for each hypersurface, for `pandas.DataFrame(run.rows())` and the like."""
         names = ("polynomial", "degree", "status", "contracted_at", "confined_at")
-        return [attributes(one, *names) for one in self.hypersurfaces]
+        return [attributes(hypersurface, *names) for hypersurface in self.hypersurfaces]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -271,8 +271,8 @@ def _map_by_map(
 ) -> SingularityRun | None:
     """The run for a composition whose maps are followed one by one; None where one of them is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
-    found = followed_map_by_map(map_, run.eps, rng, limits, progress)
-    return found and replace(run, word=found[0], hypersurfaces=tuple(found[1]), stopped=limits.budget.is_spent)
+    followed = followed_map_by_map(map_, run.eps, rng, limits, progress)
+    return followed and replace(run, word=followed[0], hypersurfaces=tuple(followed[1]), stopped=limits.budget.is_spent)
 
 
 @dataclass(frozen=True)
@@ -346,7 +346,7 @@ class Patterns:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        found = attributes(self, "lengths", "searched", "some_confined", "running", "text")
+        data = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
         exceptional = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.exceptional, strict=False)]
@@ -356,7 +356,7 @@ class Patterns:
             "exceptional_hypersurfaces": exceptional,
             "eps": self.at or None,
         }
-        return {**found, **known, "maps_a_step": maps}
+        return {**data, **known, "maps_a_step": maps}
 
 
 def _ascending(coefficients: Sequence[int]) -> str:
@@ -376,7 +376,7 @@ def _ascending(coefficients: Sequence[int]) -> str:
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
     """The patterns from runs at one eps, or at two that represent all; `at`: the map depends on eps."""
-    found = set()
+    settled = set()
     for run in runs:
         if not run.is_dominant:
             known = _not_dominant(run.eps)
@@ -384,8 +384,8 @@ def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
             known = _unknown(_STOPPED)
         else:
             known = _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
-        found.add(known)
-    return found.pop() if len(found) == 1 else _unknown(_DIFFERENT)
+        settled.add(known)
+    return settled.pop() if len(settled) == 1 else _unknown(_DIFFERENT)
 
 
 def patterns(
@@ -403,9 +403,9 @@ def patterns(
     """
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
-    found = _unknown("")
+    result = _unknown("")
     for again in range(_DRAWS if eps is None else 1):
-        if again and (not found.running or budget.is_spent):
+        if again and (not result.running or budget.is_spent):
             break
         values = default_eps(map_, seed + again) if eps is None else (eps,)
         stages = budget.share([1] * len(values))
@@ -417,7 +417,7 @@ def patterns(
                 runs = [singularities(map_, value, steps=steps, seed=seed, effort=stage) for value, stage in given]
             except TooLongFormula:
                 return _unknown("the composition is too long for its singularities to be followed")
-            found = patterns_of(runs, map_.has_eps)
+            result = patterns_of(runs, map_.has_eps)
         else:
             several = set()
             for value, stage in zip(values, stages, strict=True):
@@ -435,8 +435,8 @@ def patterns(
                     except OrbitDataUnknown as error:
                         known = _unknown(_STOPPED if limits.budget.is_spent else str(error))
                 several.add(known)
-            found = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
-    return found
+            result = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
+    return result
 
 
 def _digits(map_: MapFamily, eps: fmpq) -> int:

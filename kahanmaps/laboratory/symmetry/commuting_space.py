@@ -93,17 +93,17 @@ def commutator_equations(
     n = f.dim
     of_f = _Terms(coefficients_of(f), n)
     of_g = _Terms(combination(basis, weights, weights[0].context().constant(0)), n)
-    found: list[fmpq_mpoly] = []
+    equations: list[fmpq_mpoly] = []
     idle = 0
     while idle < 2 and not budget.is_spent:
         point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
         x: Series = [point, *([fmpq(0)] * n for _ in range(order))]
         left, right = of_f.step(of_g.step(x)), of_g.step(of_f.step(x))
         new = [a - b for u, v in zip(left, right, strict=True) for a, b in zip(u, v, strict=True)]
-        spanned = independent([*found, *(p for p in new if isinstance(p, fmpq_mpoly))])
-        idle = idle + 1 if len(spanned) == len(found) else 0
-        found = spanned
-    return found
+        spanned = independent([*equations, *(p for p in new if isinstance(p, fmpq_mpoly))])
+        idle = idle + 1 if len(spanned) == len(equations) else 0
+        equations = spanned
+    return equations
 
 
 class _Terms:
@@ -228,10 +228,10 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
             flat = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
             (relation,) = nullspace(QQ, flat)
             replaced = max(k for k in range(len(fields)) if relation[k] != 0)
-            rest = [k for k in range(len(fields)) if k != replaced]
+            other_indices = [k for k in range(len(fields)) if k != replaced]
             identity = [QQ.identity(n)] if matrices else []
-            found = (f, *(fields[k] for k in rest))
-            return CommutingSpace(found, (*identity, *(matrices[k] for k in rest if matrices)), len(found))
+            basis = (f, *(fields[k] for k in other_indices))
+            return CommutingSpace(basis, (*identity, *(matrices[k] for k in other_indices if matrices)), len(basis))
         needed = len(rows) + 2 * n
 
 

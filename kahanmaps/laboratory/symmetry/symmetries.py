@@ -287,9 +287,9 @@ def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
             generators.append(element)
             group = _generated([t.S for t in generators], len(element.r))
     for element in list(generators):
-        rest = [t for t in generators if t is not element]
-        if len(_generated([t.S for t in rest], len(element.r))) == len(group):
-            generators = rest
+        others = [t for t in generators if t is not element]
+        if len(_generated([t.S for t in others], len(element.r))) == len(group):
+            generators = others
     return generators
 
 
@@ -400,8 +400,8 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
     solved = solve_system([*equations, gens[-1]], r, budget)
     if not solved.components:
         return None
-    found = solved.components[0].point
-    return found if is_symmetry(f, S, found, sign) else None
+    point = solved.components[0].point
+    return point if is_symmetry(f, S, point, sign) else None
 
 
 def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:

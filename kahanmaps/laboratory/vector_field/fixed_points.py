@@ -141,14 +141,14 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     context = ring(system.variables)
     budget = budget_for("fixed points", effort)
     solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), budget)
-    found, undecided = [_on(system, part, []) for part in solved.components], ""
+    components, undecided = [_on(system, part, []) for part in solved.components], ""
     for part in (*solved.conjugate, *solved.unsolved):
         basis = None if part in solved.without_basis else groebner(part.equations, budget)
         if basis is None:
             undecided = solved.reason or (SPENT if budget.is_spent else "a Groebner basis would be too large")
         elif not any(p.is_constant() for p in basis):
-            found.append(_on(system, part, basis))
-    return FixedPointSearch(tuple(found), undecided)
+            components.append(_on(system, part, basis))
+    return FixedPointSearch(tuple(components), undecided)
 
 
 def _on(system: QuadraticSystem, part: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:

@@ -73,7 +73,7 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
     n = system.dim
     f = VectorField(system)
     drawn = np.random.default_rng(0).uniform(-3, 3, (_NEWTON_STARTS if n <= _MAX_DIMENSION else 0, n))
-    found: list[Equilibrium] = []
+    all_equilibria: list[Equilibrium] = []
     for x in (np.zeros(n), np.ones(n), *drawn):
         for _ in range(_NEWTON_STEPS):
             value, bound = f(x), 1e-12 * (1 + float(np.abs(x).max()))
@@ -81,13 +81,13 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
                 nearest = np.round(x, 9)
                 point = nearest if np.abs(f(nearest)).max() <= bound else x
                 # Where an equilibrium is degenerate, Newton's method ends somewhat beside it: once is enough.
-                if not any(np.allclose(point, other.point, atol=1e-3) for other in found):
-                    found.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
+                if not any(np.allclose(point, other.point, atol=1e-3) for other in all_equilibria):
+                    all_equilibria.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
                 break
             x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
             if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
                 break
-    return found
+    return all_equilibria
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,24 +126,28 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     length = np.linalg.norm(arrows, axis=1, keepdims=True)
     with np.errstate(all="ignore"):
         arrows = np.where(length > 0, arrows / length, 0)
-    every = equilibria(system)
-    if len(every) > 2**system.dim:  # more than conics have in common: they fill curves
-        every = []
-    shown = [one for one in every if np.all((one.point[order] >= low) & (one.point[order] <= high))]
+    all_equilibria = equilibria(system)
+    if len(all_equilibria) > 2**system.dim:  # more than conics have in common: they fill curves
+        all_equilibria = []
+    shown = [
+        equilibrium
+        for equilibrium in all_equilibria
+        if np.all((equilibrium.point[order] >= low) & (equilibrium.point[order] <= high))
+    ]
     box = tuple(window[k] for k in order)
     size = np.array([b - a for a, b in box])
     branches = []
-    for saddle in (one for one in shown if one.kind == SADDLE):
+    for saddle in (equilibrium for equilibrium in shown if equilibrium.kind == SADDLE):
         for value, vector in zip(saddle.values.real, saddle.vectors.real.T, strict=True):
             offset = vector / np.linalg.norm(vector / size) * 1e-3
             for start in (saddle.point + offset, saddle.point - offset):
                 branches.append(np.vstack([saddle.point, solution(f, start, box, np.copysign(np.inf, value))]))
-    kinds = tuple((one.kind, one.point[order]) for one in shown)
+    kinds = tuple((equilibrium.kind, equilibrium.point[order]) for equilibrium in shown)
     return Flow(places, arrows, kinds, tuple(curve[:, order] for curve in branches))
 
 
 def projected_solutions(
-    system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], found: Trajectories, backward: bool
+    system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], trajectories: Trajectories, backward: bool
 ) -> tuple[FloatArray, ...]:
     """The solutions through the starts of orbits, as long as these are followed and around them, along some axes.
 
@@ -152,10 +156,10 @@ def projected_solutions(
     functions = [axis for axis in axes if not isinstance(axis, str)]
     if len(functions) < len(axes):
         raise InputError("the flow is drawn as curves in phase space: it does not go with the axis step")
-    box = window_of(found.points.reshape(-1, system.dim), found.points[0])
-    steps = len(found.points) - 1
+    box = window_of(trajectories.points.reshape(-1, system.dim), trajectories.points[0])
+    steps = len(trajectories.points) - 1
     time = float(time_step(eps) * steps) * (-1 if backward else 1) if steps else None
-    curves = (solution(VectorField(system), start, box, time) for start in found.points[0])
+    curves = (solution(VectorField(system), start, box, time) for start in trajectories.points[0])
     return tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves)
 
 
@@ -179,8 +183,8 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
 
     def direction(x: FloatArray) -> FloatArray:
         value: FloatArray = sign * f(x)
-        found = float(np.linalg.norm(value / size))
-        return value / found if found > 0 else value
+        norm = float(np.linalg.norm(value / size))
+        return value / norm if norm > 0 else value
 
     stop = _SLOW * max(map(speed, (low, high, middle, start)))
     points, x, spent = [start], start, 0.0
@@ -229,12 +233,14 @@ def automatic_starts(
     """
     plane = [index for index in plane if index < system.dim][:2]
     # Equilibria, those first at which the field expands least, then those without negative coordinates; the origin.
-    order = sorted(equilibria(system), key=lambda one: (one.expansion, bool((one.point < 0).any())))
-    centers = [one.point for one in order[:_CENTERS]]
+    order = sorted(
+        equilibria(system), key=lambda equilibrium: (equilibrium.expansion, bool((equilibrium.point < 0).any()))
+    )
+    centers = [equilibrium.point for equilibrium in order[:_CENTERS]]
     if all(center.any() for center in centers):
         centers.append(np.zeros(system.dim))
     others = [index for index in range(system.dim) if index not in plane]
-    found: list[tuple[int, FloatArray]] = []
+    candidates: list[tuple[int, FloatArray]] = []
     for center in centers:
         # Around the origin of a homogeneous field a smaller size is only a slower motion.
         is_scaled = system.is_homogeneous and not center.any()
@@ -259,5 +265,5 @@ def automatic_starts(
             stays = (distance <= _FAR * np.abs(starts - center).max()).all(axis=0)
             if (stays & moves).all():
                 return starts
-            found.append((int((stays & moves).sum()), starts))
-    return max(found, key=lambda one: one[0])[1]
+            candidates.append((int((stays & moves).sum()), starts))
+    return max(candidates, key=lambda equilibrium: equilibrium[0])[1]

@@ -70,12 +70,12 @@ def field_of(file: SystemFile) -> QuadraticSystem | None:
 
 def float_normal_form(file: SystemFile) -> tuple[NormalForm | None, str]:
     """The normal form in which floats can step, or None and why there is none."""
-    found = file.normal_form
-    if isinstance(found, NoNormalForm):
-        return None, found.reason
-    if found.T is not None:
+    form = file.normal_form
+    if isinstance(form, NoNormalForm):
+        return None, form.reason
+    if form.T is not None:
         return None, "in floating point only J = [[0, I], [-I, 0]] has one"
-    return found.form, ""
+    return form.form, ""
 
 
 def ensemble_of_file(

@@ -43,17 +43,17 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
     first = points[:0] if starts is None else starts
     reach = float(np.abs(first[np.isfinite(first)]).max(initial=0))
     window = []
-    for column, wanted in zip(points.T, first.T, strict=True):
-        low, high = main_range(column, wanted)
+    for column, required in zip(points.T, first.T, strict=True):
+        low, high = main_range(column, required)
         if 0 < _UNBOUNDED * reach < max(-low, high):
-            low, high = main_range(column[np.abs(column) <= _SHOWN * reach], wanted)
+            low, high = main_range(column[np.abs(column) <= _SHOWN * reach], required)
         unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in which nothing overflows
         margin = (high / unit - low / unit) * _MARGIN
         window.append(((low / unit - margin) * unit, (high / unit + margin) * unit))
     return tuple(window)
 
 
-def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[float, float]:
+def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
     """The range of the values as `window_of` chooses it, without a margin; `wanted` are the starts.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
@@ -64,8 +64,8 @@ def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[fl
     if unit == 0:
         return -1.0, 1.0
     parts = [values]
-    if wanted is not None and len(wanted := np.clip(wanted[np.isfinite(wanted)], -_LARGEST, _LARGEST)):
-        parts.append(wanted)
+    if required is not None and len(required := np.clip(required[np.isfinite(required)], -_LARGEST, _LARGEST)):
+        parts.append(required)
     # What all but a tenth at either end fill, in a unit in which nothing overflows.
     ends = [np.percentile(part, [_SHARE, 100 - _SHARE], method="nearest") / unit for part in parts]
     first, last = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))

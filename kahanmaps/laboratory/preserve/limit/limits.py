@@ -175,9 +175,9 @@ class FlowAndMap:
             statements.append((str(timed.integral.verdict), text))
         if self.polynomials_degree > 1:
             which, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
-            found = f"of the flow of degree <= {self.polynomials_degree} were found"
+            degrees = f"of the flow of degree <= {self.polynomials_degree} were found"
             statements.append(
-                ("measured", f"no {which}Darboux polynomials {found} {exceptions} factors of known integrals")
+                ("measured", f"no {which}Darboux polynomials {degrees} {exceptions} factors of known integrals")
             )
         if self.polynomials_reason:
             which = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
