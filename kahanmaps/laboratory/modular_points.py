@@ -26,7 +26,7 @@ Point = tuple[int, ...]
 Values = Sequence[Any]  # nmod, whose products take half the time of those of Python's integers, or integers
 Exponent = tuple[int, ...]
 _TRIES = 60
-_NO_VALUE = "the map is not defined at random points modulo a prime"
+_UNDEFINED = "the map is not defined at random points modulo a prime"
 
 
 class NoPoint(KahanmapsError):
@@ -89,7 +89,7 @@ class ModularMap:
             else:
                 missed += 1
                 if missed > _TRIES:
-                    raise NoPoint(_NO_VALUE)
+                    raise NoPoint(_UNDEFINED)
 
     def orbit(self, count: int) -> list[Point]:
         """Return the first `count` points of an orbit, or all of its points if the orbit has a smaller period.
@@ -106,7 +106,7 @@ class ModularMap:
             else:
                 return points
             longest = max(longest, len(points))
-        raise NoPoint(_NO_VALUE if longest == 1 else "orbits modulo a prime meet the singular set")
+        raise NoPoint(_UNDEFINED if longest == 1 else "orbits modulo a prime meet the singular set")
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None

@@ -62,7 +62,7 @@ def test_in_a_small_field_the_period_and_the_poles_are_those_that_walking_finds(
             assert found.period == field.prime
     expected = {PeriodKind.STEPPED} if field.prime <= 3 else {PeriodKind.SMOOTH, PeriodKind.ADDITIVE, PeriodKind.FIXED}
     if field.prime > 3 and field.q < 20:
-        expected |= {PeriodKind.TRIANGLE, PeriodKind.VERTEX, PeriodKind.AT_POLE, PeriodKind.NO_VALUE}
+        expected |= {PeriodKind.TRIANGLE, PeriodKind.VERTEX, PeriodKind.AT_POLE, PeriodKind.UNDEFINED}
     assert expected <= set(kinds)
 
 

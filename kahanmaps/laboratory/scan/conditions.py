@@ -19,16 +19,16 @@ from kahanmaps.laboratory.scan.modular_components import ModularComponents, find
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
-_SHARE = 0.5  # of the prime, points of a curve at least
+_SHARE = 0.5  # a curve has at least this share of p points
 
 
 def conditions(
     degrees: Degrees, sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
 ) -> list[Component]:
-    """The components of the special members with these degrees. `check` is called now and then, and may raise.
+    """Find the components over Q of the special members with these degrees.
 
-    Hypersurfaces come first, from random lines, which hardly meet anything smaller; then the smaller components of the
-    points outside these hypersurfaces.
+    Hypersurfaces come first, from random lines, which hardly meet anything smaller; then smaller components of the
+    points outside these hypersurfaces. `check` is called repeatedly, and may raise.
     """
     components: list[Component] = []
     count = len(names)
@@ -38,13 +38,10 @@ def conditions(
         for sweep in sweeps:
             if sweep.on_lines is on_lines and degrees in sweep.classes:
                 unassigned = points_outside(sweep.classes[degrees], components, sweep.prime)
-                smallest = 0 if sweep.complete else count - sweep.width
-                parts += (
-                    [find_components(unassigned, sweep.prime, sweep.measured, smallest, rng, check)]
-                    if unassigned
-                    else []
-                )
-        if count > 1:  # a hyperplane by its coefficients in the order of those of other hypersurfaces
+                least = 0 if sweep.complete else count - sweep.width
+                if unassigned:
+                    parts.append(find_components(unassigned, sweep.prime, sweep.measured, least, rng, check))
+        if count > 1:  # rows of hyperplanes end with the constant; forms of other hypersurfaces begin with it
             hypersurfaces = {
                 part.prime: [
                     *((row[-1], *row[:-1]) for (row,) in part.linear.get(count - 1, [])),
@@ -64,7 +61,8 @@ def conditions(
         if dimension == 0 and len(linear) > 1:
             low, high = min(linear), max(linear)
             few, many = len(linear[low]), len(linear[high])
-            if few >= _SHARE * low and many - few >= _SHARE * (high - low):  # as many as a curve has
+            # Their number grows like the prime: these are points of a curve that was not found, not isolated points.
+            if few >= _SHARE * low and many - few >= _SHARE * (high - low):
                 continue
         lifted = lift_linear(linear)
         components += [Component(linear_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
@@ -87,7 +85,7 @@ def conditions(
 
 
 def points_outside(points: Sequence[Point], components: Iterable[Component], prime: int) -> list[Point]:
-    """The points modulo a prime that are on none of the components."""
+    """Return the points modulo a prime that lie on none of the components."""
     import numpy as np
 
     outside = np.array(points, dtype=np.int64)

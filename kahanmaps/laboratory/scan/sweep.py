@@ -21,9 +21,7 @@ from kahanmaps.maps.implicit import MapFamily
 
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
-Choice = tuple[
-    int, int | None, int
-]  # a prime, the number of random affine subspaces (None: all members), their dimension
+Choice = tuple[int, int | None, int]  # a prime, the number of affine subspaces (None: all members), their dimension
 
 _BATCH_SIZE = 512
 _MIN_LINES, _MAX_LINES = 3, 12  # on which a special member is measured
@@ -35,11 +33,11 @@ class TimeOver(Exception):
 
 @dataclass(frozen=True)
 class Sweep:
-    """The special members modulo one prime: `classes` maps degrees to points, and `measured` is the number of
-    members measured.
+    """The special members modulo one prime: `classes` maps degrees to points.
 
-    `generic` are the degrees of the other members. If not `complete`, only members on random affine subspaces of
-    dimension `width` were measured. `false_alarms` counts generic members that looked special on their first line.
+    `generic` are the degrees of all other members that were `measured` (their number). If not `complete`, only members
+    on random affine subspaces of dimension `width` were measured. `false_alarms` counts generic members that looked
+    special on their first line.
     """
 
     prime: int
@@ -136,14 +134,14 @@ def sweep(
     generic = degrees.max(axis=0)
     if generic[0] < 0:
         raise InputError("the map is defined nowhere, whatever the parameters are")
-    special, accidents = np.flatnonzero((degrees != generic).any(axis=1)), 0
+    special, false_alarms = np.flatnonzero((degrees != generic).any(axis=1)), 0
     for line in range(1, _MAX_LINES):
         if not len(special):
             break
         before, again = degrees[special], measure([points[i] for i in special])
         degrees[special] = np.maximum(before, again)
         still_special = special[(degrees[special] != generic).any(axis=1)]
-        accidents += len(special) - len(still_special)
+        false_alarms += len(special) - len(still_special)
         if line >= _MIN_LINES and (before == degrees[special]).all():
             break
         special = still_special
@@ -151,5 +149,11 @@ def sweep(
     for i in special:
         classes.setdefault(tuple(int(d) for d in degrees[i]), []).append(points[i])
     return Sweep(
-        prime, tuple(int(d) for d in generic), classes, len(points), on is None, accidents, 1 if on is None else on[1]
+        prime,
+        tuple(int(d) for d in generic),
+        classes,
+        len(points),
+        on is None,
+        false_alarms,
+        1 if on is None else on[1],
     )

@@ -184,9 +184,9 @@ class _Plane:
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
         period = plane_period_over_rationals(block, start)
         self.period = period.period
-        self.lazy = period.period is not None or period.kind in (PeriodKind.ADDITIVE, PeriodKind.NO_VALUE)
+        self.lazy = period.period is not None or period.kind in (PeriodKind.ADDITIVE, PeriodKind.UNDEFINED)
         self.pole: int | None = None
-        if period.kind is PeriodKind.NO_VALUE:
+        if period.kind is PeriodKind.UNDEFINED:
             self.pole = 1
         elif period.kind is PeriodKind.ADDITIVE:
             r = translation.parabolic_ratio(block, start)
