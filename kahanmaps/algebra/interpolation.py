@@ -329,6 +329,8 @@ def _along_line(
         where.append(t)
         return tuple((a + (t - start) * d) % p for a, d in zip(anchor, direction, strict=True))
 
+    # Newton's form: a further point adds one term to each polynomial, so that points can be taken one by one until all
+    # fractions are determined. Their degrees are not known in advance.
     entries = range(len(values.values[0]))
     vanishing = nmod_poly([-start, 1], p)
     through = [nmod_poly([v], p) for v in values.values[0]]

@@ -413,6 +413,7 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
         row = parts.setdefault(tuple(exponents), [])
         row += [K.zero] * (e + 1 - len(row))
         row[e] = row[e] + K.convert(fmpq_poly([0] * j + [coefficient]))
+    # Euclid's algorithm over the field: the content is a polynomial in eps, defined up to a number of the field.
     content: list[EtaleElement] = []
     for row in parts.values():
         content, remainder = row, content

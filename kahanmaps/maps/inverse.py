@@ -116,7 +116,7 @@ def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, 
     """Return a random point (x, x~) of the graph modulo a random prime, followed by values of the symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
-    while True:
+    while True:  # ends: only finitely many primes are bad, and the matrix is singular on a hypersurface only
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
         arguments = [field.random(rng) for _ in names]
         try:

@@ -193,6 +193,7 @@ def _search_lower_bound(
     bounds = {n: float(bound) for n, bound in expected.items() if bound is not None}
     if not bounds:
         return None
+    # The tangents are expensive, so that they are computed only for the number of steps that promises the best bound.
     steps = max(bounds, key=bounds.__getitem__)
     largest = 0
     for start in _random_tangents(map_.field.characteristic, rng):

@@ -264,6 +264,8 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     order = int(polynomial.degree())
     if len(values) < 2 * order + needed_checks(order):
         return None
+    # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues next
+    # to 0 are candidates for them. The test below is exact, and rejects wrong ones.
     lifted = [int(c) for c in polynomial.coeffs()]
     lifted = [c - _PRIME if 2 * c > _PRIME else c for c in lifted]
     for n in range(len(values) - order):

@@ -320,7 +320,7 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
         pair: list[list[list[int]]] = []
         for _ in range(2):
             points = map_.orbit(count + iterates)
-            closed = len(points) < count + iterates
+            closed = len(points) < count + iterates  # a cycle: its points are continued around it
             periods.add(len(points) if closed else None)
             ahead = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
             rows = [
@@ -332,6 +332,8 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
             ]
             pair.append(null_space(rows, len(functions), map_.prime))
         bases += pair
+        # Entries of reduced bases that agree on two orbits of one map are constants; the others depend on the orbit,
+        # and are values of integrals.
         if len(pair[0]) == len(pair[1]):
             same = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*pair, strict=True)]
             constant = same if constant is None or len(constant) != len(same) else constant

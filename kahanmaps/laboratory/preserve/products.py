@@ -178,6 +178,7 @@ class _Line:
             denominator = int(factor.determinant(x)) * pow(Z, n * top, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
+        # Without the common factor: its degree would multiply in each further map, and its zeros are not those of Z~.
         raw = _interpolated(homogeneous, n * top * size, p)
         common = reduce(nmod_poly.gcd, raw)
         self.image = [entry // common for entry in raw]

@@ -61,6 +61,7 @@ def lift_linear(
     lifted: dict[RationalRows, tuple[int, ...]] = {}
     sizes = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
     pairs = 0
+    # Primes with the fewest pairs of subspaces first: a subspace over Q is lifted from the first pair that has it.
     for p, q in sorted(sizes, key=sizes.__getitem__):
         pairs += sizes[p, q]
         if pairs > _MAX_PAIRS:
@@ -258,6 +259,7 @@ def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[
     count(20 * size + size**3 * modulus.bit_length() / 500)
     shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest)
+    # Any residues have a relation with (2 height + 1)^size of about the modulus; only much smaller ones count.
     small = (2 * height + 1) ** size << spare <= modulus
     return [int(c) for c in shortest] if small and shortest[-1] else None
 

@@ -138,6 +138,7 @@ def sweep(
     for line in range(1, _MAX_LINES):
         if not len(special):
             break
+        # The degree of an iterate is the largest on any line; a line in special position can only lower it.
         before, again = degrees[special], measure([points[i] for i in special])
         degrees[special] = np.maximum(before, again)
         still_special = special[(degrees[special] != generic).any(axis=1)]

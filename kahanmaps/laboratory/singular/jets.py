@@ -260,7 +260,7 @@ def form_order(form: Any, field: PrimeField) -> Function:
         count(2 + len(terms) / 5)
         if int(reduced(*(int(entry[0]) for entry in X))):
             return 0
-        if precision > _LOW_PRECISION:
+        if precision > _LOW_PRECISION:  # most orders are small, and few terms show them
             low = order([entry.truncate(_LOW_PRECISION) for entry in X], _LOW_PRECISION)
             if low is not None:
                 return low

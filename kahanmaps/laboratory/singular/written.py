@@ -203,6 +203,8 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
             raise TooLarge("the determinant of the affine map is too large")
 
     try:
+        # Shortest rows first: minors of the first rows are factors in all further products. The order changes the sign
+        # only, which no factor depends on.
         rows.sort(key=lambda row: sum(len(entry) for entry in row if entry is not None))
         determinant = kernel_minors(rows, counted_product, require_few)[-1]
     except TooLarge:

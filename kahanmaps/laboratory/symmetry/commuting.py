@@ -296,6 +296,8 @@ class _Search:
         equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self.budget)
         equations = [*part.equations, *(normal_form(p, part.equations) for p in equations)]
         gens = part.values[0].context().gens()
+        # New coordinates in which the equations have few unknowns each. Only at the first level: later parts have
+        # equations of their own, which would have to be transformed as well.
         T = decoupling(equations, len(gens))
         if T is not None and level == 0:
             zero = gens[0].context().constant(0)

@@ -116,6 +116,8 @@ class _Terms:
 
     def step(self, y: Series) -> Series:
         """y + 2 eps v with v = g(y) + eps g'(y) v, order by order."""
+        # A further coordinate 1 makes g homogeneous. In eps g'(y) v only lower orders of v occur, so that v is computed
+        # without solving a linear system.
         y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
         v: Series = []
         terms_of = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]

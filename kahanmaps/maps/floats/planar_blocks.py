@@ -172,6 +172,7 @@ class _Blocks:
             kappas.append(complex(*_round_to_doubles([kappa.real, kappa.imag])))
             for row, column in zip(into_uv, out_uv, strict=True):
                 into.append(_round_to_doubles([entry.real for entry in row]))
+                # A complex block stands for two conjugate ones, whose sum is twice the real part.
                 out.append(_round_to_doubles([entry.real if real else 2 * entry.real for entry in column]))
                 if not real:
                     into.append(_round_to_doubles([entry.imag for entry in row]))

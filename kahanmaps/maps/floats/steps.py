@@ -321,6 +321,7 @@ def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int,
                         *image, good = step.fast(*x)
                 except ZeroDivisionError:  # arrays would contain an infinity here
                     image, good = x, False
+                # Orbits for which the fast program does not guarantee the image repeat the step with the careful one.
                 if good is not True and not np.all(good | has_ended):
                     repeat = np.flatnonzero(~(good | has_ended))
                     points_before, points_after = (

@@ -60,15 +60,15 @@ class Jacobian:
 
 
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
-    """The order of T over GF(q), or the field of q elements that is given; gamma is not 0 or 1.
+    """Return the order of T over GF(q), or over the field `context` of q elements; gamma is not 0 or 1.
 
-    A number k with k T = 0 is sought among those |k - q - 1| <= 2 sqrt(q), one of which is the number of points. In a
-    large field that is found modulo a product of small primes first (schoof.py). Then k is freed of the primes that it
-    can do without.
+    A number k with k T = 0 is searched among those with |k - q - 1| <= 2 sqrt(q); the number of points is one of them
+    (Hasse). In a large field the number of points is computed modulo a product of small primes first (schoof.py).
+    Finally k is divided by all prime factors that the order of T does not need.
     """
     curve = Jacobian(gamma)
     radius, middle, unit = isqrt(4 * q), q + 1, 1
-    if q < 1000:
+    if q < 1000:  # adding T until it vanishes is faster than a search, and needs no Hasse interval
         point, order = curve.add(curve.T, None), 1
         while point is not None:
             point, order = curve.add(point, curve.T), order + 1
@@ -77,6 +77,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
         field = fq_default_ctx(q, 1) if context is None else context
         a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, 64 * gamma * gamma))
         trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
+        # The representative of the trace next to 0: then all candidates of the interval are near `middle`.
         middle -= trace if 2 * trace <= unit else trace - unit
     k = _annihilator(curve, middle, unit, radius // unit + 2)
     for factor, exponent in fmpz(k).factor():
@@ -125,7 +126,7 @@ class LevelCubic:
         self._opposite = self.third(zero, zero)
 
     def gradient(self, P: Triple) -> Triple:
-        """The three derivatives at P of F = below h - above W (W^2 + D)."""
+        """Return the three derivatives at P of F = denominator h - numerator W (W^2 + D)."""
         (U, V, W), (p, q, r), block = P, self.block.D, self.block
         along = self.numerator * W
         return (
@@ -138,6 +139,8 @@ class LevelCubic:
 
     def third(self, P: Triple, Q: Triple) -> Triple:
         """The third point of the cubic on the line through P and Q, on the tangent where they are the same."""
+        # The cubic form on a line has four coefficients. With zeros at P and Q two are left, and these are derivatives;
+        # no equation has to be solved.
         if not same_point(P, Q):
             s, t = _dot(self.gradient(P), Q), _dot(self.gradient(Q), P)
             return t * P[0] - s * Q[0], t * P[1] - s * Q[1], t * P[2] - s * Q[2]

@@ -50,6 +50,7 @@ class _Torsion:
         elif (Y + T) % f == 0 * f:
             return None
         else:
+            # The points agree modulo some factors of f and are opposite modulo the others: f splits.
             raise _Divisor((Y - T).gcd(f))
         x_sum = (slope * slope % f * self.c - X - Z) % f
         return x_sum, (slope * (X - x_sum) - Y) % f
@@ -131,6 +132,8 @@ class _DivisionPolynomials:
     def __getitem__(self, n: int) -> Poly:
         if n not in self._known:
             m, odd = divmod(n, 2)
+            # Psi with an even index is stored without its factor 2 y. In the recurrence of an odd index one of the two
+            # products has four such factors, 16 y^4 = 16 c^2.
             if odd:
                 first_product = self[m + 2] * self[m] * self[m] * self[m]
                 second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]

@@ -59,9 +59,10 @@ def iterate(
         return _parabolic(block, start, n)
     level = numerator / denominator
     gamma = 1 - block.discriminant * level * level
-    if is_zero(gamma):
+    if is_zero(gamma):  # three lines, permuted by Psi: every third point is on the same line
         points = _first_points(block, points, n % 3 + 10, is_zero)
         return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
+    # The formulas divide by values that vanish at special points: then the next base point is tried.
     for base in range(3, _BASES + 3):
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:

@@ -85,6 +85,8 @@ def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: flo
     c1 = (u * inverse[1] + v * inverse[0]) % p
     first, d, r = length_a - length_b, nu * c1, 1.0 / p
     b0, b1, x, y = b[0], b[1], a[0], a[1]
+    # s mod p without a division: s is an integer, so that (s + 1/2)/p is at least 1/(2p) away from all integers, more
+    # than the rounding error. Without the 1/2 a multiple of p could be rounded below its quotient.
     for j in range(length_b - 1):
         s = x[first + j] - c0 * b0[j] - d * b1[j]
         t = y[first + j] - c0 * b1[j] - c1 * b0[j]

@@ -126,7 +126,7 @@ class Family:
             step = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
         elif eps is None:
             step = draw.integers(0, p, (2, count))
-            step[0, ~step.any(axis=0)] = 1
+            step[0, ~step.any(axis=0)] = 1  # eps = 0 would be the identity
         else:
             step = np.zeros((2, count), dtype=np.int64)
             step[0] = int(GF(p).convert(eps))

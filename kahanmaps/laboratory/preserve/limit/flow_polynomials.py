@@ -280,6 +280,7 @@ class _Search:
             is_unique = pivots(solution) == list(range(len(columns)))
             return [row[-1] for row in solution] if is_unique else None
 
+        # P is determined up to a factor. One coefficient stays fixed, so that the linear systems have one solution.
         first = next(k for k, c in enumerate(vector) if c)
         P, P_known = total(vector, terms), list(vector)
         K_known = solve([P * k for k in cofactor], along(P))

@@ -351,6 +351,7 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
             for part in (integral.function.numerator, integral.function.denominator)
         )
         try:
+            # A constant leading term says nothing: subtract it and take the next term, once.
             for _ in range(2):
                 order, content, leading = _leading(Function(functions, P, Q))
                 if not (leading.is_polynomial and leading.numerator.is_constant()):

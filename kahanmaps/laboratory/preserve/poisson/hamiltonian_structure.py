@@ -266,6 +266,7 @@ class InheritedIntegrals:
         f_y = field.column([f[i] for i in free])
         u = field.column([image_point[i] - point[i] for i in free])
         du_dy = (identity - A * eps).inv() * (identity + A_image * eps) - identity
+        # The integral of the map is H + grad H . (x~ - x)/3, where grad H = K f and the Hesse matrix of H is K A.
         third = field.convert(fmpq(1, 3))
         for form in self.forms:
             K = field.convert_matrix(form)
