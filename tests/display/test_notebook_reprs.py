@@ -26,8 +26,8 @@ def html_of(thing):
     html = thing._repr_html_()
     assert len(html) < LARGEST
     tree = ElementTree.fromstring(f"<div>{html}</div>")
-    assert "script" not in {one.tag for one in tree.iter()}
-    assert not {one.get("style", "") for one in tree.iter() if "background" in one.get("style", "")}
+    assert "script" not in {entry.tag for entry in tree.iter()}
+    assert not {entry.get("style", "") for entry in tree.iter() if "background" in entry.get("style", "")}
     return tree
 
 

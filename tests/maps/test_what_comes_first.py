@@ -23,9 +23,9 @@ FAR = 10**12
 
 
 def found_structure(system) -> SystemNormalForm:
-    found = system_normal_form(system)
-    assert isinstance(found, SystemNormalForm)
-    return found
+    normal_form = system_normal_form(system)
+    assert isinstance(normal_form, SystemNormalForm)
+    return normal_form
 
 
 def ended(orbit) -> OrbitEnd:

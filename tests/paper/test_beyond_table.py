@@ -23,13 +23,13 @@ def test_every_cell_is_proved_or_refuted_by_a_counterexample_and_the_page_shows_
         for _, formula, *_, signs in STATEMENTS
         for name, sign in zip(VARIATIONS, signs, strict=True)
     }
-    found = {(one.place["statement"], one.place["variation"]): one.verdict for one in report.findings}
+    results = {(finding.place["statement"], finding.place["variation"]): finding.verdict for finding in report.findings}
     words = {"+": Certainty.PROVED, "-": Certainty.REFUTED}
-    assert found == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
+    assert results == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
     assert table(report) in PAGE.read_text(encoding="utf-8")
-    for one in report.findings:
-        assert (one.verdict is Certainty.REFUTED) is one.control is (one.witness is not None)
-        assert one.witness is None or one.witness.left != one.witness.right
+    for entry in report.findings:
+        assert (entry.verdict is Certainty.REFUTED) is entry.control is (entry.witness is not None)
+        assert entry.witness is None or entry.witness.left != entry.witness.right
 
 
 def test_formulas_of_the_table_are_code_so_that_markdown_prints_their_stars():

@@ -71,12 +71,12 @@ def test_settings_of_a_user_do_not_get_into_a_picture_and_are_left_as_they_were(
         *((path, None, None) for path in ("a", "a.jpg", "a.pdf.gz", ".svg")),
     ],
 )
-def test_the_format_is_that_of_the_ending_or_the_one_asked_for(path, asked, expected):
+def test_the_format_is_that_of_the_ending_or_the_one_asked_for(path, requested, expected):
     if expected is None:
         with pytest.raises(InputError, match=r"expected \.pdf, \.svg or \.png"):
-            format_of(path, asked)
+            format_of(path, requested)
     else:
-        assert format_of(path, asked) == expected
+        assert format_of(path, requested) == expected
 
 
 def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():
