@@ -162,7 +162,8 @@ class Field(ABC):
 
 
 def operand(field: Field, value: Any) -> Any:
-    """Convert an operand of an operator to an element of `field`, or return None (for text, matrices and the like).
+    """Convert an operand of an operator to an element of `field`, or return None (for text, matrices and other
+    objects).
 
     Raises `InexactNumber` and `BadPrime` as `convert` does.
     """

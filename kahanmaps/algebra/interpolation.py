@@ -36,7 +36,7 @@ from kahanmaps.errors import BadPrime, InputError
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
 
 
-_UNLUCKY_PRIMES = 3  # after so many failures the black box counts as not rational
+_UNLUCKY_PRIMES = 3  # after this number of failures the black box counts as not rational
 _CONFIRMATIONS = (
     5  # values modulo a new prime each; a box like the Legendre symbol passes each one with probability 1/2
 )

@@ -679,7 +679,7 @@ class _Arithmetic:
             raise self.error_at(f"found {what} of degree {degree}, expected at most {self.limits.degree}", column)
 
     def spend(self, terms: int, bits: int, column: int) -> None:
-        """Count the machine words of so many terms with coefficients of so many bits."""
+        """Count the machine words of `terms` terms with coefficients of this number of bits."""
         self.words_left -= terms * (bits // 64 + 1)
         if self.words_left < 0:
             raise self.error_at("found an expression that takes too much work to expand: simplify or split it", column)

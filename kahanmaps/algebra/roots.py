@@ -99,7 +99,7 @@ class Root:
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
     def real_approximation(self, bits: int = 256) -> fmpq:
-        """Return a rational approximation of the real root to so many bits."""
+        """Return a rational approximation of the real root to this number of bits."""
         middle = self._real(bits).mid()
         mantissa, exponent = middle.man_exp()
         return fmpq(mantissa) * fmpq(2) ** int(exponent)

@@ -211,7 +211,7 @@ def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:
 
 
 def _coefficients(system: QuadraticSystem) -> fmpq_mat:
-    """One row a component, one column a monomial of degree at most 2."""
+    """Return the coefficients: a row for each component, a column for each monomial of degree at most 2."""
     n = system.dim
     rows = []
     for i in range(n):

@@ -64,7 +64,7 @@ def map_html(map_: MapFamily) -> str:
 
 
 def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS, most: int = _EQUATIONS) -> str:
-    """Return at most `most` equations as HTML, each cut after about so many characters."""
+    """Return at most `most` equations as HTML, each cut after about this number of characters."""
     shown = equations(system.variables[:most], system.rhs[:most], characters)
     return shown if system.dim <= most else f"{shown}<br/>\n… ({system.dim} equations)"
 

@@ -6,7 +6,7 @@
     verdict = "integrable"                integrable, linearisable or not integrable
     codimension = 2                       of the smallest variety known to contain a generic orbit
 
-    [[catalog.relations]]                 so many independent combinations vanish along a generic orbit
+    [[catalog.relations]]                 number of independent combinations that vanish along a generic orbit
     monomials = ["x1^2", "x2^2", "x3^2", "1"]
     dimension = 2
 

@@ -119,6 +119,6 @@ def _toml_value(value: Any) -> str:
 
 
 def _toml_string(text: str) -> str:
-    # A JSON string is a TOML basic string, but for DEL, which TOML wants escaped; a terminal obeys some others too.
+    # A JSON string is a TOML basic string, except that DEL must be escaped. Other characters are escaped for terminals.
     characters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
     return "".join(characters)

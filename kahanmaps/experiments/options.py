@@ -36,7 +36,7 @@ class Option:
     """An option of tasks with its name and help.
 
     `read` converts the value in a spec to plain data or raises InputError, `make` converts plain data to an argument of
-    the library; None means "not given". `numbers` tells whether ranges "a..b step c" are allowed.
+    the library; None means "not given". `numbers` says whether ranges "a..b step c" are allowed.
     """
 
     name: str

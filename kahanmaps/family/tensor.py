@@ -26,7 +26,7 @@ from kahanmaps.family.skew_hamiltonian import companion_matrix, evaluate_at_matr
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system
 
 GENERATOR = "t"
-_MAX_DIMENSION = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
+_MAX_DIMENSION = 12  # dimension up to which commuting matrices are computed: its square is their number of entries
 _DRAWS = 40
 
 

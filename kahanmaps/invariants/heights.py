@@ -265,7 +265,7 @@ def height_growth(
 
 
 def decimal_text(value: Fraction, digits: int = 6) -> str:
-    """Round a number to so many significant digits, ties to even; the text is the same on every machine.
+    """Round a number to this number of significant digits, ties to even; the text is the same on every machine.
 
     >>> decimal_text(Fraction(1, 3)), decimal_text(Fraction(-20, 3), 2), decimal_text(Fraction(5))
     ('0.333333', '-6.7', '5')

@@ -89,7 +89,7 @@ class Analysis(AnalysisResult, PrintableResult):
         return [(title, lines) for title, lines in (*sections, ("not done", skipped)) if lines]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each statement, for `pandas.DataFrame(analysis.rows())` and the like."""
+        """A row for each statement, for example for `pandas.DataFrame(analysis.rows())`."""
         statements = ((title, line) for title, lines in self.sections for line in lines)
         return [{"section": title, "status": line.status, "text": line.text} for title, line in statements]
 
@@ -244,7 +244,7 @@ class _Account:
 def _second_process(context: AnalysisContext, steps: Sequence[AnalysisStep], account: _Account) -> Iterator[Connection]:
     """Run steps in a forked process, if there are any, and yield the connection for their outcomes.
 
-    The fork inherits the map and all functions; results come back as pickles. The process ends with the block.
+    The fork inherits the map and all functions; results are returned as pickles. The process ends with the block.
     """
     parent, (receiver, sender) = os.getpid(), Pipe(duplex=False)
     if not steps:

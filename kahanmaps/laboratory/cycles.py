@@ -63,12 +63,12 @@ class Census(PrintableResult):
 
     @property
     def periodic(self) -> int:
-        """The number of points, among those looked at, that lie on cycles."""
+        """The number of examined points that lie on cycles."""
         return sum(length * n if self.complete else n for length, n in self.lengths.items())
 
     @property
     def cycles(self) -> int | None:
-        """The number of cycles; None unless all points were looked at."""
+        """The number of cycles; None unless all points were examined."""
         return sum(self.lengths.values()) if self.complete else None
 
     @property
@@ -81,7 +81,7 @@ class Census(PrintableResult):
         return all_fields(self)
 
     def rows(self) -> list[dict[str, int]]:
-        """A row for each length: the number of cycles, or of sampled points; for pandas.DataFrame and the like."""
+        """A row for each length: the number of cycles, or of sampled points; for example for pandas.DataFrame."""
         return [{"length": length, "count": count} for length, count in self.lengths.items()]
 
 
@@ -99,7 +99,7 @@ def cycle_census(
     """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
 
     A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
-    looked at up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
+    examined up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
     points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends it with what is known.
     Of a composition each map is applied in turn: a point is indeterminate where one of them is not defined. Above
     dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.

@@ -52,7 +52,7 @@ def convention(*maps: MapFamily) -> str:
 
 
 def eps_share(map_: MapFamily) -> str:
-    """Return "eps is half the time step" or the like for a map; empty if it has no time step."""
+    """Return a sentence such as "eps is half the time step" for a map; empty if it has no time step."""
     if not map_.time_steps:
         return ""
     return f"eps is {'half' if map_.time_steps == 1 else f'{fmpq(1, 2 * map_.time_steps)} of'} the time step"

@@ -80,7 +80,7 @@ class Claim:
     pairwise: bool = False
     symplectic: bool = True  # keeps its form under symplectic changes of coordinates and extensions of the field
     theorem: str = ""  # what proves it for all data, its hypotheses true by construction, where nothing is expanded
-    statement: str = ""  # of one that is asked of several variations: the statement, and the variation
+    statement: str = ""  # of a claim that is tested for several variations: the statement, and the variation
     variation: str = ""
     misprint: str = ""  # not empty: this is the form printed, it fails, and here is why
 

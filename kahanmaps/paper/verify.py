@@ -69,7 +69,7 @@ PROOF_BUDGET = 50_000_000
 _MAX_INDETERMINATES = 64  # of a proof for one member
 _MAX_UNDEFINED = 40
 _POINTS = 4  # for statements that something differs, or has full rank
-_LARGE = 5  # from this m on, controls are looked at over GF(p) first
+_LARGE = 5  # from this m on, controls are evaluated over GF(p) first
 NOTE_ON_PROOFS = (
     "proofs in normal form: the claim is an identity of rational functions in indeterminate roots of chi, coefficients "
     "of H, x and eps, multiplied out for so many planar blocks; it holds for every member with distinct roots, being "

@@ -249,7 +249,7 @@ _UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, AttributeErr
 def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGrowth]:
     """The name of the system, and the degrees, in the JSON object that `kahanmaps degrees --json` writes.
 
-    The recurrence is looked for anew; records of older versions have no patterns of singularities.
+    The recurrence is searched for again; records of older versions have no patterns of singularities.
     Raises InputError for anything else.
 
     >>> record = {"command": "degrees", "system": "top", "degrees": [1, 3, 9, 19, 33, 51, 73, 99], "eps": "generic"}

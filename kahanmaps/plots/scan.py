@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _ASPECT = 0.8
 _MANY = f"{Growth.EXPONENTIAL} growth"  # drawn thin, and none of it is named
 _CONDITION_SIZE = 0.8  # of the letters of conditions, in units of that of other text
-_PLACES, _DOTS = 12, 300  # parts of a curve, at whose ends its condition may stand, and to tell what it crosses
+_PLACES, _DOTS = 12, 300  # parts of a curve: at whose ends its condition may be written, and to find what it crosses
 _INNER = 0.85  # of the width and height of the picture, the axes
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 

@@ -1,4 +1,4 @@
-"""How pictures look: sizes as a journal states them, colors that color-blind readers can tell apart.
+"""How pictures look: sizes as a journal states them, colors that color-blind readers can distinguish.
 
 The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up
 to four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown by
@@ -60,7 +60,7 @@ class Style:
         return self.width / CENTIMETRES_PER_INCH, height / CENTIMETRES_PER_INCH
 
     def require_pixels(self, width: float, height: float) -> None:
-        """Raise InputError where a picture of so many inches would not fit into memory, at so many dots per inch."""
+        """Raise InputError if a picture of this size in inches, at `dpi` dots per inch, would not fit into memory."""
         given = width * height * self.dpi**2
         if given > _MAX_PIXELS:
             raise InputError(

@@ -79,7 +79,7 @@ def page(
 ) -> str:
     """Return a page without its empty sections. `script` is the only program that browsers may run.
 
-    `command`, `seed` (None if nothing is random) and `file` tell how the page was made.
+    `command`, `seed` (None if nothing is random) and `file` say how to reproduce the page.
     """
     remake: list[tuple[str, str]] = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
     remake += [("version", f"kahanmaps {__version__}")]

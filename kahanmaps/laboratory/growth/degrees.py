@@ -57,7 +57,7 @@ MAX_TERMS = 10_000
 _LINES = 2
 _OFTEN, _SELDOM = 64, 8  # a recurrence is searched for after each of the first 64 terms, then after every 8
 _ENOUGH_QUOTIENTS = 6
-_AGREEING = 12  # so many measured terms beyond twice the longest pattern have to agree with the derived ones
+_AGREEING = 12  # measured terms beyond twice the longest pattern that must agree with the derived ones
 _LARGE = 2000  # a degree from which on no further measured terms have to agree
 _MATRIX_TERMS = 60  # of monomial maps
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
@@ -237,7 +237,7 @@ class DegreeGrowth(PrintableResult):
         return self.kind_text + (f" ({self.basis})" if self.proof is not None or is_limited else "")
 
     def rows(self) -> list[dict[str, int]]:
-        """A row for each iterate, for `pandas.DataFrame(found.rows())` and the like."""
+        """A row for each iterate, for example for `pandas.DataFrame(growth.rows())`."""
         return [{"n": n, "degree": degree} for n, degree in enumerate(self.degrees)]
 
     @property

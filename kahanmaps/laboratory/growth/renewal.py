@@ -26,13 +26,16 @@ from kahanmaps.laboratory.singular.following import Fraction, OrbitData
 def degree_series(
     degrees: Sequence[int], hypersurfaces: Sequence[tuple[int, OrbitData]], stages: Sequence[int] = ()
 ) -> Fraction:
-    """The generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms.
+    """Return the generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms; exact.
 
-    `degrees` has d_1; of a word of maps, which are applied one after the other and from the beginning again, it has
-    those of the maps, `stages` say which of them, from 0, contracts each hypersurface, and the series has the degrees
-    after whole words only, with z for a single map. Of each contracted hypersurface its degree and its orders are
-    given. These are settled ones, and the columns nu follow the hypersurfaces; orders beyond what is known must not be
-    `needed`. Exact. Source: docs/mathematics.md.
+    Args:
+        degrees: d_1; for a word of maps, applied one after the other and periodically, the degree of each map.
+        hypersurfaces: for each exceptional hypersurface its degree and its orbit data, which must be settled; the
+            columns nu are in the same order. Multiplicities that are not known must not be `needed`.
+        stages: for a word, the index (from 0) of the map that contracts each hypersurface. The series then has the
+            degrees after complete words only, with z for a single map.
+
+    Source: docs/mathematics.md.
 
     >>> free = OrbitData((), (), 0, True)
     >>> degree_series([2], [(1, free)])

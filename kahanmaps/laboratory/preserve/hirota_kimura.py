@@ -55,7 +55,7 @@ _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation p
 MAX_UNKNOWNS = 1800
 MAX_INDEPENDENT = 800  # monomials that lower degrees leave independent; eliminating their matrix takes about a second
 _SETTLED_DEGREES = 4
-_SPARE_BITS = 40  # of 122 modulo two primes: a number counts only if it is so many bits shorter than a random residue
+_SPARE_BITS = 40  # of 122 modulo two primes, by which a number must be shorter than a random residue
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 
@@ -412,7 +412,7 @@ def sparse_relations(
     integral, function = (next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES"))
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
-    # Two orbits of the first map tell integrals from constants; the second map gives constants as numbers.
+    # Two orbits of the first map distinguish integrals from constants; the second map gives constants as numbers.
     for row, other_orbit, other_map in zip(*tables, strict=True):
         used = [k for k, entry in enumerate(row) if entry]
         is_implied = any(all(map(ge, support[used[0]], lead)) for lead in leads)

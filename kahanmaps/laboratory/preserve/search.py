@@ -57,7 +57,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.maps.kahan import KahanMap
 
-# Degrees up to which polynomials with a given cofactor are sought, by dimension.
+# Largest degrees of polynomials with a given cofactor that are searched for, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MAX_TERMS = 1000
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]

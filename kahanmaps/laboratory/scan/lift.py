@@ -31,11 +31,11 @@ from kahanmaps.laboratory.scan.modular_components import Rows
 RationalRows = tuple[tuple[fmpq, ...], ...]
 
 _MAX_PAIRS = 100_000  # of affine subspaces modulo two primes that are tried
-_MAX_CONJUGATES = 24  # pairs are only formed of at most so many hypersurfaces modulo a prime
+_MAX_CONJUGATES = 24  # largest number of hypersurfaces modulo a prime of which pairs are formed
 _LOW_HEIGHT = 12  # up to this height one prime may be bad
 _MIN_PRIMES = 3
 MAX_FIELD_DEGREE = 6
-SPARE_BITS = 12  # the relations of a point must be smaller by so many bits than random residues would give
+SPARE_BITS = 12  # bits by which relations of a point must be shorter than those of random residues
 _MAX_FAILURES = 200
 _MAX_POINTS = 24  # modulo a prime
 _MAX_PRIMES = 14  # that are combined

@@ -29,7 +29,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     """Return generators of the group of changes of parameters that was found, as images of the parameters.
 
     Each preserves the degrees of the special members modulo each prime for which all members were tried, and the
-    hypersurfaces over Q, except for what is mapped to infinity. Only changes that move a component, or
+    hypersurfaces over Q, except for components that are mapped to infinity. Only changes that move a component, or
     preserve one that is not affine, are reported.
 
     >>> a, b = ring(["a", "b"]).gens()

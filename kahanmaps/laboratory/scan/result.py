@@ -238,7 +238,7 @@ class Scan(PrintableResult):
         if any(self.unassigned):
             counts = list(zip(self.unassigned, self.sweeps, strict=True))
             shown = [f"{n} modulo {sweep.prime}" for n, sweep in counts if n or len(counts) <= _MAX_LISTED]
-            missed_dimension = 0  # the largest dimension of a variety with so many members
+            missed_dimension = 0  # the largest dimension of a variety with this number of members
             for n, sweep in counts:
                 dimension = len(self.over) - 1
                 while dimension > missed_dimension and n < 0.5 * sweep.measured / sweep.prime ** (

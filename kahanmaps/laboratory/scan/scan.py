@@ -59,7 +59,7 @@ _FURTHER_PRIMES = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
 # of them: otherwise hypersurfaces that split over such a field would have no points to be found.
 _LINE_PRIMES = (107, 131, 139, 193, 241, 281)
 _LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
-_LINE_FACTOR = 4  # so many times as many lines if hypersurfaces were missed
+_LINE_FACTOR = 4  # factor for the number of lines if hypersurfaces were missed
 _MANY_LINES = (150, 60)
 _PLANES, _PLANE_PRIMES = (
     24,

@@ -101,7 +101,7 @@ def components(
 
 
 _MIN_LINES, _MAX_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
-_REPEATED = 4  # so many times orders of forms are told apart, and then the same way again
+_REPEATED = 4  # after this number of equal factorizations for the same orders of forms, the next ones are not computed
 _FIRST = 12  # steps by which hypersurfaces are distinguished
 _MAX_DIGITS = 1000  # in forms that are factored
 _TRIES = 16  # lines on a surface, for a point of a component
@@ -155,7 +155,7 @@ class _Curve:
 
     @property
     def prime(self) -> int:
-        """The prime modulo which all is computed."""
+        """The prime modulo which the curve is computed."""
         return self.equation.over.characteristic
 
     @cached_property
@@ -202,7 +202,7 @@ class _Curve:
         return components(self.equation, self.forms.all, curve, self.across)
 
     def through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """The same with a point of a component on the surface through a curve. Raises OrbitDataUnknown without any."""
+        """Return the curve with a point of a component on the surface through `curve`; raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
                 point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
@@ -288,7 +288,7 @@ def exceptional_hypersurfaces(
     """The degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
     Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
-    point. Nothing but points modulo random primes is followed. Where the forms do not suffice to tell the hypersurfaces
+    point. Only points modulo random primes are followed. If the forms do not suffice to tell the hypersurfaces
     apart, their degrees are 0 and their orders those of the forms. Raises OrbitDataUnknown.
     """
     here = map_.at(eps)

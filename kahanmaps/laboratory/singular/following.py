@@ -33,8 +33,8 @@ from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
 _FIRST_ALONG, _MOST_ALONG = 512, 2048  # where series are followed far: a step costs at least as much as their length
-_CONSTANT = 8  # so often at least is the same order repeated that goes on
-_CHECKED = 4  # further orders have to follow a recurrence than tell it
+_CONSTANT = 8  # a column is constant if its last entries, at least this number, are equal
+_CHECKED = 4  # number of orders that must satisfy a recurrence beyond those that determine it
 _FREE_STEPS = 100  # for which a hypersurface is followed that is one again
 
 
@@ -103,7 +103,7 @@ class OrbitData:
         }
 
     def of(self, hypersurfaces: Sequence[int]) -> OrbitData:
-        """The same with the columns of these hypersurfaces only."""
+        """Return the data with the columns of these hypersurfaces only."""
         columns = [0, *(1 + k for k in hypersurfaces)]  # of orders without a return
         rows = tuple(tuple(row[k] for k in columns) for row in self.rows)
         return replace(self, rows=rows, recurrences=tuple(self.recurrences[k] for k in columns if self.recurrences))
@@ -132,7 +132,7 @@ NO_ORBIT_DATA = OrbitData(())
 
 
 class AlongCurves(Protocol):
-    """Functions whose orders are looked at along a curve, and what these make of its steps: the rows of `OrbitData`."""
+    """Functions whose orders are measured along a curve, and the rows of `OrbitData` that follow from these orders."""
 
     @property
     def functions(self) -> tuple[Function, ...]:
@@ -144,7 +144,7 @@ class AlongCurves(Protocol):
 
 @dataclass(frozen=True)
 class Tracked:
-    """The functions whose orders are looked at along curves through a hypersurface.
+    """The functions whose orders are measured along curves through a hypersurface.
 
     `excess` are their exponents in the common factor of the minors of the equation, which is no part of the map;
     `first` are their orders on the hypersurface itself: 1 for its own, 0 for others. The first `critical` of them are

@@ -48,7 +48,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapFamily
 
 _MAX_TANGENT_PRECISION = 1024
-_KEY_PRECISION = 64  # terms of the series by which points are told apart
+_KEY_PRECISION = 64  # terms of the series by which points are distinguished
 _TRIES = 40
 _MIN_LINES = 6  # on which critical points are searched, and more while a multiplicity has no point
 _POINTS = 2  # each modulo a prime of its own
@@ -164,7 +164,7 @@ class Hypersurface:
     determinant of the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?"
     where it is too large: then `degree` is that of all components of this multiplicity together. It is contracted by
     the step `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not
-    happen). `steps` tells the first steps, at the first of two points, modulo the first of the `primes`.
+    happen). `steps` are the first steps, at the first of two points, modulo the first of the `primes`.
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
@@ -243,7 +243,7 @@ class HypersurfaceForm:
 
 @dataclass(frozen=True)
 class Tracking:
-    """The forms whose orders are told along curves: those that are contracted, and those in a common factor of minors.
+    """The forms whose orders are measured along curves: contracted ones, and those in a common factor of minors.
 
     Where the maps of a composition are followed one by one, `stage` is the number of the one that contracts, from 0,
     and steps are single maps of a word of `period`.
@@ -390,7 +390,7 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             run, _ = TestCurve(equations, critical.point, direction, limits).steps(limits.shown, most=_KEY_PRECISION)
             orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             known = alike.setdefault(orders, [])
-            if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
+            if len(known) >= _POINTS and len(set(known)) == 1:  # a third point would give no new information
                 primes = dict.fromkeys((*hypersurfaces[known[0]].primes, field.prime))
                 hypersurfaces[known[0]] = replace(hypersurfaces[known[0]], primes=tuple(primes))
                 continue
@@ -451,7 +451,7 @@ def _outcome_at(
     data = NO_ORBIT_DATA
     if up is None:
         data = curve.orbit_data(limits.shown)
-        # Beyond the steps that are shown it may be a hypersurface again, whose orders go on as those of another one do.
+        # After the steps that are shown the image may be a hypersurface again; then its orders are those of that one.
         longest = min(limits.along, limits.reach)
         while up is None and is_complete and not data.is_settled and len(run) < longest:
             run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)

@@ -76,7 +76,7 @@ _ENOUGH = {1: 60, 2: 60}  # of these where series would have to be long and orde
 _MOST_SHOWN = 200
 _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
-_POINTS = 3  # random ones, where det dPhi is looked at
+_POINTS = 3  # random points at which det dPhi is evaluated
 _MAX_DEGREE = 20_000  # of a composition
 _STOPPED = "work limit reached before all singularities were traced; raise --effort"
 _DIFFERENT = "the singularities at the two values of eps differ; choose one with --eps"
@@ -108,7 +108,7 @@ class SingularityRun(PrintableResult):
     word: Word | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each hypersurface, for `pandas.DataFrame(run.rows())` and the like."""
+        """A row for each hypersurface, for example for `pandas.DataFrame(run.rows())`."""
         names = ("polynomial", "degree", "status", "contracted_at", "confined_at")
         return [attributes(hypersurface, *names) for hypersurface in self.hypersurfaces]
 
@@ -179,11 +179,11 @@ def singularities(
 
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
-    modulo two random primes; "not confined" means within so many steps. Stops when the budget is spent, which doubles
-    with each more of `effort`, and at a TimeLimit, which ends a stage of something else, where `effort` is a Budget, as
-    a whole. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or
-    coefficients of more than 10,000 digits, or so long that writing formulas would exceed the budget.
-    Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+    modulo two random primes; "not confined" means within this number of steps. Stops when the budget is spent, which
+    doubles with each more of `effort`, and at a TimeLimit, which ends a stage of something else, where `effort` is a
+    Budget, as a whole. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and
+    an eps or coefficients of more than 10,000 digits, or so long that writing formulas would exceed the budget. Source:
+    grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, str(run.verdict)
@@ -210,7 +210,7 @@ def singularities(
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
         map_form = homogeneous_map(over)
         count(3 * sum(map(len, map_form.forms)))
-    except TooLarge:  # a composition: map by map, or hypersurfaces are told by random points
+    except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
         try:
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)

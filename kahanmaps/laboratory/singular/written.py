@@ -132,7 +132,7 @@ def is_long(map_: Map) -> bool:
 
 
 def _is_short(size: int, degree: int) -> bool:
-    """Whether a form in so many variables, of this degree, has few enough terms to be expanded."""
+    """Return whether a form in this number of variables, of this degree, has few enough terms to be expanded."""
     return comb(degree + size - 1, size - 1) <= _MAX_TERMS
 
 

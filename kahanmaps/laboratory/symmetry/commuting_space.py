@@ -29,7 +29,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SHAPES = ("linear", "quadratic")
 MAX_DIMENSION = 100  # of a space whose basis is kept and verified
-MAX_UNKNOWNS = 900  # a matrix of so many rows and columns takes seconds
+MAX_UNKNOWNS = 900  # a square matrix of this size takes seconds
 
 # A vector of power series in eps: series[k][i] is the coefficient of eps^k in coordinate i.
 Series = list[list[Any]]
@@ -153,7 +153,7 @@ class CommutingSpace:
 
 
 def unknowns(system: QuadraticSystem, shape: str) -> int:
-    """How many coefficients the space is looked for in."""
+    """The number of coefficients among which the space is computed."""
     n = system.dim
     return n * len(_independent_components(system)) if shape == "linear" else n * (n + 1) * (n + 2) // 2
 
@@ -257,5 +257,5 @@ def _independent_components(f: QuadraticSystem) -> list[int]:
 
 
 def field_at(space: CommutingSpace, weights: Sequence[fmpq]) -> QuadraticSystem:
-    """The field sum weights[i] fields[i]."""
+    """Return the field sum_i weights[i] fields[i]."""
     return system_of(space.fields[0].variables, combination(space.fields, weights, fmpq(0)))

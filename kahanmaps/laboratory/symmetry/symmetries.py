@@ -146,7 +146,7 @@ class Symmetries(PrintableResult):
         return [t for t in (*self.signed, *self.others) if t.reversing]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each finite symmetry that is known, for `pandas.DataFrame(symmetries.rows())` and the like."""
+        """A row for each known finite symmetry, for example for `pandas.DataFrame(symmetries.rows())`."""
         return [{"kind": t.kind, "action": t.text} for t in (*self.symmetries, *self.reversing)]
 
     def to_json(self) -> dict[str, Any]:
@@ -407,7 +407,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
 def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:
     """Polynomials in the entries of S that vanish where f(S x) = sign S f(x) for all x.
 
-    `S` holds the generators of a ring, row by row. The divergence of f must go along with an invertible S as well:
+    `S` holds the generators of a ring, row by row. The divergence of f must be invariant under an invertible S as well:
     this follows, and is linear in S.
 
     >>> s = ring(["s"]).gens()[0]

@@ -86,7 +86,7 @@ class NthIterate:
         from kahanmaps.maps.normal_form.planar_block import same_point
         from kahanmaps.maps.normal_form.rational_iterate import stepped_over
 
-        # Over a small finite field orbits soon come back or meet a pole.
+        # Over a small finite field orbits soon close or meet a pole.
         point = start
         for k in range(1, n + 1):
             if k > _CYCLE:

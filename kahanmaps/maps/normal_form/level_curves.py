@@ -91,7 +91,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
 def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
     """Some k > 0 with k T = 0, where one is `middle` + m `unit`, |m| <= `radius`.
 
-    m is sought as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
+    m is written as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
     """
     babies, step = isqrt(radius) + 2, curve.multiple(unit, curve.T)
     index: dict[Any, tuple[int, Any]] = {}

@@ -89,7 +89,7 @@ class Assembly:
             forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.denominator // row.denominator
             table_rows += [entry * factor for i, zero in enumerate(zeros) for entry in forms_by_plane.get(i, zero)]
         self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, over one denominator
-        # By so many bits numerators may be longer than the products of the triples they are made of.
+        # Bits by which numerators may be longer than the products of the triples from which they are computed.
         largest = max(map(abs, table_rows))
         self.excess = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
         self.excess += sum(block.slack for block in blocks)

@@ -67,7 +67,7 @@ class OrbitInPlanes:
         for step, value in enumerate(steps.points(x)):
             bits = value.exceeding(self._limit)
             if step == 0 or not bits:
-                self._walked.append(value)  # the start is given: the budget is for what is computed
+                self._walked.append(value)  # not charged to the budget, since the initial point is given
             if bits:
                 self._end = OverBudget(step, bits)
                 break

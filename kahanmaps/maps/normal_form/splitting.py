@@ -28,7 +28,7 @@ class Plane:
 
     `residue` takes the coefficients of an element of K (elements of the field of x) to its value in the plane, and
     `coefficients` takes a value in the plane to `degree` elements of the field of x (two for a complex pair). `context`
-    is FLINT's field of the plane where that is an extension of GF(p), since elements do not tell it.
+    is FLINT's field of the plane where that is an extension of GF(p), since it cannot be read off its elements.
     """
 
     name: str

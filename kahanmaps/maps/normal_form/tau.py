@@ -32,7 +32,7 @@ from kahanmaps.maps.somos import Terms
 
 _BASES = 3
 _FIRST = 2  # below it psi_{n-1} would be zero
-_SHARED = 8  # so many points are taken from one table, which holds some ten times the digits of a point then
+_SHARED = 8  # points taken from one table, which then holds about ten times the digits of a point
 
 
 def triples(block: Any) -> Iterator[Triple]:

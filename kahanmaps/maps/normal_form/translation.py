@@ -129,7 +129,7 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
     P, Q = points[0], points[1]
     if same_point(P, Q):
         return P
-    # Coordinates (x, y) stand for x P + y Q, found from two entries of the triples that tell P and Q apart.
+    # Coordinates (x, y) are those of x P + y Q; two entries of the triples in which P and Q are independent give them.
     i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
     determinant = P[i] * Q[j] - P[j] * Q[i]
     (a, b), (c, d) = (

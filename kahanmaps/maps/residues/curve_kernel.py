@@ -5,7 +5,7 @@ polynomial is an array (2, length). Sums of products stay below 2^53 by the choi
 that they are exact, and are reduced by a product with 1/p: floor((x + 1/2)/p) is right where x/p < 2^36, since
 (x + 1/2)/p is at least 1/(2 p) away from an integer.
 
-The functions are ordinary ones until `kernel` puts what numba makes of them in their place.
+The functions are ordinary Python until `kernel` replaces them by functions compiled by numba.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ Members = NDArray[np.int64]
 class Family:
     """A map with symbols modulo an odd prime p < 2^13, every coefficient a table over monomials in symbols and eps.
 
-    Raises InputError for what is out of range, BadPrime where the prime divides a denominator.
+    Raises InputError for values out of range, BadPrime if the prime divides a denominator.
     """
 
     def __init__(self, map_: MapFamily, prime: int) -> None:

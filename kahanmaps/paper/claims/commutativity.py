@@ -12,7 +12,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 
 def associated_pairs(o: PaperObjects) -> Iterator[tuple[Any, SystemOver, Any]]:
-    """B, g and x^ for every associated system that is looked at."""
+    """Yield B, g and x^ for every associated system that is tested."""
     for B in o.associates():
         yield B, o.g(B), o.step(o.g(B), o.x)
 

@@ -12,7 +12,7 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, ClaimKind, Pairs, claim, entries
 from kahanmaps.paper.variations import VARIATIONS, jordan_block, varied
 
-_ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
+_ITERATES = 4  # the first iterate whose degree distinguishes a planar Hamiltonian map from others
 
 
 @claim("Structure", "", "H eps")
@@ -241,9 +241,9 @@ def formula(o: PaperObjects) -> Pairs:
     yield o.modified_H(o.x), right
 
 
-# What is asked of every variation: the formula, the controls of what holds, how it is proved, and an answer for each of
-# VARIATIONS in turn: + holds, - fails, and a blank where it is not asked: of a variation that concerns g nothing is
-# asked that concerns f alone.
+# The statements that are tested for the variations: the formula, the controls where it holds, how it is proved, and a
+# sign for each of VARIATIONS: + holds, - fails, blank not tested, since the variation changes g and the statement is
+# about f alone.
 _ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
 STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
     (commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _BOTH, "++--++"),

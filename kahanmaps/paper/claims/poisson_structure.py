@@ -261,7 +261,7 @@ def components(o: PaperObjects) -> Pairs:
 
 @claim("(90)", "grad q comp", "f''")
 def gradient_of_q(o: PaperObjects) -> Pairs:
-    """The gradient of q_i is the sum of two sums in components
+    """The gradient of q_i has these two terms in components
     dq/dx_l = tr(B^T f''_l f')/8 + tr(B^T f' f''_l)/8"""
     for i in o.free:
         gradient = o.gradient(lambda o, x: o.q(i, x), o.x)

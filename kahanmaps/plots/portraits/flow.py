@@ -214,7 +214,7 @@ _SIZES = 24
 _SHRINK = 0.8
 _STEPS = 300
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-_FAR = 4.0  # an orbit stays if it is never farther from the center than so many times the largest start
+_FAR = 4.0  # an orbit stays if its distance from the center never exceeds this multiple of the largest initial one
 
 
 def automatic_starts(

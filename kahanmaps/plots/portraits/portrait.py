@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
     from kahanmaps.plots.drifts.drift_functions import WatchedFunction
 
-_MAX_NEIGHBOURS = 2000  # points: distances are taken pair by pair, and a curve through so many looks smooth
+_MAX_NEIGHBOURS = (
+    2000  # points: all pairs of points are compared; a curve through more points looks smooth without lines
+)
 _MIN_NEIGHBOURS = 8
 _OF_DEGREE_2 = 0.9  # of the points on a curve; of those of a cloud it is half
 # A gap in an orbit that has not filled its curve: in lengths of a usual line, and in diameters of the orbit. Points
@@ -240,7 +242,7 @@ def plot_portrait(
             axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
             handles["level curve"] = Line2D([], [], color=_LEVEL["colors"], linewidth=_LEVEL["linewidths"])
         if portrait.euler is not None:
-            # In the plane lines go on to the edge; what is far beyond it may be too large to draw.
+            # Lines continue to the edge of the plane; points far outside may be too large to draw.
             around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in portrait.window)
             # Dashes, for in a gray copy the colors say less.
             dashes: dict[str, Any] = {

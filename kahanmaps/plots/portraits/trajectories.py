@@ -25,7 +25,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 4_000_000  # of all orbits together: beyond that a picture of single points shows nothing more
 _MAX_NUMBERS = 40_000_000
-# Up to so much work, and so many steps, numpy is done before compiled code is loaded.
+# Up to this work and number of steps, numpy finishes before compiled code is loaded.
 _LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
 
 
@@ -112,7 +112,7 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
 
 
 def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: int) -> Trajectories:
-    """Orbits of explicit Euler, x~ = x + 2 eps f(x), in doubles; those that leave the range of floats are NaN then.
+    """Compute orbits of the explicit Euler method, x~ = x + 2 eps f(x), in doubles; NaN after leaving their range.
 
     `starts` (n, dim) are doubles, eps is exact, half the time step; a negative one steps backward.
 

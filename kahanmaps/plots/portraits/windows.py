@@ -15,7 +15,7 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
 _SHARE = 10.0  # percent of the points, at either end, that do not say how far the picture reaches
-_REACH = 3.0  # ... unless they are within so many lengths of what the others fill
+_REACH = 3.0  # ... unless they are within this multiple of the length that the others fill
 _UNBOUNDED, _SHOWN = 1e12, 10  # times the reach of the starts
 _MARGIN = 0.04
 _LARGEST = 1e307  # what matplotlib can still subtract
@@ -54,7 +54,7 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
 
 
 def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
-    """The range of the values as `window_of` chooses it, without a margin; `wanted` are the starts.
+    """The range of the values as `window_of` chooses it, without a margin; `required` are the initial points.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
@@ -104,7 +104,7 @@ def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
     """The `count` variables, in order, whose plane or space points (n, dim) fill most; of equals the first ones.
 
     Each variable is scaled to its own window, and the boxes of a grid that hold a point are counted. Of more than 16
-    variables the first 16 that vary are looked at.
+    variables the first 16 that vary are compared.
 
     >>> t = np.linspace(0, 6, 200)
     >>> fullest_axes(np.stack([t, t, 0 * t, np.sin(5 * t)], axis=1), 2)

@@ -60,7 +60,7 @@ _MAX_UNKNOWNS = 2000
 _MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
 _SPARE = 8
 _SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
-_MAX_INTEGRALS = 12  # all subsets of so many integrals are tried for involution
+_MAX_INTEGRALS = 12  # the number of integrals of which all subsets are tested for involution
 _MAX_PENCIL = 8  # tensors whose combinations are tested for the Jacobi identity
 
 Exponents = tuple[int, ...]
