@@ -466,7 +466,7 @@ QQ = RationalField()
 def GF(prime: int) -> PrimeField:
     """The field of `prime` elements.
 
-    Raises InputError where the number is not a prime: FLINT would end the whole process on a composite modulus.
+    Raises InputError if the number is not a prime: FLINT would abort the process for a composite modulus.
 
     >>> GF(7).convert("1/3")
     5

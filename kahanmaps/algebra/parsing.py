@@ -102,7 +102,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
         raise ExpressionError(f"found {quoted(text[start:end])}, {_EXPECTED}", text, column)
     sign, numerator, denominator, integer_part, fraction, power = match.groups()
     if max(len(numerator or ""), len(denominator or ""), len(integer_part or "") + len(fraction or "")) > digits:
-        raise ExpressionError(f"found a number of more than {digits} digits, expected at most so many", text, start)
+        raise ExpressionError(f"found a number of more than {digits} digits, expected at most {digits}", text, start)
     if denominator is not None:
         divisor = fmpz(denominator)
         if divisor == 0:

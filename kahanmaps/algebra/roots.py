@@ -129,7 +129,7 @@ class Root:
             roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs have a weaker type
             real_roots: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
             if not real_roots:
-                raise InputError(f"a {self} is not real: take exact or mod:P arithmetic")
+                raise InputError(f"a {self} is not real: use exact or mod:P arithmetic")
             middle = arb(0 if near is None else near)
             first, *others = sorted(real_roots, key=lambda root: float(abs(root - middle)))
             if others and (near is None or not abs(first - middle) < abs(others[0] - middle)):  # a comparison of balls

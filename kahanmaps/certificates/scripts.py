@@ -108,7 +108,7 @@ def script_certificate(
     Args:
         to: GP, for `gp -q FILE`, or PYTHON, for SymPy.
         data: the map.
-        claims: what is checked.
+        claims: the statements to be checked.
         header: lines of the comment on top.
     """
     n = data.dim

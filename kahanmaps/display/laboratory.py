@@ -105,7 +105,7 @@ def _text(text: str, width: int = _TEXT) -> str:
     return markup.escape(markup.shortened(text, width))
 
 
-# -- a whole analysis
+# -- complete analyses
 
 
 def analysis_title(analysis: Analysis) -> str:
@@ -123,7 +123,7 @@ def analysis_head(analysis: Analysis) -> str:
 
 @text_form.register
 def analysis_text(analysis: Analysis) -> str:
-    """The whole report."""
+    """Return the complete report."""
     lines = [analysis_head(analysis)]
     for title, statements in analysis.sections:
         lines += ["", title, *(f"{line.status}\t{line.text}" for line in statements)]
@@ -148,7 +148,7 @@ def analysis_html(analysis: Analysis) -> str:
     return markup.titled(markup.shortened(analysis.file.name), "\n".join(inside), beside)
 
 
-# -- what is preserved
+# -- preserved structures
 
 
 @lines_of.register

@@ -233,7 +233,7 @@ class DocumentReader(PartReader):
                 written = "\nan algebraic number is written: root of t^2 - 2"
                 hint = written if isinstance(given, str) and "sqrt" in given else ""
                 self._mistake(path, f"{error}{hint}")
-                self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
+                self.parameters[name] = fmpq(1)  # or each use of the parameter would be reported as a further mistake
                 self.unsure = True
         if self.root is not None:
             self.symbols = (self.root[0],)

@@ -243,7 +243,7 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
             if derivative.order != 1 or derivative.name not in velocities:
                 raise InputError(
                     f"found a derivative of {derivative.name} on the right side of the equation for {name}, expected a "
-                    "formula in the variables: write out what it is equal to"
+                    "formula in the variables: replace it by the right-hand side of its equation"
                 )
             formula.append(gaps[k] + velocities[derivative.name])
             k = derivative.end

@@ -63,7 +63,7 @@ class SystemFile(HtmlDisplay):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any] = field(repr=False)
-    notes: tuple[str, ...] = ()  # what was made of equations beyond their words, for people
+    notes: tuple[str, ...] = ()  # how equations were interpreted, as sentences for the user
     integrals_in_iterates: Mapping[str, RationalFunction] = field(default_factory=dict)  # claims that contain x~
 
     @property
@@ -132,7 +132,7 @@ class SystemFile(HtmlDisplay):
     def real_approximation(self) -> SystemFile:
         """The file for floats: an algebraic parameter is replaced by a rational number close to it.
 
-        Raises InputError where that is not real.
+        Raises InputError if the number is not real.
         """
         if not isinstance(self.map, AlgebraicMap):
             return self

@@ -94,7 +94,7 @@ def parse_with_iterates(
     sizes = [len(P) for P in functions] * (outer + 1)
     monomials = [monomial for part in parts for monomial in part.monoms()]
     if sum(prod(size ** int(e) for size, e in zip(sizes, m, strict=False)) for m in monomials) > _MAX_PRODUCTS:
-        raise InputError("found a formula whose letters, replaced, have too many terms")
+        raise InputError("found a formula with too many terms after its letters are replaced")
     gens, coordinates = context.gens(), (count + 1) * n
 
     def later(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:

@@ -319,7 +319,7 @@ class ExperimentReader:
         return valid
 
     def _find_option(self, kind: TaskKind, name: str, written: str) -> Option:
-        """Return the option or parameter of this name. Raises InputError where there is none."""
+        """Return the option or parameter of this name. Raises InputError if there is no such option."""
         if name.startswith(PARAMETERS) and self.has_parameters:
             key = name.removeprefix(PARAMETERS)
             for file in self.files:

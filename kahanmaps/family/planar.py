@@ -281,7 +281,7 @@ def normal_form(member: FamilyMember) -> NormalForm:
 
 
 def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
-    """For each unit vector a sum of it with few small multiples of others that generates a free K-module.
+    """Yield for each unit vector a sum with few small multiples of other unit vectors that generates a free K-module.
 
     A multiple c of another unit vector makes the module as large as the two allow for all but at most m values of c:
     on the part of every factor of chi, where K is a field, at most one c is bad.

@@ -185,7 +185,7 @@ def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     for i, component in enumerate(field):
         for exponent, coefficient in component.terms():
             raised = tuple(power + (i == j) for j, power in enumerate(exponent))
-            # Euler's formula, for each degree by itself.
+            # Euler's formula, for each degree separately.
             H = H + context.from_dict({raised: coefficient / sum(raised)})
     return CubicHamiltonian(H, J) if gradient(H) == field else None
 
@@ -265,7 +265,7 @@ def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
 
 
 def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
-    """The idempotent E of the space taken apart, as far as its elements E X E do it; each piece with the best X."""
+    """Split the idempotent E of the space by elements E X E, as far as possible; return each part with its best X."""
     if trace(E) == 2:  # self-adjoint in a symplectic plane: scalar
         yield _Part(E, E * 0, _T)
         return
@@ -402,7 +402,7 @@ def _reason_against(hamiltonian: CubicHamiltonian) -> str:
 
 def _require_size(dim: int) -> None:
     if dim > MAX_DIMENSION:
-        raise InputError(f"A is looked for in dimensions up to {MAX_DIMENSION}, found {dim}")
+        raise InputError(f"A is searched for in dimensions up to {MAX_DIMENSION}, and the system has dimension {dim}")
 
 
 def _pulled_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly:

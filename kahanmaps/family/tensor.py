@@ -199,7 +199,7 @@ def components(
 ) -> list[fmpq_mpoly]:
     """Return the coefficients of 1, t, ..., t^(m-1) of a polynomial in x = x_0 + x_1 t + ....
 
-    Of the polynomial's own variables the first ones are split, into `variables`, and t and those in `names` are kept.
+    The first variables of the polynomial are split into `variables`; t and the variables in `names` are unchanged.
     Without `names` the ring is that of the variables.
     """
     names = names or variables

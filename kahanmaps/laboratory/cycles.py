@@ -28,7 +28,7 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 
-MAX_POINTS = 2_000_000  # of a whole space, up to dimension 6; half as many with each further dimension
+MAX_POINTS = 2_000_000  # of a space that is examined completely, up to dimension 6; halved with each further dimension
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
 MAX_DIMENSION = 12  # the minors of a point are 2^(n + 1) arrays
 MAX_FACTORED = 6  # the dimension up to which the forms of the map are computed
@@ -100,8 +100,8 @@ def cycle_census(
 
     A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
     examined up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
-    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends it with what is known.
-    Of a composition each map is applied in turn: a point is indeterminate where one of them is not defined. Above
+    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends the census early. The maps
+    of a composition are applied one after the other: a point is indeterminate if one of them is not defined. Above
     dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
     Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
 
@@ -205,7 +205,7 @@ class _ProjectiveMap:
             self.maps.append((by_minors, terms))
 
     def images(self, X: Any) -> Any:
-        """The images of at most `portion` points; columns of zeros where there is none."""
+        """Return the images of at most `portion` points; a column of zeros for a point without image."""
         p = self.prime
         for by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}

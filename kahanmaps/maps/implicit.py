@@ -531,7 +531,7 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
 
 
 def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
-    """Return what is wrong with a map given by the user, tested at random points modulo primes; empty if nothing is.
+    """Return the error in a map given by the user, tested at random points modulo primes; empty if there is none.
 
     The map must be defined and dominant, and an inverse map that is given must be the inverse. A wrong map passes one
     of the three points with probability below 2^-40. If `root` is given, the only symbol stands for it, and primes are

@@ -138,7 +138,7 @@ def claims() -> tuple[Claim, ...]:
 
 # ---- evaluating a claim ----------------------------------------------------------------------------------------
 
-# What evaluating a claim raises where it is not defined.
+# The exceptions that a claim raises at points where it is not defined.
 UNDEFINED = (SingularStep, SingularMatrix, ZeroDivisionError)
 
 

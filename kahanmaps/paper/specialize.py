@@ -1,7 +1,7 @@
 """The objects of the paper over several fields: for a given member, and for the member with indeterminate data.
 
 * `MemberObjects`: a member at a point, over QQ or GF(p); where the library has its own code for a letter (the chain,
-  the associated systems, the integrals, Pi), that code is what is tested.
+  the associated systems, the integrals, Pi), the claims test that code.
 * `normal_form_objects`: the normal form with indeterminate roots, coefficients, x and eps. Over the splitting field of
   chi every member with distinct roots is symplectically similar to a specialization of it (docs/mathematics.md).
 * `random_objects`: everything at random over GF(p), hidden by a random symplectic matrix.

@@ -93,5 +93,5 @@ VARIATIONS: dict[str, Variation] = {
 
 
 def varied(name: str, o: PaperObjects) -> PaperObjects:
-    """The objects varied, or as they are where `o.varied` is False."""
+    """Return the varied objects, or the objects unchanged if `o.varied` is False."""
     return VARIATIONS[name].function(o) if o.varied else o

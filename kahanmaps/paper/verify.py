@@ -131,7 +131,7 @@ def verify(
     Raises:
         InputError: where the system is not of kind [family], and for another m.
 
-    Source: petrera-suris-2016, all of it; schwartz-1980 for the bounds.
+    Source: petrera-suris-2016; schwartz-1980 for the bounds.
 
     >>> report = verify(m=2, options=VerifyOptions(sections=(6,)))
     >>> str(report.verdict), report.findings[1].claim
@@ -456,7 +456,7 @@ class Verifier:
             yield Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
 
     def notes(self) -> list[str]:
-        """Return the notes on the whole table."""
+        """Return the notes on the complete table."""
         if self.member is None:
             return [NOTE_ON_RANDOM_MEMBERS]
         notes = [diagnosis(self.member.A)]

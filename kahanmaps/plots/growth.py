@@ -117,7 +117,7 @@ def plot_degrees(
 
 
 def _degree_label(growth: DegreeGrowth) -> str:
-    """A line of the legend behind the name: what d_n is, the dynamical degree and what is estimated."""
+    """A line of the legend behind the name: the meaning of d_n, the dynamical degree, and a mark for estimates."""
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
@@ -348,7 +348,7 @@ def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, .
             steps = [_integer(height["step"]) for height in orbit["heights"]]
             bits = [_integer(height["bits"]) for height in orbit["heights"]]
             if not steps or any(later <= earlier for earlier, later in pairwise(steps)):
-                raise InputError("steps do not increase")
+                raise InputError("expected increasing steps")
             kind, every = Growth(orbit["kind"]), max(1, _integer(orbit["every"]))
             constant = None if orbit["constant"] is None else float(orbit["constant"])
             ratio = None
@@ -370,7 +370,7 @@ def _integer(value: Any) -> int:
 
 
 def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
-    """The law that was fitted, as a function of the step, NaN where it is not positive; None where there is none.
+    """Return the fitted law as a function of the step, NaN where it is not positive; None if no law was fitted.
 
     For c n^2 and c n, c is that of the library, and the terms of lower degree fit the heights best in the sense of
     least squares. The exponential goes through the last height.

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.8
-_MANY = f"{Growth.EXPONENTIAL} growth"  # drawn thin, and none of it is named
+_MANY = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
 _CONDITION_SIZE = 0.8  # of the letters of conditions, in units of that of other text
 _PLACES, _DOTS = 12, 300  # parts of a curve: at whose ends its condition may be written, and to find what it crosses
 _INNER = 0.85  # of the width and height of the picture, the axes
@@ -156,10 +156,11 @@ def _draw(scan: Scan, style: Style, kinds: list[_Kind], window: Window, beside_n
 
 
 def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None:
-    """Conditions beside what they describe, as far as there is room: curves first, which may cover points if need be.
+    """Write conditions next to their curves and points where there is room: curves first; these labels may cover
+    points.
 
-    Of points those with the fastest growth that is not exponential come first. Of the places where a text fits it takes
-    the one that the fewest curves cross.
+    Among points, those with the fastest growth that is not exponential come first. A label takes the place, of those
+    where it fits, that the fewest curves cross.
     """
     em = _CONDITION_SIZE * style.font_size
     across, high = (em / (72 * _INNER * inches) for inches in style.inches(_ASPECT))

@@ -204,7 +204,7 @@ def plot_squares(
     """
     dim = squares_of_pairs[0].pair.f.dim
     if not all(np.isfinite(_table(squares.g_after_f)[0, 0]).all() for squares in squares_of_pairs):
-        raise InputError(f"found a start with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
+        raise InputError(f"found an initial point with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
     chosen = widest_axes(squares_of_pairs) if axes is None else axes
     if len(chosen) != 2 or not all(0 <= k < dim for k in chosen):
         raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
@@ -384,7 +384,7 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
 
 
 def _table(lattice: Lattice) -> Floats:
-    """The points as floating-point numbers, nan where there is none or it is too large for them."""
+    """Return the points as floating-point numbers, nan for missing points and those that are too large."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
     table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
     return np.where(np.abs(table) < _LARGEST, table, np.nan)

@@ -23,7 +23,7 @@ _MAX_PIXELS = 1 << 28  # a gigabyte while it is drawn
 
 @dataclass(frozen=True)
 class Style:
-    """How a picture is set: width and height in centimetres, letters in points, dots per inch of what is rasterised.
+    """The layout of a picture: width and height in centimetres, font size in points, dots per inch of rasterised parts.
 
     A height of None is left to the kind of picture. Raises InputError for sizes out of the range given with each, and
     for more than 2^28 dots in the picture.

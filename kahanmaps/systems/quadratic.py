@@ -62,7 +62,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
             if degree > 2 and self.symbols:
                 raise InputError(
                     f"found right-hand sides of degree {degree} in the variables with {', '.join(self.symbols)} as "
-                    "symbols, expected at most 2: leave the parameter that makes them cubic a number"
+                    "symbols, expected at most 2: give the parameter that makes them cubic a value"
                 )
             if degree > 2:
                 raise InputError(
@@ -253,7 +253,7 @@ class SystemOver:
 
     @cached_property
     def _slopes(self) -> list[Any]:
-        """The derivative of f' by each variable: f''(v) as their sum costs a third of a product of the whole tensor."""
+        """The derivatives of f' by each variable; f''(v) as their sum costs a third of a product with the tensor."""
         n, entries = self.dim, self.tensor.entries()
         with self.field.working():
             return [self.field.matrix(n, n, entries[k::n]) for k in range(n)]
@@ -288,5 +288,5 @@ def as_system(value: Any) -> QuadraticSystem:
 
 
 def _indices(monomial: Sequence[int]) -> list[int]:
-    """Of the variables in a monomial, each as often as it occurs."""
+    """Return the indices of the variables in a monomial, each repeated according to its exponent."""
     return [j for j, exponent in enumerate(monomial) for _ in range(exponent)]

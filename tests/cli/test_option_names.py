@@ -29,7 +29,7 @@ def test_whoever_takes_eps_takes_the_time_step():
     assert by_name()["--eps"] == by_name()["--time-step"] != set()
 
 
-@together("option, value, found", REFUSED)
+@together("option, value, result", REFUSED)
 def test_a_value_that_is_none_is_refused_by_every_command(kahanmaps, option, value, result):
     assert by_name()[option]
     for words in by_name()[option]:

@@ -57,7 +57,7 @@ def test_the_json_has_what_is_needed_to_run_it_again_and_files_of_an_earlier_sca
     ((only,),) = [entry["components"] for entry in result["classes"]]
     assert (only["equations"], only["values"], only["growth"]) == (["a + 1"], {"a": "-1"}, "linear")
     assert (only["confirmed"], only["tried"], only["primes"]) == (3, 3, [11, 13, 17])
-    assert [entry["seen"] for entry in result["sweeps"]] == [11, 13, 17]
+    assert [entry["measured"] for entry in result["sweeps"]] == [11, 13, 17]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lotka_volterra-1.toml", "lotka_volterra-x.toml"]
     assert tomllib.loads((tmp_path / "lotka_volterra-1.toml").read_text())["parameters"]["a"] == "-1"
 

@@ -1,7 +1,7 @@
 """The normal form of a system, declared or found.
 
-Specified here: what is declared is taken as it is, what is not is looked for; the structure steps like the system, also
-for another J; and where there is none the reason is said.
+Specified here: a declared structure is used unchanged, otherwise it is searched for; the structure steps like the
+system, also for another J; and if there is none, the reason is given.
 """
 
 import pytest

@@ -19,7 +19,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 @pytest.fixture(autouse=True)
 def early(monkeypatch):
-    """Forms are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
+    """Forms are searched for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
     monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)

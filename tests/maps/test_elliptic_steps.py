@@ -27,7 +27,7 @@ small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x:
 
 @pytest.fixture(autouse=True)
 def early(monkeypatch):
-    """Sequences are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
+    """Sequences are searched for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
     monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)

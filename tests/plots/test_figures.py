@@ -89,7 +89,7 @@ def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():
 
 
 def test_pictures_of_more_dots_than_fit_into_memory_are_refused():
-    with pytest.raises(InputError, match="take fewer dots per inch than 2400"):
+    with pytest.raises(InputError, match="use fewer dots per inch than 2400"):
         Style(width=200, dpi=2400)
     tall = Style(width=20, dpi=2000)  # 12 000 x 16 000 dots are few enough, as high as three times that are not
     with pytest.raises(InputError, match="2000"):

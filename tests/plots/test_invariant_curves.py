@@ -152,7 +152,7 @@ def test_one_pole_ends_the_orbit_in_all_planes_and_a_plane_at_rest_is_said_to_be
         ([START[4]], -1, "found -1 steps"),
         ([START[4]], MAX_POINTS, "expected 0 or more steps and at most 1000000 points"),
         ([[1, 2]], 5, "found a point with 2 coordinates, expected 4"),
-        ([[10**200, 0, 0, 0]], 5, "scale the start"),
+        ([[10**200, 0, 0, 0]], 5, "scale the initial point"),
     ],
 )
 def test_wrong_sizes_are_refused(starts, steps, message):

@@ -73,7 +73,9 @@ def command(system: str | None, **options: Any) -> int:
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
-            raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
+            raise click.UsageError(
+                "a range of values cannot be combined with --monomials, --darboux, --flow, --toml and --latex"
+            )
         result = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{integral.text} ({integral.verdict})" for integral in result.integrals)
         line = f"{_count(result).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
@@ -82,12 +84,12 @@ def command(system: str | None, **options: Any) -> int:
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
     if options["flow"] and (options["sets"] or options["as_toml"]):
-        raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
+        raise click.UsageError("--flow cannot be combined with --monomials and --toml, which are for the map")
     if options["sets"] and options["darboux"] is not None:
         raise click.UsageError("give --monomials or --darboux, not both")
     instead = "--monomials" if options["sets"] else "--darboux" if options["darboux"] is not None else ""
     if instead and (options["as_toml"] or options["as_latex"]):
-        raise click.UsageError(f"{instead} goes with --json, not with --toml and --latex")
+        raise click.UsageError(f"{instead} can be combined with --json, not with --toml and --latex")
     if instead:
         return (_bases if options["sets"] else _darboux)(system, options)
     with SearchProgress(options) as search:
@@ -136,7 +138,9 @@ def _darboux(system: str | None, options: dict[str, Any]) -> int:
 
 def _bases(system: str | None, options: dict[str, Any]) -> int:
     if options["symbolic"]:
-        raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")
+        raise click.UsageError(
+            "--monomials cannot be combined with --symbolic: the null space is measured at random eps"
+        )
     eps = symbols_and_eps(options)[1]
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)

@@ -156,7 +156,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
 
 
 def read_record(path: str) -> Any:
-    """The JSON object in a file, `-` for standard input. Raises InputError where there is none."""
+    """Return the JSON object in a file, `-` for standard input. Raises InputError if the file contains no object."""
     try:
         with click.open_file(path, "rb") as file:
             content = file.read(_MAX_BYTES + 1)

@@ -112,7 +112,7 @@ def print_search(
 def print_list(
     name: str, heading: str, result: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
-    """Print the result of a search that is complete or says what is undecided; return the exit status."""
+    """Print the result of a search, which is complete or names what is undecided; return the exit status."""
     if as_json:
         print_json({"command": name, **context, **result.to_json()})
     else:

@@ -138,7 +138,7 @@ class SearchProgress(Progress):
 
     @property
     def ending(self) -> str:
-        """The message that the search was stopped, with what was being done."""
+        """Return the message that the search was stopped, and in which step."""
         return f"stopped after {self._seconds:g} s (--seconds){self._sentence and ': '}{self._sentence}"
 
     def __enter__(self) -> Self:

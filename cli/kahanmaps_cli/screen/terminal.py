@@ -76,7 +76,7 @@ def console() -> Console:
 
 
 def formula(text: str, width: int = 400) -> str:
-    """Shorten a long formula on a terminal; a pipe gets all of it."""
+    """Shorten a long formula on a terminal; a pipe gets the complete formula."""
     return shorten(text, width) if on_terminal() else text
 
 

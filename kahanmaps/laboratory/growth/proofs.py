@@ -121,7 +121,7 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
 
 
 def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
-    """The proof that a monomial map with this exponent matrix is periodic; None where it is not, or is the identity.
+    """Prove that a monomial map with this exponent matrix is periodic; return None if it is not, or is the identity.
 
     If A^n = 1, the iterate n multiplies each variable by a number or a function of eps. Its order is then 1 or 2.
     """
@@ -168,10 +168,10 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
 
 
 def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProof | None:
-    """The proof that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
+    """Prove that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
 
-    Exact, by composing formulas. None where it is not, and where the formulas have too many terms. Of a linear iterate
-    powers up to 12 are tried as well, the first that is the identity is named then.
+    Exact, by composing formulas. Returns None if the iterate is not linear or the formulas have too many terms. If it
+    is linear, its powers up to 12 are computed, and the proof names the first one that is the identity.
     """
     if map_.symbols or map_.root is not None:
         return None

@@ -101,7 +101,7 @@ def candidates(
 
     For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
     factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
-    of the `further` polynomials. For a flow they are its Darboux polynomials, as far as the budget goes.
+    of the `further` polynomials. For a flow they are its Darboux polynomials, until the budget is spent.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
@@ -160,7 +160,7 @@ class _Line:
             self._apply(factor)
 
     def _apply(self, factor: ElementaryMap) -> None:
-        """Apply one factor of the map to the image; det of it is numerator Z^n / (denominator Z~^n)."""
+        """Apply one factor of the map to the image; its determinant is numerator Z^n / (denominator Z~^n)."""
         p, n, curve = self.prime, factor.dim, self.image
         top, size = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 

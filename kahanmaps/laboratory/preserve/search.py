@@ -91,7 +91,7 @@ class Branches:
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
-    """Return the span of 1 and the affine integrals v.x (for Kahan maps: v.f = 0); None where there are none."""
+    """Return the span of 1 and the affine integrals v.x (for Kahan maps: v.f = 0); None if there are none."""
     n, prime = map_.dim, map_.prime
     changes = [[b - a for a, b in zip(x, image, strict=True)] for x, image in map_.pairs(n + _SPARE)]
     vectors = null_space(changes, n, prime)

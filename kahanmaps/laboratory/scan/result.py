@@ -1,4 +1,4 @@
-"""The result of a scan: components of parameter space, and the part of it that was searched."""
+"""The result of a scan: components of parameter space, and which part of the space was searched."""
 
 from __future__ import annotations
 

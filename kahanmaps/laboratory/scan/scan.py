@@ -317,7 +317,7 @@ class _ScanRun:
         return plan
 
     def more_primes(self, known: Sequence[Component], primes: Sequence[int] | None, most: float) -> list[Choice]:
-        """Plan further primes, as far as all members together are at most `most`, if points were probably missed.
+        """Plan further primes if points were probably missed, with at most `most` members in total.
 
         Points are missed if there are unassigned members, but fewer than a curve has, or a hypersurface on random
         lines. The plan is empty if none were, or if the user gave the primes.
@@ -446,7 +446,7 @@ def _choose_terms(
     room = usual if terms is None else _MAX_ROOM
     degrees = family.degrees(members, eps, terms or _MAX_TERMS, room, rng).max(axis=0).tolist()
     if degrees[0] == NOWHERE:
-        raise InputError("the map is defined nowhere, whatever the parameters are")
+        raise InputError("the map is not defined at any point, for all parameters")
     measured = sum(degree >= 0 for degree in degrees)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")

@@ -100,7 +100,7 @@ def sweep(
         room: as for `Family.degrees`.
         on: the number and the dimension of random affine subspaces of parameter space whose members are measured, or
             None for all members.
-        units: the work that one member counts as.
+        units: the units of work that are counted for one member.
         seed: the random seed.
         jobs: as for `Family.degrees`.
         check: called repeatedly; may raise TimeOver.
@@ -133,7 +133,7 @@ def sweep(
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
     generic = degrees.max(axis=0)
     if generic[0] < 0:
-        raise InputError("the map is defined nowhere, whatever the parameters are")
+        raise InputError("the map is not defined at any point, for all parameters")
     special, false_alarms = np.flatnonzero((degrees != generic).any(axis=1)), 0
     for line in range(1, _MAX_LINES):
         if not len(special):

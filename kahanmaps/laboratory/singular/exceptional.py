@@ -133,7 +133,7 @@ class _Forms:
 
 @dataclass(frozen=True)
 class _Curve:
-    """A curve through a point of a line where a form vanishes, and what is tracked along it.
+    """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
 
     `across` is another random vector, for surfaces. `excess` are the exponents of the forms in the common factor of the
     minors of the equation, which is no part of the map. Curves are followed within the limits.
@@ -211,7 +211,7 @@ class _Curve:
 
     @cached_property
     def census(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
-        """All components on a plane, each with a curve through a point of it; empty where one has no point."""
+        """Return all components on a plane, each with a curve through one of its points; empty if one has no point."""
         try:
             return [(component, self.through(component, self.line)) for component in self.components(self.line)]
         except OrbitDataUnknown:

@@ -139,7 +139,7 @@ class AlongCurves(Protocol):
         """What `images_of_curve` takes."""
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """For each of the steps, or the first of them, what is divided out and the orders of hypersurfaces."""
+        """Return for each step, or the first steps, the power that is divided out and the orders of hypersurfaces."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class Range:
     A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
     point of the image is followed, which is fast. Where it reaches the locus, series are needed, which are slow: for
     at most `along` steps, or `enough` if multiplicities repeat and each step uses up terms, so that series are long.
-    All of it stops when the `budget` is spent.
+    The computation stops when the `budget` is spent.
     """
 
     shown: int
@@ -304,7 +304,8 @@ class TestCurve:
             steps = longest
 
     def _met_for_ever(self, point: Sequence[int]) -> tuple[int, ...] | None:
-        """The critical hypersurfaces on the later orbit of a point, if it closes and the map has a value on all of it.
+        """Return the critical hypersurfaces on the later orbit of a point; None unless it closes at points of
+        definition.
 
         Then no power of t is ever divided out again. None elsewhere. Lines in this direction show the value of the map.
         """

@@ -82,7 +82,7 @@ class JetStep:
         rank: the rank of the differential of the map from the hypersurface to the limits of its points.
         limit: the limit of the point for t -> 0, after the step.
         orders: the valuations of the requested functions at the image.
-        curve: the image itself as far as it is known; empty if no functions were requested.
+        curve: the known terms of the image itself; empty if no functions were requested.
     """
 
     common: int

@@ -170,7 +170,7 @@ class Hypersurface:
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
     cannot be said: its pattern has not settled. `orbit_data` is this pattern. In a composition that is
     followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
-    `generic` is its polynomial over Q[eps], empty where it is not known.
+    `generic` is its polynomial over Q[eps], empty if it is not known.
     """
 
     polynomial: str = "?"
@@ -192,7 +192,7 @@ class Hypersurface:
     def sentence(self, at: str) -> str:
         """Describe its pattern: where its images lie, when they lower the degree, and whether it is confined.
 
-        `at` names the eps of the polynomial, where that is not the one over Q[eps].
+        `at` names the eps of the polynomial if this is not the one over Q[eps].
         """
         text, most = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
         cut = text if len(text) <= most else f"{text[:most]} ..."

@@ -314,7 +314,7 @@ class Patterns:
 
     @property
     def series_text(self) -> str:
-        """The generating function of the degrees as a formula in z; empty where it is not known."""
+        """The generating function of the degrees as a formula in z; empty if it is not known."""
         return " / ".join(f"({_ascending(part)})" for part in self.series)
 
     @property
@@ -466,7 +466,7 @@ def _patterns(
     map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = "", word: Word | None = None
 ) -> Patterns:
     maps = 1 if word is None else word.length
-    # A pole of multiplicity 0 is no critical hypersurface: what it becomes lowers no degree.
+    # A pole of multiplicity 0 is no critical hypersurface: its images lower no degree.
     critical = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
     for h in critical:
         name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
@@ -549,7 +549,7 @@ def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
     """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
     rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
     for _ in range(_POINTS):
-        field = GF(random_prime(rng))  # what is not 0 there is not 0 over Q
+        field = GF(random_prime(rng))  # a number that is not 0 modulo p is not 0 over Q
         try:
             if det(map_.at(eps, field).jacobian([rng.randrange(field.prime) for _ in range(map_.dim)])) != 0:
                 return True

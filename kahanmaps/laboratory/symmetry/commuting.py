@@ -430,6 +430,6 @@ def find_commuting(
             replace(family, base=over_field(family.base), directions=tuple(map(over_field, family.directions)))
             for family in result.families
         ],
-        irrational=[],  # such solutions are not over the field either, but over extensions of it
+        irrational=[],  # such solutions are not over the field either, but over its extensions
         root=str(given.root),
     )

@@ -431,7 +431,7 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
 
 
 def is_singular(part: SolutionComponent, n: int) -> bool:
-    """Whether det S = 0 on the whole linear family of n x n matrices, its entries row by row.
+    """Return whether det S = 0 on the complete linear family of n x n matrices, given by its entries row by row.
 
     >>> a = ring(["a"]).gens()[0]
     >>> is_singular(SolutionComponent((a, a, a, a)), 2), is_singular(SolutionComponent((a, a, a, -a)), 2)

@@ -43,7 +43,7 @@ class NthIterate:
         from kahanmaps.maps.normal_form.splitting import Splitting
 
         self.splitting = Splitting(normal_form.form, field, self.eps, normal_form.T)
-        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last one, with what it is of
+        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last orbit, with its arguments
 
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
@@ -90,7 +90,7 @@ class NthIterate:
         point = start
         for k in range(1, n + 1):
             if k > _CYCLE:
-                raise InputError(f"the iterate {n} cannot be reached directly here: take fewer steps or another prime")
+                raise InputError(f"the iterate {n} cannot be reached directly here: use fewer steps or another prime")
             point = stepped_over(block, point, 1)
             if same_point(point, start):
                 return stepped_over(block, start, n % k)

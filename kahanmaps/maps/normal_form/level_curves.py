@@ -116,7 +116,7 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
 
 
 class LevelCubic:
-    """A smooth level cubic above h - below W (W^2 + D), as a group with a point of it for its zero.
+    """A smooth level cubic denominator h - numerator W (W^2 + D), as a group with one of its points as zero.
 
     The sum of points comes from chords and tangents, with no normal form. Its points are triples, not normalised.
     """

@@ -150,7 +150,7 @@ class ShortElements:
         self._powers = [[root**k for k in range(algebra.degree)] for root, _ in roots if not root.imag < 0]
 
     def split(self, value: EtaleElement) -> tuple[EtaleElement, EtaleElement]:
-        """Return a value that is not zero as (short element, scale): their product."""
+        """Write a value that is not zero as the product of a short element and a scale."""
         multiplier = self._multiplier(value)
         return (value, self._algebra.one) if multiplier is None else (value * multiplier, 1 / multiplier)
 

@@ -99,7 +99,7 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def power(self) -> fmpz:
-        """A power of `bad` with its primes mostly as often as they are in numbers."""
+        """A power of `bad` whose primes have exponents that numbers rarely exceed."""
         return self.bad**3
 
     @cached_property

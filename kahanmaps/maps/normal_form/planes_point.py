@@ -152,7 +152,7 @@ class PlanesPoint:
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Return numerator and denominator of each coordinate in lowest terms, denominators positive."""
         planes = [(numerator, W) for numerator, W, _ in self._fractions]
-        suspects = fmpz(1)  # with all primes that divide two of the W
+        suspects = fmpz(1)  # divisible by all primes that divide two of the W
         *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest is only reduced
         while others:
             number = others.pop()
@@ -220,7 +220,7 @@ def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fm
 
 
 def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
-    """Return a common factor of two numbers and the modulus: all of it, except high powers of primes."""
+    """Return a common factor of two numbers and the modulus: the greatest one, except for high powers of primes."""
     common = modulus.gcd(numerator % modulus)
     return common if common == 1 else common.gcd(denominator % common)
 

@@ -39,7 +39,7 @@ def iterate(
     """Return P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
     `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep where a
-    pole is met before `n`, as far as the orbit is stepped (a few points from the start); NoTranslation where it meets
+    pole is met among the first points, which are stepped one by one; NoTranslation where it meets
     too many special positions.
 
     >>> from kahanmaps.algebra.fields import GF

@@ -500,7 +500,7 @@ def _normal_form(
     """Return the normal form, or the reason why none is used."""
     map_, eps = request.map, request.eps
     if method == "generic":
-        return NoNormalForm("not looked for")
+        return NoNormalForm("not computed")
     if not isinstance(map_, KahanFamily) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
     if method is None:  # no search for a normal form where it would take longer than the orbit
@@ -509,9 +509,9 @@ def _normal_form(
         if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
             max_steps = max(max_steps, 24)
         if request.steps <= max_steps:
-            return NoNormalForm("not looked for, for so few steps")
+            return NoNormalForm("not computed for so few steps")
         if member is None and map_.dim > _MAX_SEARCH_DIMENSION:
-            return NoNormalForm(f"not looked for in dimension {map_.dim}")
+            return NoNormalForm(f"not computed in dimension {map_.dim}")
     normal_form = system_normal_form(map_.system, hamiltonian, member)
     if isinstance(normal_form, NoNormalForm):
         return normal_form

@@ -60,13 +60,13 @@ def _add_product(total: Any, a: Any, length_a: int, b: Any, length_b: int, sign:
 
 
 def _clear(a: Any, length: int) -> None:
-    """Zeros, as far as the length."""
+    """Set the first `length` coefficients to zero."""
     for i in range(length):
         a[0, i] = a[1, i] = 0.0
 
 
 def _copy(a: Any, b: Any, length: int) -> None:
-    """b becomes a, as far as the length."""
+    """Copy the first `length` coefficients of a to b."""
     for i in range(length):
         b[0, i], b[1, i] = a[0, i], a[1, i]
 

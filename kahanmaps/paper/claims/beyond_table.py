@@ -82,7 +82,7 @@ def table(report: Report) -> str:
 
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
-    """The data in words, and the point with both sides; None where there is none with at most seven ones."""
+    """Return the data as text, and the point with both sides; None if no data with at most seven ones refute it."""
     m, roots, slots, extras = _SMALL[variation]
     for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):

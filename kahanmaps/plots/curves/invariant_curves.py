@@ -34,7 +34,7 @@ MAX_STARTS = 7  # the number of colors
 BITS = 256
 _POLE_BITS = 96
 _PROGRESS_EVERY = 2_000  # steps
-_LARGEST = 1e60  # of what is drawn: cubes of it are still floating-point numbers
+_LARGEST = 1e60  # largest coordinate that is drawn: its cube does not overflow
 
 Numbers = NDArray[Any]
 
@@ -235,7 +235,7 @@ def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
     if not 1 / _LARGEST < smallest <= largest < _LARGEST:
         raise InputError(
             f"found numbers from {smallest:.0e} to {largest:.0e} in the plane of lambda = {frame.root_text}, expected "
-            f"{1 / _LARGEST:.0e} to {_LARGEST:.0e}: scale the start, the system or eps"
+            f"{1 / _LARGEST:.0e} to {_LARGEST:.0e}: scale the initial point, the system or eps"
         )
     return cubic
 

@@ -130,7 +130,9 @@ def survey_drift(
     for function in functions:
         exact, value = function.at(point), float(function(to_floats(point)[None])[0])
         if exact is None or not np.isfinite(value):
-            raise InputError(f"{function.name} has no value in floating point at the start: take another start")
+            raise InputError(
+                f"{function.name} is not defined in floating point at the initial point: choose another one"
+            )
         # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
         relative[function.name] = exact != 0 and value != 0.0
         origins.append((value, abs(value) if relative[function.name] else 1.0))

@@ -155,7 +155,7 @@ def projected_solutions(
     """
     functions = [axis for axis in axes if not isinstance(axis, str)]
     if len(functions) < len(axes):
-        raise InputError("the flow is drawn as curves in phase space: it does not go with the axis step")
+        raise InputError("the flow is drawn as curves in phase space: it cannot be combined with the axis step")
     box = window_of(trajectories.points.reshape(-1, system.dim), trajectories.points[0])
     steps = len(trajectories.points) - 1
     time = float(time_step(eps) * steps) * (-1 if backward else 1) if steps else None

@@ -72,7 +72,7 @@ class Limit:
 
     @property
     def text(self) -> str:
-        """The integral of the flow and what becomes of it under the map, as a sentence."""
+        """A sentence on the integral of the flow: whether the map conserves or deforms it."""
         relation = "one of the map tends to"
         if self.conserved.holds or self.conserved is Certainty.REFUTED:
             relation = f"the map conserves ({self.conserved})" if self.conserved.holds else "the map deforms"

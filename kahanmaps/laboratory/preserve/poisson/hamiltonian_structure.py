@@ -85,7 +85,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
 
     Returns:
         A `ConstantStructures`. J = [[0, I], [-I, 0]] is preferred, then another invertible J of few terms, then a J
-        whose kernel is the space of all affine integrals. A kernel that is a proper subspace of it is not tried.
+        whose kernel is the space of all affine integrals. Proper subspaces of this space are not tried as kernels.
 
     Raises:
         InputError: for a dimension above 30.

@@ -242,8 +242,8 @@ def find_poisson(
         if any(part.is_zero() for part in at_eps(denominator, laboratory.eps)):
             at = "" if laboratory.eps is None else f" at eps = {laboratory.eps}"
             raise InputError(
-                f"found the denominator {quoted(format_rational_function(denominator))}, which is identically 0 or has "
-                f"no values{at}, expected a function that is not zero"
+                f"found the denominator {quoted(format_rational_function(denominator))}, which is identically 0 or "
+                f"undefined{at}, expected a function that is not zero"
             )
     while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree -= 1
@@ -262,7 +262,7 @@ def find_poisson(
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             forms, _ = _tensors(laboratory, 2, None, logarithmic, log_canonical(dim))
         if not forms and denominator is None:
-            # Try the product of the factors of a known density as denominator, and raise the degree by that of it.
+            # Try the product of the factors of a known density as denominator, and raise the degree by its degree.
             density = None
             with suppress(NoPoint):
                 density = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), over_density)).density
