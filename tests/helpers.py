@@ -129,7 +129,7 @@ def random_point(dim: int, seed: int, height: int = 9) -> tuple[fmpq, ...]:
 
 
 def step_or_none(phi: KahanMap, x: Sequence[Any]) -> tuple[Any, ...] | None:
-    """The image of x, or None where the map has no value."""
+    """The image of x, or None where the map is not defined."""
     try:
         return phi.step(x)
     except SingularStep:

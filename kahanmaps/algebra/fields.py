@@ -360,7 +360,7 @@ class PrimeField(Field):
             text = format_number(number)
             text = text if len(text) <= 40 else f"{text[:20]}...{text[-20:]}"
             raise BadPrime(
-                f"the prime {self.prime} divides the denominator of {text}: take another prime", self.prime
+                f"the prime {self.prime} divides the denominator of {text}: use another prime", self.prime
             ) from None
 
     def random(self, rng: random.Random, height: int = 10) -> Any:

@@ -173,7 +173,7 @@ class Quotient:
 class Reconstruction:
     """The result of `reconstruct`: the functions, or None and the reason.
 
-    `samples` is the number of calls of the black box, including calls without a value; `primes` are the primes used.
+    `samples` is the number of calls of the black box, including calls that give no value; `primes` are the primes used.
     """
 
     functions: tuple[RationalFunction, ...] | None

@@ -112,7 +112,7 @@ class Root:
         residues = [int(field.convert(c)) for c in self.polynomial.coeffs()]
         roots = sorted(int(root) for root, _ in nmod_poly(residues, p).roots())
         if not roots:
-            raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: take another prime", p)
+            raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: use another prime", p)
         return roots
 
     @property

@@ -54,7 +54,7 @@ class ModularMap:
         self.rng = random.Random(f"{seed} {prime} {eps} {tuple(values)}")
         field = GF(prime)
         if eps % prime == 0:
-            raise BadPrime(f"found eps = 0 modulo {prime}: take another prime", prime)
+            raise BadPrime(f"found eps = 0 modulo {prime}: use another prime", prime)
         self.map = as_map(system).at(field.convert(eps), field, [field.convert(value) for value in values])
         count(20 if isinstance(self.map, KahanMap) else 200)
 

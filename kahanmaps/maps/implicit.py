@@ -523,7 +523,7 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
     if element == 0:
         if isinstance(eps, int | str | Fraction | fmpz | fmpq) and rational(eps) != 0:
             raise BadPrime(
-                f"the prime {over.characteristic} divides the numerator of eps = {eps}: take another prime",
+                f"the prime {over.characteristic} divides the numerator of eps = {eps}: use another prime",
                 over.characteristic,
             )
         raise InputError("found eps = 0, expected another number: at eps = 0 a map with a time step is the identity")

@@ -130,7 +130,7 @@ def squares(
                 try:
                     image = tuple(phi.step(points[-1]))
                 except SingularStep:
-                    missing.append(f"{name}: the map has no value at a point on the way")
+                    missing.append(f"{name}: the map is not defined at a point on the way")
             if image and max(entry.p.bit_length() + entry.q.bit_length() for entry in image) > MAX_BITS:
                 missing.append(f"{name}: the coordinates have more than {MAX_BITS} bits")
                 image = None

@@ -19,8 +19,8 @@ def read(text):
     ("text", "words"),
     [
         ("F0*x~, F0", "expected what a letter stands for"),
-        ("F0*x~, x = y", "no names of something else"),
-        ("F0*x~, F0 = x, F0 = y", "expected each once"),
+        ("F0*x~, x = y", "no names that are already in use"),
+        ("F0*x~, F0 = x, F0 = y", "expected each of them once"),
         ("F0~, F0 = F1, F1 = x", "unknown name 'F1'"),
         ("F0~, F0 = x/y", "division"),
         ("x" + "~" * 17, "expected at most 16"),

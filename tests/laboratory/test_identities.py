@@ -1,4 +1,4 @@
-"""Formulas that were found are put to the proof: what is expanded decides, and what has no value is undecided."""
+"""Formulas that were found are certified: an expansion decides, and an undefined formula is undecided."""
 
 from functools import partial
 

@@ -41,7 +41,7 @@ def test_singularities_of_integrable_maps_are_confined(name):
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "lorenz"])
 def test_nothing_is_confined_where_degrees_are_the_largest_possible(name):
-    """The degrees 2^n and 3^n say that no contracted hypersurface ever meets a point without a value."""
+    """The degrees 2^n and 3^n say that no contracted hypersurface ever meets an indeterminacy point."""
     for run in runs(name, steps=60):
         assert run.verdict == "not confined"
         assert {h.status for h in run.hypersurfaces} == {NOT_CONFINED}

@@ -51,7 +51,7 @@ def test_a_step_and_its_derivatives_are_those_of_the_formula(name, field):
 
 
 def test_an_orbit_stays_where_a_factor_has_no_value():
-    """x -> 1/x -> 1/x is the identity, without a value at 0 if it is stepped."""
+    """x -> 1/x -> 1/x is the identity, undefined at 0 if it is stepped."""
     inversion = parse_system('variables = ["x", "y"]\n[map]\nimage = ["1/x", "y"]').map
     shift = parse_system('variables = ["x", "y"]\n[map]\nimage = ["x - 1", "y"]').map
     word = composed_map(shift, inversion, shift)

@@ -126,7 +126,7 @@ def test_a_wrong_doubling_is_noticed(monkeypatch):
 
 @together("name", STARTS)
 def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(name):
-    """The level is infinite where the map has no value, and 0 or delta = 1 as the names of the starts say."""
+    """The level is infinite where the map is not defined, and 0 or delta = 1 as the names of the starts say."""
     _, normal_form, start = side_by_side(name)
     kinds = {
         "h = 0": "at rest",

@@ -122,7 +122,7 @@ def test_wrong_values_are_refused(start, steps, eps, methods):
 
 
 def test_a_pole_at_the_start_is_refused_and_points_without_a_value_are_counted():
-    with pytest.raises(InputError, match="E has no value in floating point at the start"):
+    with pytest.raises(InputError, match="E is not defined in floating point at the initial point"):
         survey(CIRCLE, [1, 0], 10, [("E", "1/(x - 1)")])
     file = SystemFile.from_system(QuadraticSystem.from_text(["x"], ["1"]), "shift")
     result = survey(file, [0], 10, [("E", "1/(x - 1)")], eps=fmpq(1, 2))  # x_n = n

@@ -79,7 +79,7 @@ def test_a_singular_point_is_reported_and_only_existing_corners_are_compared():
     pair = plane_pair(["x^2", "0"], ["0", "y^2"])
     result = squares(pair, [5, 2], "1/10")
     assert (result.closes, result.verdict) == (None, "no fourth corner")
-    assert result.stopped == "Phi_f: the map has no value at a point on the way"
+    assert result.stopped == "Phi_f: the map is not defined at a point on the way"
     later = squares(pair, ["5/3", "1/7"], "1/10", 3)
     assert (later.g_after_f[3][0], later.closes, bool(later.stopped)) == (None, True, True)
 

@@ -39,7 +39,7 @@ class NthIterate:
         self.normal_form, self.field = normal_form, field
         self.eps = field.convert(eps)
         if field.characteristic == 2:
-            raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): take another prime", 2)
+            raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): use another prime", 2)
         from kahanmaps.maps.normal_form.splitting import Splitting
 
         self.splitting = Splitting(normal_form.form, field, self.eps, normal_form.T)
