@@ -89,7 +89,7 @@ def Seconds() -> ParameterKind:
 
 
 def Steps() -> ParameterKind:
-    """Step numbers separated by commas."""
+    """Return the type of step numbers separated by commas."""
 
     def read(text: str) -> list[int]:
         steps = set()

@@ -34,7 +34,7 @@ class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
 
     @property
     def holds(self) -> bool | None:
-        """True, False, or None if it is not known."""
+        """Whether the claim holds; None if this is not known."""
         return {Certainty.REFUTED: False, Certainty.UNDECIDED: None, Certainty.NOTE: None}.get(self, True)
 
 

@@ -51,7 +51,7 @@ def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> 
 
 
 def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
-    """All rational associated systems; of more than 8 factors those with at most one minus sign, f_0 first."""
+    """Return rational associated systems, f_0 first; with more than 8 factors those with at most one minus sign."""
     count = len(member.factors)
     if count <= MAX_FACTORS:
         return list(member.associated())

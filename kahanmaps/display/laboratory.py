@@ -153,7 +153,7 @@ def analysis_html(analysis: Analysis) -> str:
 
 @lines_of.register
 def _integrals(search: IntegralSearch) -> Iterator[Line]:
-    """Every formula with its verdict and evidence, then the reason why there are no more."""
+    """List each formula with its verdict and evidence, then the reason why there are no more."""
     return _formulas([(integral.name, integral, "") for integral in search.integrals], (search.note, search.reason))
 
 
@@ -165,7 +165,7 @@ def _densities(search: DensitySearch) -> Iterator[Line]:
 
 @lines_of.register
 def _tensors(search: PoissonSearch) -> Iterator[Line]:
-    """Every tensor with its verdict and properties, then the reason why there are no more."""
+    """List each tensor with its verdict and properties, then the reason why there are no more."""
     named = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
     return _formulas(named, (search.note, search.reason))
 

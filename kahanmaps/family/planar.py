@@ -103,7 +103,7 @@ class NormalForm(HtmlDisplay):
 
     @property
     def dim(self) -> int:
-        """2m."""
+        """The dimension 2m."""
         return int(self.A.nrows())
 
     @property
@@ -303,7 +303,7 @@ def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
 
 
 def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
-    """S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
+    """Return S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
 
     The integers (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1, those with s = 0 one of rank m.
     With weights beyond the bounds of LLL for short vectors of either, the first m vectors of a reduced basis have

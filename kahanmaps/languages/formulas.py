@@ -40,7 +40,7 @@ class Formulas:
     """
 
     def __init__(self, file: SystemFile, symbols: Sequence[str] = ()) -> None:
-        """Raises InputError if these parameters cannot be symbols."""
+        """Collect the formulas; raises InputError if these parameters cannot be symbols."""
         self.file = file
         if isinstance(file.map, AlgebraicMap):
             if symbols:

@@ -98,7 +98,7 @@ class PaperObjects:
 
     @property
     def m(self) -> int:
-        """Half the dimension, m."""
+        """The number m, half the dimension."""
         return self.n // 2
 
     # ---- numbers, vectors and matrices --------------------------------------------------------------------------

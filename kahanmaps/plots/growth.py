@@ -48,7 +48,7 @@ _ASPECT = 0.62  # of the axes
 def plot_degrees(
     growths: Mapping[str, DegreeGrowth], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Degrees d_n of the iterates against n, for one or more systems by their names.
+    """Plot the degrees d_n of the iterates against n, for one or more systems by their names.
 
     Marks are the measured degrees. A solid line is the recurrence that they satisfy; dots join degrees for which none
     could be checked, and what the legend says of their growth is estimated. `scale` is "linear", "log" (exponential
@@ -146,7 +146,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
 def plot_heights(
     survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Heights of exact orbits against the step, with the growth that was fitted, a color for each eps.
+    """Plot the heights of exact orbits against the step, with the fitted growth, in a color for each eps.
 
     Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2, c n (each with its lower
     terms) or a factor in each step; orbits whose growth is bounded, logarithmic or undecided have none. `scale` is

@@ -32,7 +32,7 @@ class Plot:
         return "plot"  # there is one, `km.plot`
 
     def degrees(self, growth: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
-        """What `km.degrees` found; `scale` is "linear", "log" or "loglog"."""
+        """Plot the result of `km.degrees`; `scale` is "linear", "log" or "loglog"."""
         from kahanmaps.plots.growth import plot_degrees
 
         _require(growth, DegreeGrowth, "a result: km.plot.degrees(km.degrees(...))")
@@ -40,7 +40,7 @@ class Plot:
         return axes
 
     def heights(self, survey: HeightSurvey, *, scale: str | None = None) -> Axes:
-        """What `km.heights` found."""
+        """Plot the result of `km.heights`."""
         from kahanmaps.plots.growth import plot_heights
 
         _require(survey, HeightSurvey, "a result: km.plot.heights(km.heights(...))")
@@ -56,7 +56,7 @@ class Plot:
         )
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
-        """As `km.portrait`."""
+        """Draw a portrait, as `km.portrait` does."""
         return plot_orbits(given, *others, **options)
 
 

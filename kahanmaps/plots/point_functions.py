@@ -52,7 +52,7 @@ class PointFunction:
         return value
 
     def parts(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Numerator and denominator at points (..., dim)."""
+        """Return numerator and denominator at points (..., dim)."""
         with np.errstate(all="ignore"):
             return self._value(self.function.numerator, points), self._value(self.function.denominator, points)
 

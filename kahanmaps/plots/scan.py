@@ -44,7 +44,7 @@ _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 def plot_scan(
     scan: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
 ) -> Figure:
-    """Curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
+    """Draw curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
 
     `window` is (low, high) of each parameter; by default it holds most of the points with rational parameters. With
     `modulo`, one of the primes modulo which all members were tried, the special ones among these, those on no component
@@ -206,7 +206,7 @@ def _overlap(box: tuple[float, ...], other_box: tuple[float, ...]) -> bool:
 
 
 def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
-    """So many points along a curve, at equal distances."""
+    """Return `count` points along a curve, at equal distances."""
     lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, column) for column in piece.T], axis=-1)

@@ -55,7 +55,7 @@ class Style:
         self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
-        """Width and height in inches; `aspect` is height over width where the style has no height."""
+        """Width and height in inches; `aspect` is height over width if the style has no height."""
         height = self.width * aspect if self.height is None else self.height
         return self.width / CENTIMETRES_PER_INCH, height / CENTIMETRES_PER_INCH
 

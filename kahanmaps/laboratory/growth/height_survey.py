@@ -87,7 +87,7 @@ class HeightSurvey(PrintableResult):
 
     @property
     def text(self) -> str:
-        """One sentence: the kind of growth and the number of orbits that have it, or how they disagree."""
+        """A sentence: the kind of growth and the number of orbits of this kind, or the kinds if they differ."""
         total, cut = len(self.orbits), "" if self.is_whole else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)

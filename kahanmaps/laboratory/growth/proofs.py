@@ -105,7 +105,7 @@ def monomial_degree(matrix: fmpz_mat) -> int:
 
 
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
-    """How the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
+    """Return how the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
 
     They are those of the entries of A^n up to a factor between two constants.
     """

@@ -123,7 +123,7 @@ class DensitySearch(Search):
 
     @property
     def note(self) -> str:
-        """Sentences on an anti-invariant density and on the period of the map; empty where there is neither."""
+        """Sentences on an anti-invariant density and on the period of the map; empty if there is neither."""
         periodic = closing_note(self.period, self.eps, self.file.map)
         if self.anti_invariant is None:
             return periodic

@@ -198,7 +198,7 @@ class _Curve:
         return levels
 
     def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
-        """Those of the forms on a surface through any curve."""
+        """Return the components of the forms on a surface through any curve."""
         return components(self.equation, self.forms.all, curve, self.across)
 
     def through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
@@ -240,7 +240,7 @@ class _Resolved:
         return self.curve.functions
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Those of the steps but the last. Raises OrbitDataUnknown."""
+        """Return the rows of all steps except the last. Raises OrbitDataUnknown."""
         rows, mus = [], divided(run, self.curve.own, self.curve.excess)
         for t, (mu, level) in enumerate(zip(mus, self.curve.levels(run)[1:], strict=False)):
             column = fmpq_mat(len(level), 1, list(level))

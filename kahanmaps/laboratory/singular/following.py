@@ -136,7 +136,7 @@ class AlongCurves(Protocol):
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """What `images_of_curve` takes."""
+        """The functions in the form that `images_of_curve` takes."""
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """Return for each step, or the first steps, the power that is divided out and the orders of hypersurfaces."""
@@ -214,7 +214,7 @@ class TestCurve:
     def steps(
         self, count: int, tangents: Sequence[Sequence[int]] = (), most: int = _MAX_PRECISION
     ) -> tuple[list[JetStep], bool]:
-        """`count` steps along series as long as needed, and whether the budget and the precision allowed all of them.
+        """Return `count` steps along series of sufficient length, and whether budget and precision allowed all of them.
 
         With tangents no function is tracked.
         """
@@ -235,7 +235,7 @@ class TestCurve:
                 precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
     def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[JetStep, ...]:
-        """`count` steps. Raises PrecisionTooLow if it ends early."""
+        """Return `count` steps. Raises PrecisionTooLow if fewer are possible."""
         run, is_complete = self.steps(count, tangents)
         if not is_complete:
             raise PrecisionTooLow

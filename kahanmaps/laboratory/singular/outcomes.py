@@ -85,7 +85,7 @@ def critical_points(
     excluded = line[-1]
 
     def function(X: Sequence[nmod_poly], times: Product, is_line: bool = False) -> nmod_poly:
-        """E or det M; on the line from images without their common factors, which are no zeros to be found."""
+        """Return E or det M; on the line, images are taken without their common factors, whose zeros do not count."""
         nonlocal excluded
         total = X[0] * 0 + 1
         for k, equation in enumerate(equations):
@@ -255,7 +255,7 @@ class Tracking:
     period: int = 1
 
     def equations(self, map_: MapFamily, eps: fmpq, field: PrimeField) -> Sequence[Equation]:
-        """Those of the map modulo a prime, from the stage on."""
+        """Return the equations of the map modulo a prime, from the stage on."""
         equations: Sequence[Equation] = map_.at(eps, field).equations
         if self.stage is None:
             return equations
@@ -343,7 +343,7 @@ def _agreed(first_outcome: Hypersurface, second_outcome: Hypersurface, is_over: 
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """As `unwritten`, with the poles and infinity; without any polynomial."""
+    """Follow the hypersurfaces as `unwritten` does, including the poles and infinity, all without polynomials."""
     hypersurfaces = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
@@ -422,7 +422,7 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
 
 
 def _by_ranks(ranks: Sequence[int], full: int) -> tuple[SingularityOutcome, int | None, int | None]:
-    """Status, the step that contracts and the step that ends it."""
+    """Return the status, the step that contracts the hypersurface, and the step after which it is confined."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
     if down is None:
         return NOT_CONTRACTED, None, None

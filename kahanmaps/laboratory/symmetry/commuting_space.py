@@ -36,7 +36,7 @@ Series = list[list[Any]]
 
 
 def coefficients_of(system: QuadraticSystem) -> list[list[fmpq]]:
-    """For each component the coefficients of x_j x_k (j <= k), of x_j, and the constant, in this order.
+    """Return for each component the coefficients of x_j x_k (j <= k), of x_j, and the constant, in this order.
 
     >>> coefficients_of(QuadraticSystem.from_text(["x", "y"], ["x*y", "x - 2"]))
     [[0, 1, 0, 0, 0, 0], [0, 0, 0, 1, 0, -2]]
@@ -79,7 +79,8 @@ def commutator_equations(
     rng: random.Random,
     budget: Budget,
 ) -> list[fmpq_mpoly]:
-    """Equations that hold for b if the Kahan maps of f and g = sum `weights[i]` `basis[i]` commute for every eps.
+    """Return equations that hold for b if the Kahan maps of f and g = sum `weights[i]` `basis[i]` commute for every
+    eps.
 
     `weights` are polynomials in b. Exact: coefficients of eps^2, ..., eps^order of the commutator at small random
     integer points, as many until two in a row bring nothing new, or the `budget` is spent. Returns linearly independent
@@ -159,7 +160,8 @@ def unknowns(system: QuadraticSystem, shape: str) -> int:
 
 
 def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat | None = None) -> CommutingSpace:
-    """All g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"). Exact; f is not zero.
+    """Compute all g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"). Exact; f is not
+    zero.
 
     With a matrix C, for which C f' = f' C, only those g with C g' = g' C.
 

@@ -122,7 +122,7 @@ class Symmetries(PrintableResult):
 
     @property
     def reversing_order(self) -> int:
-        """How many elements of the group take the map to its inverse."""
+        """The number of elements of the group that take the map to its inverse."""
         if self.group_of != MATRICES:
             return sum(t.reversing for t in self.signed)
         # f is not 0 here, so that none is both, and those that commute with the map are all or half of them
@@ -137,12 +137,12 @@ class Symmetries(PrintableResult):
 
     @property
     def symmetries(self) -> list[Symmetry]:
-        """All finite ones that commute with the map."""
+        """The known symmetries of finite order that commute with the map."""
         return [t for t in (*self.signed, *self.others) if not t.reversing]
 
     @property
     def reversing(self) -> list[Symmetry]:
-        """All finite ones that take the map to its inverse."""
+        """The known symmetries of finite order that take the map to its inverse."""
         return [t for t in (*self.signed, *self.others) if t.reversing]
 
     def rows(self) -> list[dict[str, str]]:
@@ -309,7 +309,7 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
 
 
 def _add_general(symmetries: Symmetries, budget: Budget) -> None:
-    """All rational S with f(S x) = sign S f(x), by its polynomial equations."""
+    """Add all rational S with f(S x) = sign S f(x), from the polynomial equations of S."""
     f = symmetries.system
     n = f.dim
     if any(x.is_linear for x in symmetries.infinitesimal):
@@ -405,7 +405,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
 
 
 def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:
-    """Polynomials in the entries of S that vanish where f(S x) = sign S f(x) for all x.
+    """Return polynomials in the entries of S that vanish if S is invertible and f(S x) = sign S f(x) for all x.
 
     `S` holds the generators of a ring, row by row. The divergence of f must be invariant under an invertible S as well:
     this follows, and is linear in S.

@@ -52,7 +52,7 @@ class FixedPoints:
 
     @property
     def where(self) -> str:
-        """As a phrase: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
+        """A phrase: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
         point = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
         kind = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
         if not self.equations:

@@ -76,7 +76,7 @@ class PlanarBlocks:
 
     @property
     def rows(self) -> int:
-        """2m, the number of rows of a state."""
+        """The number of rows of a state, 2m."""
         return len(self.into)
 
     @property

@@ -55,7 +55,8 @@ class PeriodicLevels:
         return tuple(sorted(root for root in roots if root != 0 and root != 1))
 
     def squares(self, discriminant: fmpq, eps: fmpq) -> tuple[fmpq, ...]:
-        """For each of `gammas` the square of the value of h/(1 + eps^2 D) on that level, in a plane with this disc(h).
+        """Return for each of `gammas` the square of the value of h/(1 + eps^2 D) on that level, in a plane with this
+        disc(h).
 
         The levels are real where it is positive. Raises InputError for disc(h) = 0 or eps = 0.
 

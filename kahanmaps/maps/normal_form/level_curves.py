@@ -37,11 +37,11 @@ class Jacobian:
 
     @staticmethod
     def negative(P: AffinePoint | None) -> AffinePoint | None:
-        """-P."""
+        """Return -P."""
         return None if P is None else (P[0], -P[1])
 
     def add(self, P: AffinePoint | None, Q: AffinePoint | None) -> AffinePoint | None:
-        """P + Q."""
+        """Return P + Q; None is the point at infinity, the zero of the group."""
         if P is None or Q is None:
             return Q if P is None else P
         if P[0] != Q[0]:
@@ -89,7 +89,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
 
 
 def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
-    """Some k > 0 with k T = 0, where one is `middle` + m `unit`, |m| <= `radius`.
+    """Return some k > 0 with k T = 0; one of them must be `middle` + m `unit` with |m| <= `radius`.
 
     m is written as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
     """
@@ -153,11 +153,11 @@ class LevelCubic:
         return t * P[0] - s * X[0], t * P[1] - s * X[1], t * P[2] - s * X[2]
 
     def add(self, P: Triple, Q: Triple) -> Triple:
-        """P + Q."""
+        """Return P + Q."""
         return self.third(self.zero, self.third(P, Q))
 
     def subtract(self, P: Triple, Q: Triple) -> Triple:
-        """P - Q."""
+        """Return P - Q."""
         return self.add(P, self.third(Q, self._opposite))
 
     def multiple(self, n: int, P: Triple) -> Triple:

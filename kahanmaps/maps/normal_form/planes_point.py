@@ -194,7 +194,7 @@ class PlanesPoint:
         return pairs
 
     def _fractions_of(self, planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> list[tuple[fmpz, fmpz]]:
-        """Numerator and denominator of each coordinate, from numerators and W of the planes, or residues of these."""
+        """Return numerators and denominators of all coordinates, from those of the planes or residues."""
         fractions: dict[int, tuple[fmpz, fmpz]] = {}
         rows = self._assembly.rows
         for support, (numbers, forms) in self._assembly.by_support.items():

@@ -103,7 +103,7 @@ class OrbitInPlanes:
         return value
 
     def _sighted(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
-        """Step n, its value and 0; or a step before it that is over the budget, and the bits there (None: not known).
+        """Return (n, value, 0), or for an earlier step over the budget that step, None and its bits (None: not known).
 
         The value is None if it was not computed, or is at a pole.
         """

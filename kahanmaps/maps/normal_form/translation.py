@@ -219,7 +219,7 @@ def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
 
 @lru_cache(maxsize=16)
 def _digits(n: int) -> list[tuple[int, int]]:
-    """Odd digits from -3 to 3 of n > 0, from the highest on, each with the number of binary places to the next.
+    """Yield odd digits from -3 to 3 of n > 0, highest first, each with the number of binary places to the next.
 
     >>> _digits(100)
     [(3, 3), (1, 2)]

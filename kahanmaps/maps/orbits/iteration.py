@@ -58,7 +58,7 @@ class OrbitEnd:
 
     @property
     def text(self) -> str:
-        """Status and message, without repetition."""
+        """The status with the message, unless the message repeats it."""
         return self.message if self.message.startswith(self.status) else f"{self.status}: {self.message}"
 
     def to_json(self) -> dict[str, Any]:

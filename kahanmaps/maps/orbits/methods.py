@@ -27,7 +27,7 @@ class Method:
 
     @property
     def text(self) -> str:
-        """Method and reason in one line."""
+        """A line with the method and the reason for it."""
         return f"method {self.name}: {self.reason}"
 
 

@@ -39,7 +39,7 @@ def kernel() -> Any:
 
 
 def _reduce(x: Any, length: int, p: float) -> None:
-    """Residues, in place."""
+    """Reduce the entries modulo p, in place."""
     r = 1.0 / p
     for part in range(2):
         row = x[part]
@@ -157,7 +157,7 @@ def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: fl
 
 
 def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
-    """Minors of the first rows for all sets of columns; those of all rows have the length that is returned."""
+    """Compute the minors of the first rows for all sets of columns; return the length of those of all rows."""
     n = M.shape[0]
     for j in range(n + 1):
         _copy(M[0, j], minors[1 << j], length)
@@ -183,7 +183,7 @@ def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
 
 
 def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, work: Any) -> int:
-    """Divides the polynomials of the curve by their gcd, in place; the length that they have then, 0 for none."""
+    """Divide the polynomials of the curve by their gcd, in place; return their length, 0 if all are zero."""
     a, b, c, common = work[0], work[1], work[2], work[3]
     count = X.shape[0]
     _clear(a, length)

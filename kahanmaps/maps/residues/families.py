@@ -151,7 +151,7 @@ def _walk_in_flint(
     start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
     degrees: Any,
 ) -> None:  # fmt: skip
-    """Do the same as `walk` of curve_kernel.py, without numba."""
+    """Measure degrees as `walk` of curve_kernel.py does, without numba."""
     modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
     field: Any = fq_default_ctx(modulus=modulus, var="w")
     context: Any = fq_default_poly_ctx(field)

@@ -49,7 +49,7 @@ class Equilibrium:
 
     @property
     def kind(self) -> str:
-        """What the eigenvalues say: a center is one of the linear part, and terms of degree 2 may undo it."""
+        """The kind by the eigenvalues: a center of the linear part need not be one, because of terms of degree 2."""
         values, real = self.values, self.values.real
         least = _ZERO * max(float(np.abs(values).max()), _ZERO)
         if (np.abs(values) <= least).any():
@@ -106,7 +106,7 @@ class Flow:
 
 
 def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) -> Flow:
-    """Arrows, equilibria and separatrices of a planar system, in a window of the plane of its two variables.
+    """Compute arrows, equilibria and separatrices of a planar system, in a window of the plane of its two variables.
 
     `plane` says which variable is along which axis. In another dimension the directions at a point of the picture are
     many, and there is nothing.
@@ -220,7 +220,7 @@ _FAR = 4.0  # an orbit stays if its distance from the center never exceeds this 
 def automatic_starts(
     system: QuadraticSystem, eps: Any, plane: Sequence[int] = (0, 1), *, backward: bool = False
 ) -> FloatArray:
-    """Sixteen starts (16, dim) which make a good picture, the same ones every time; eps is half the time step.
+    """Choose sixteen initial points (16, dim) for a picture, deterministically; eps is half the time step.
 
     Around an equilibrium, the most stable one that is found: on a ray in the plane of these two variables, or where
     the field is homogeneous (and points of a ray move alike) on a circle; other coordinates are moved a little. They

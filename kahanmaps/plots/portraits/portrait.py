@@ -327,7 +327,7 @@ def _draw_colored(
     lines: bool,
     portrait: Portrait,
 ) -> Any:
-    """Dots of the orbits in this order, or the lines that join them, in the colors of the values."""
+    """Draw dots of the orbits in this order, or the lines that join them, in the colors of the values."""
     import matplotlib as mpl
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize
@@ -359,12 +359,12 @@ def _draw_colored(
 
 
 def _inside(shown: FloatArray, window: Window) -> FloatArray:
-    """NaN for points outside the window."""
+    """Replace points outside the window by NaN."""
     return np.where(inside(shown, window)[..., None], shown, np.nan)
 
 
 def _make_room(axes: Any, window: Window | None) -> None:
-    """Axes in space: light planes, few ticks, and labels inside the picture, which layouts do not look after.
+    """Format axes in space: light planes, few ticks, and labels inside the picture, which layouts do not ensure.
 
     With a window the box has the proportions of its sides. Of the twelve edges matplotlib draws those of three planes.
     """

@@ -43,7 +43,7 @@ class Trajectories:
 
     @property
     def orbits(self) -> int:
-        """How many orbits there are."""
+        """The number of orbits."""
         return int(self.points.shape[1])
 
 

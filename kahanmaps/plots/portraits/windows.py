@@ -79,7 +79,7 @@ def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[
 
 
 def require_window(numbers: Sequence[float], axes: int) -> Window:
-    """Numbers low, high, low, high, ... as a window. Raises InputError unless there are two for each axis, in order."""
+    """Return low, high, low, high, ... as a window. Raises InputError unless there are two for each axis, in order."""
     if len(numbers) != 2 * axes:
         raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
     window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
@@ -90,13 +90,13 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
 
 
 def inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
-    """Which points (..., d) lie in the window; NaN does not."""
+    """Return which points (..., d) lie in the window; NaN does not."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
 
 
 def outside(points: FloatArray, window: Window) -> int:
-    """How many points (n, d) lie outside the window; NaN does not count."""
+    """Return the number of points (n, d) outside the window; NaN does not count."""
     return int((~np.isnan(points).any(axis=1) & ~inside(points, window)).sum())
 
 

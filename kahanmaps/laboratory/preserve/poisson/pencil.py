@@ -55,7 +55,7 @@ class BasePoints:
 
     @property
     def text(self) -> str:
-        """As a phrase."""
+        """The base points as a phrase."""
         near = f" ({self.infinitely_near} infinitely near)" if self.infinitely_near else ""
         return f"{self.count} of multiplicity {self.multiplicity}{near}"
 
@@ -80,7 +80,7 @@ class Pencil:
 
     @property
     def text(self) -> str:
-        """One sentence with all numbers."""
+        """A sentence on degree, genus and base points of the generic curve."""
         kind = "is" if self.components == 1 else f"has {self.components} components"
         points = ", ".join(points.text for points in self.base_points)
         return (
