@@ -87,7 +87,7 @@ class Finding(HtmlDisplay, WithoutTruthValue):
     source: str = ""
     control: bool = False
     place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
-    applies: bool = True  # False: the claim is stated for generic input and this input is special; it does not count
+    applies: bool = True  # False: the claim is for generic input and this input is special; its verdict does not count
 
     @property
     def holds(self) -> bool | None:

@@ -100,7 +100,7 @@ def parse_with_iterates(
     gens, coordinates = context.gens(), (count + 1) * n
 
     def later(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:
-        # What would move beyond the last iterate does not occur in P.
+        # Variables of the last iterate, which have no successor, do not occur in P.
         moved = [gens[min(k + steps * n, coordinates - 1)] for k in range(coordinates)]
         return P.compose(*moved, *gens[coordinates:], ctx=context)
 

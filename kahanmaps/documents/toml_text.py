@@ -29,7 +29,7 @@ class TomlKind(NamedTuple):
     def read(self, path: str | Path) -> bytes:
         """Read the bytes of a file, at most one more than allowed. Raises InputError if it cannot be read."""
         try:
-            # Nobody may ever write to a pipe, and a device need not end. But /dev/fd/63 is the shell's <(...).
+            # Reading a pipe or a device may never end. But /dev/fd/63 is the shell's <(...).
             mode = os.stat(path).st_mode
             is_of_shell = stat.S_ISFIFO(mode) and str(path).startswith(("/dev/fd/", "/dev/stdin"))
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):

@@ -129,7 +129,7 @@ class _Lines:
             value, k = "0", k + 1
             if tokens[k : k + 1] == ["="]:
                 end = k + 1 + (tokens[k + 1 : k + 2] == ["-"] or tokens[k + 1 : k + 2] == ["+"])
-                if tokens[end + 1 : end + 2] == ["/"]:  # where XPP stops reading, without a word
+                if tokens[end + 1 : end + 2] == ["/"]:  # XPP stops reading here, without a message
                     end += 2
                     self.notes.append(
                         f"{name} = {''.join(tokens[k + 1 : end + 1])} is read as it stands, unlike in XPP"

@@ -329,7 +329,7 @@ class ExperimentReader:
                     raise InputError(f"{file.name} has no such parameter, its parameters are: {known}{hint}")
             return exact(name, "a parameter of the system")
         options = dict(kind.options)
-        if self.is_family or (self.has_parameters and not self.files):  # perhaps a member was meant
+        if self.is_family or (self.has_parameters and not self.files):  # a member of the family may have been intended
             options |= FAMILY | {"seed": VOCABULARY["seed"]}
         if name in options:
             return options[name]
@@ -376,7 +376,7 @@ class ExperimentReader:
                 continue
             unknown = [name for name in names if name not in axes]
             for name in unknown:
-                if name not in given:  # else another mistake was reported
+                if name not in given:  # otherwise another mistake was reported
                     self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
             twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
             if len(names) < 2:

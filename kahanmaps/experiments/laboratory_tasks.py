@@ -354,7 +354,7 @@ def _growth(growth: DegreeGrowth) -> Result:
     recurrence, rate = growth.recurrence, growth.dynamical_degree
     return {
         "growth": str(growth.growth),
-        "looks_exponential": growth.looks_exponential,  # an estimate, where there is no recurrence
+        "looks_exponential": growth.looks_exponential,  # an estimate if there is no recurrence
         "unconfirmed": growth.unconfirmed,  # why a recurrence that fits is not given
         "singularities": None if growth.patterns is None else growth.patterns.text,
         "dynamical_degree": None if rate is None else rate.digits,

@@ -364,7 +364,7 @@ def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) ->
     for coefficient, monomial in zip(coefficients, monomials, strict=True):
         if coefficient.is_zero():
             continue
-        # What has one term, or only negative ones, is written with its sign outside.
+        # A coefficient with one term, or with negative terms only, is written with its sign outside the brackets.
         terms = [c for c in coefficient.coeffs() if c != 0]
         negative = all(c < 0 for c in terms)
         element = format_univariate(-coefficient if negative else coefficient)

@@ -31,7 +31,7 @@ from kahanmaps.family.skew_hamiltonian import Factor, bits_of, evaluate_at_matri
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
-MAX_DIMENSION = 32  # as for the members that are drawn; the unknowns are n(n-1)/2
+MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns
 _DRAWS = 24  # small combinations that are tried beside the basis
 _TRIAL_DIVISION = 1000
 _T = fmpq_poly([0, 1])
@@ -118,7 +118,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     n = J.nrows()
     inverse = J.inv()
     conditions: list[fmpz_mat] = [(third * J).numer_denom()[0] for third in third_derivatives(H)]
-    # A few combinations of the conditions nearly always say as much as all of them.
+    # A few random combinations of the conditions are almost always equivalent to all of them.
     rng = random.Random(n)
     few = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
     for chosen in (few, conditions):

@@ -166,7 +166,7 @@ class HeightGrowth:
         if self.end.status == "periodic" or self.end.period is not None:
             return Growth.PERIODIC, self.end.message
         kind, reason = _decide(self.heights)
-        if kind is Growth.UNDECIDED and not self.end.is_whole:
+        if kind is Growth.UNDECIDED and not self.end.is_complete:
             reason = f"{reason}; {self.end.message}"
         return kind, reason
 

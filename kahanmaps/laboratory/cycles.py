@@ -191,7 +191,7 @@ class _ProjectiveMap:
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
         self.prime = prime
         self.portion = 1 << max(8, 18 - map_.dim)  # points at a time: their minors should stay in the cache
-        # Of each map of a composition the forms of its image, or a matrix of forms whose minors they are, as terms.
+        # For each map of a composition the forms of its image, or a matrix with these minors, as lists of terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
         for factor in map_.at(eps, GF(prime)).factors:
             matrix, by_minors = factor.equation.polynomials(), False

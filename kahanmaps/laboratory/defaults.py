@@ -14,7 +14,7 @@ UNITS = {
     "Poisson tensors": 60e6,
     "Darboux polynomials": 60e6,
     "singularities": 60e6,  # for each eps
-    "degrees": 40e6,  # singularities are followed within this, which `analyze` does apart
+    "degrees": 40e6,  # includes following singularities, for which `analyze` has a step of its own
     "dynamical degree": 10e6,
     "heights": 30e6,
     "symmetries": 30e6,

@@ -90,7 +90,7 @@ def test_no_orbit_is_begun_after_the_budget_is_spent(monkeypatch):
 
     monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.height_growth", expensive)
     survey = height_survey(load("weierstrass").system, starts=3, steps=4, effort=-6)
-    assert (len(survey.orbits), survey.is_whole) == (1, False)
+    assert (len(survey.orbits), survey.is_complete) == (1, False)
 
 
 def test_wrong_values_in_the_library():

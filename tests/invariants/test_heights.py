@@ -118,7 +118,7 @@ def test_systems_of_the_catalogue_grow_as_theory_says(name):
     result = growth(file.system, START[: file.system.dim], 64, normal_form=normal_form, max_digits=12_000)
     assert result.kind is kind
     assert (result.constant is None) == (constant is None)
-    if constant is not None and result.end.is_whole:
+    if constant is not None and result.end.is_complete:
         assert decimal_text(result.constant) == constant
     elif constant is not None:  # the last steps are missing: the constant is less accurate
         assert abs(result.constant / Fraction(constant) - 1) < Fraction(1, 500)
@@ -233,12 +233,12 @@ def test_few_heights_decide_nothing(heights):
 def test_a_budget_that_is_spent_ends_an_orbit_and_a_survey_and_says_so():
     top = load("euler_top").system
     complete = height_survey(top, "1/10", starts=3, steps=20)
-    assert (complete.is_whole, "early" in complete.text) == (True, False)
+    assert (complete.is_complete, "early" in complete.text) == (True, False)
     before = counted()
     height_survey(top, "1/10", starts=1, steps=20)
     entry = counted() - before
     survey = height_survey(top, "1/10", starts=3, steps=20, effort=Budget(1.5 * entry))
-    assert (survey.is_whole, len(survey.orbits)) == (False, 2)
+    assert (survey.is_complete, len(survey.orbits)) == (False, 2)
     assert survey.orbits[0] == complete.orbits[0]
     cut = survey.orbits[1].growth
     assert cut.end.message == f"work limit reached after step {cut.end.steps}; raise --effort"
@@ -256,7 +256,7 @@ def test_a_time_limit_leaves_the_orbits_that_were_finished():
             raise TimeLimit
 
     survey = height_survey(top, "1/10", starts=3, steps=20, progress=stop)
-    assert (survey.is_whole, survey.orbits) == (False, height_survey(top, "1/10", starts=3, steps=20).orbits[:2])
+    assert (survey.is_complete, survey.orbits) == (False, height_survey(top, "1/10", starts=3, steps=20).orbits[:2])
     messages.clear()
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         height_survey(top, "1/10", starts=3, steps=20, effort=Budget(1e9), progress=stop)

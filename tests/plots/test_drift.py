@@ -101,7 +101,7 @@ def test_the_methods_conserve_different_things():
 
 def test_an_orbit_that_ends_early_is_no_whole_one():
     result = survey(SQUARE, [10], 100, [("E", "x")], ("rk4", "midpoint"), eps=fmpq(1, 2))
-    assert {method: end.is_whole for method, end in result.ends.items()} == {"rk4": False, "midpoint": False}
+    assert {method: end.is_complete for method, end in result.ends.items()} == {"rk4": False, "midpoint": False}
     assert [len(curve.steps) for curve in result.curves][1] == 0
 
 
@@ -151,7 +151,7 @@ def test_a_random_start_is_the_same_for_the_same_seed_and_small_enough_for_rk4()
     first, second, other = (small_start(CIRCLE.system, EPS, seed) for seed in (0, 0, 1))
     assert first == second != other
     result = survey(load("paper_m2"), small_start(load("paper_m2").system, EPS), 1000, [("", "I1")], ("rk4",))
-    assert result.ends["rk4"].is_whole
+    assert result.ends["rk4"].is_complete
 
 
 # The picture

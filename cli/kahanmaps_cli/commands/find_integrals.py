@@ -64,7 +64,8 @@ def command(system: str | None, **options: Any) -> int:
     the differential equation are limits of integrals of the map as eps -> 0, and which are lost.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
-    combination of values; with --json one record per line. Values without a map are listed at the end.
+    combination of values; with --json one record per line. Values at which the map does not exist are listed at the
+    end.
 
     Exit status: 0 if every integral that theorems give or orbits show has a formula, 2 for a usage error, 3 if some
     have none, orbits were not measured, or the work or time limit was too small.

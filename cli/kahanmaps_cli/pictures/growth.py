@@ -143,7 +143,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         file = opt.load_system(options["system"], options)
         eps = opt.the_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
-        curves, is_complete = lib.height_curves(survey), survey.is_whole
+        curves, is_complete = lib.height_curves(survey), survey.is_complete
     figure = lib.plot_heights(curves, options["style"], scale=options["scale"])
     messages = []
     if short := sum(curve.status == "budget" for curve in curves):

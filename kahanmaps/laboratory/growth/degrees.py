@@ -58,7 +58,7 @@ _LINES = 2
 _OFTEN, _SELDOM = 64, 8  # a recurrence is searched for after each of the first 64 terms, then after every 8
 _ENOUGH_QUOTIENTS = 6
 _AGREEING = 12  # measured terms beyond twice the longest pattern that must agree with the derived ones
-_LARGE = 2000  # a degree from which on no further measured terms have to agree
+_LARGE = 2000  # from this degree on no further measured terms need to agree
 _MATRIX_TERMS = 60  # of monomial maps
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
@@ -420,7 +420,7 @@ class _Search:
         if size < 2 or (size > _OFTEN and size % _SELDOM):
             return
         recurrence = find_recurrence(self.degrees)
-        # Above dimension 4 series of maps without short forms are slow and wait until degrees say something.
+        # Above dimension 4 series of maps without short forms are slow and wait until the degrees suggest a recurrence.
         soon = self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit
         if soon:
             self._compute_patterns()
@@ -464,7 +464,7 @@ class _Search:
                     k = curve.steps + 1
                     guess = known[k] if k < n else self.map.dim if k == 1 else known[1] * known[-1]
                     if k == n > 1 and known[-2]:
-                        # Degrees are as good as log-concave, so that the last ratio bounds the next one. A guess too
+                        # Degrees are almost log-concave: the last ratio bounds the next one. A guess that is too
                         # low costs a second attempt.
                         guess = min(guess, known[-1] * known[-1] // known[-2] + 4)
                     curve.step(guess)

@@ -98,7 +98,7 @@ def monomial_degree(matrix: fmpz_mat) -> int:
     (2, 3)
     """
     rows: list[list[int]] = [[int(entry) for entry in row] for row in matrix.tolist()]
-    # What X_j and Z have to be multiplied by: the last coordinate is then the product of these powers.
+    # The factors of X_j and Z that make them polynomial: the last coordinate is then the product of these powers.
     powers = [max(0, *(-entry for entry in column)) for column in zip(*rows, strict=True)]
     degree: int = sum(powers) + max(0, *(sum(row) for row in rows))
     return degree

@@ -107,7 +107,9 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
     >>> needed([attracted]), needed([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))])
     ([], None)
     """
-    chains = [[k] for k in range(len(patterns))]  # each with those that it becomes, in this order
+    chains = [
+        [k] for k in range(len(patterns))
+    ]  # each followed by the hypersurfaces onto which it is mapped, in this order
     for chain in chains:
         while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:
             chain.append(continuation[1])

@@ -403,7 +403,7 @@ def _assembled(
     density = None
     for constant, choice in of_densities:
         vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
-        while vector is not None and density is None:  # multiply by integrals as long as that lowers the cost
+        while vector is not None and density is None:  # multiply by integrals while this lowers the cost
             others = [_combined((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
             best = min(others, key=cost, default=vector)
             if cost(best) >= cost(vector):

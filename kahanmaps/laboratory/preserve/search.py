@@ -62,7 +62,7 @@ _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MAX_TERMS = 1000
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
 
-_SAMPLES = (150, 600, 3000)  # every coefficient is tried with few samples before one is tried with many
+_SAMPLES = (150, 600, 3000)  # all coefficients are tried with few samples before any is tried with many
 _COEFFICIENTS = 6
 NO_BRANCHES: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8

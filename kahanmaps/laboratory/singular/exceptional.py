@@ -101,7 +101,7 @@ def components(
 
 
 _MIN_LINES, _MAX_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
-_REPEATED = 4  # after this number of equal factorizations for the same orders of forms, the next ones are not computed
+_REPEATED = 4  # after this number of equal multiplicities for the same orders of forms, they are not computed again
 _FIRST = 12  # steps by which hypersurfaces are distinguished
 _MAX_DIGITS = 1000  # in forms that are factored
 _TRIES = 16  # lines on a surface, for a point of a component
@@ -259,7 +259,7 @@ class _Resolved:
         nu, largest = fmpq_mat(len(self.keys), 1), max(level.entries())
         if largest == 0:
             return nu
-        # With the same orders of forms they are often the same; else as few terms are taken as show them.
+        # Equal orders of forms often have the same multiplicities; otherwise the fewest terms that show them are taken.
         same = [component for component in self.multiplicities.values() if self.exponents * component == level]
         if len(same) >= _REPEATED and all(component == same[0] for component in same):
             return same[0]
@@ -353,7 +353,7 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
                 followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, places)))
     if exponents * sizes != column or sum(sizes.entries(), fmpq(0)) != zeros:
         raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
-    # Orders on hypersurfaces that are not contracted have no part in what follows.
+    # Orders on hypersurfaces that are not contracted are not needed.
     chosen = [k for k, key in enumerate(keys) if key[0]]
     return _followed(followed, [int(size) for size in sizes.entries()], chosen)
 

@@ -32,10 +32,10 @@ from kahanmaps.laboratory.singular.jets import (
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
-_FIRST_ALONG, _MOST_ALONG = 512, 2048  # where series are followed far: a step costs at least as much as their length
+_FIRST_ALONG, _MOST_ALONG = 512, 2048  # terms of long series: the cost of a step is at least proportional to them
 _CONSTANT = 8  # a column is constant if its last entries, at least this number, are equal
 _CHECKED = 4  # number of orders that must satisfy a recurrence beyond those that determine it
-_FREE_STEPS = 100  # for which a hypersurface is followed that is one again
+_FREE_STEPS = 100  # steps for which a confined hypersurface is followed
 
 
 _SHOWN = 6  # events in a sentence

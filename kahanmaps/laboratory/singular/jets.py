@@ -135,7 +135,7 @@ def images_of_curve(
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in curves[0])
         rank = 0
-        if tangents:  # at t = 0 in projective space: the direction of the limit itself does not count
+        if tangents:  # at t = 0 in projective space, where tangent vectors are modulo the limit point
             entries = [*limit, *(int(slope[shift]) for slope in slopes)]
             rank = int(nmod_mat(len(curves), len(limit), entries, prime).rank()) - 1
         valuations = tuple(order or 0 for order in orders)

@@ -115,7 +115,7 @@ def critical_points(
         for s in roots_modulo(part):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
             # The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is
-            # (t F_v + d F_w)^power G + ... A power of t above all those that count stands for d.
+            # (t F_v + d F_w)^power G + ... For d a power of t above all relevant ones is used.
             apart = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
             far = nmod_poly([0] * apart + [1], p)
@@ -405,7 +405,7 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             hypersurface = replace(
                 outcome, degree=seen[key[0]], divides_denominator=poles, multiplicity=key[0], primes=(field.prime,)
             )
-            if key in hypersurfaces:  # of two points with the same outcome the one that was followed less counts
+            if key in hypersurfaces:  # if two points have the same outcome, the shorter run counts
                 before = hypersurfaces[key]
                 settled = [k for k in (before.settled_at, hypersurface.settled_at) if k is not None]
                 hypersurfaces[key] = replace(
@@ -484,7 +484,7 @@ def _tangents(point: Sequence[int], gradient: Sequence[int], field: PrimeField) 
     p, places = field.prime, range(len(point))
     pivot = next(k for k in places if gradient[k])
     inverse = pow(gradient[pivot], -1, p)
-    # The point itself is tangent to the cone: a basis vector that occurs in it makes room for it.
+    # The point itself is tangent to the cone: it replaces a basis vector that occurs in it.
     occurs = next((k for k in places if k != pivot and point[k]), None)
     free = [k for k in places if k not in (pivot, occurs)]
     basis = [[int(i == k) - (i == pivot) * gradient[k] * inverse for i in places] for k in free]

@@ -66,15 +66,15 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
 MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
-_DIGITS_A_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # by dimension: above 4 less is expanded
+_DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # of units, by dimension
 _FEW_DIGITS = 50
 _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
 _LEAST_ALONG = 40
-_ENOUGH = {1: 60, 2: 60}  # of these where series would have to be long and orders repeat
+_ENOUGH = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
 _MOST_SHOWN = 200
-_DRAWS = 2  # of two values of eps, where the first ones are special
+_DRAWS = 2  # of two values of eps, if the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random points at which det dPhi is evaluated
 _MAX_DEGREE = 20_000  # of a composition
@@ -253,7 +253,7 @@ def singularities(
             progress(f"following {text[:40]}")
             hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
-            if isinstance(effort, Budget):  # a stage of something else, which ends, too
+            if isinstance(effort, Budget):  # the budget of a larger computation, which is then charged, too
                 raise
             is_cut = True
             break
@@ -409,7 +409,7 @@ def patterns(
             break
         values = default_eps(map_, seed + again) if eps is None else (eps,)
         stages = budget.share([1] * len(values))
-        # What random points stand for is known of equations that are linear in both points.
+        # Random points can be attributed to hypersurfaces only if the equations are linear in both points.
         is_short = map_.dim <= WRITTEN_DIMENSION or not map_.at(values[0]).is_bilinear
         if is_short and all(can_be_written(map_, value, budget.part(1 / len(values))) for value in values):
             try:
@@ -445,7 +445,7 @@ def _digits(map_: MapFamily, eps: fmpq) -> int:
 
 def _most_digits(dim: int, budget: Budget) -> int:
     """The digits with which formulas are written within the budget; a few always are."""
-    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
+    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
 def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:

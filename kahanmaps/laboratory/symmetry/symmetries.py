@@ -125,7 +125,7 @@ class Symmetries(PrintableResult):
         """The number of elements of the group that take the map to its inverse."""
         if self.group_of != MATRICES:
             return sum(t.reversing for t in self.signed)
-        # f is not 0 here, so that none is both, and those that commute with the map are all or half of them
+        # f is not 0, so that no element is of both kinds; all of the group or half of it commutes with the map
         return (self.order or 0) // 2 if any(t.reversing for t in self.generators) else 0
 
     @property
@@ -232,7 +232,7 @@ def _add_infinitesimal(symmetries: Symmetries) -> None:
 
     symmetries.infinitesimal = [infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
     scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
-    if f.is_homogeneous:  # S = I, rather than another one
+    if f.is_homogeneous:  # prefer S = I
         symmetries.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
     elif scalings:
         vector = min(scalings, key=lambda v: sum(e != 0 for e in v))
@@ -265,7 +265,7 @@ def _add_signed(symmetries: Symmetries, budget: Budget) -> None:
         )
         return
     symmetries.searched.append("signed permutations, with a translation: all")
-    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 each is both kinds
+    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 each element is of both kinds
     if any(abs(entry) not in (0, 1) for t in symmetries.signed for entry in t.S.entries()):
         symmetries.group_of = SCALED
     symmetries.generators = _generators(symmetries.signed)

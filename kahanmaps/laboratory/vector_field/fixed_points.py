@@ -59,7 +59,7 @@ class FixedPoints:
             return f"{kind} of fixed points {point}" if self.dimension else f"fixed point {point}"
         size = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""
         size = size or counted(self.count or 0, "fixed point")
-        if len(self.equations) > len(self.coordinates):  # a basis that is not shorter than f = 0
+        if len(self.equations) > len(self.coordinates):  # the basis is not shorter than the equations f = 0
             return f"{size} {point} with f = 0{'' if self.count is None else ', not rational'}"
         return f"{size} {point} with {', '.join(f'{format_polynomial(p)} = 0' for p in self.equations)}"
 
@@ -87,7 +87,7 @@ class FixedPoints:
         ('line of fixed points (0, y)', None)
         """
         if eps is None:
-            # At one point few eps are zeros of det(I - eps f'); on a set of points with one polynomial as well.
+            # At one point, or on conjugate points, det(I - eps f') = 0 only for a few eps.
             alike = self.dimension == 0 or not any(any(m[1:]) for m in self.eigenvalues.monoms())
             return True if alike else None
         context = self.coordinates[0].context()
@@ -155,7 +155,7 @@ def _on(system: QuadraticSystem, part: SolutionComponent, basis: Sequence[fmpq_m
     """The points of one part, whose equations have this Groebner basis."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     free = sorted({*part.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
-    # As large as the largest set of variables of which no power product is a leading monomial.
+    # The dimension is the largest number of variables of which no power product is a leading monomial.
     sizes = [
         len(some)
         for size in range(len(free) + 1)

@@ -16,7 +16,7 @@ from flint import fmpq, fmpq_poly, fmpz_poly
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
-MAX_PERIOD = 60  # psi_N has degree about N^2/12
+MAX_PERIOD = 60  # largest N: psi_N has degree about N^2/12
 _GAMMA = fmpz_poly([0, 1])
 
 

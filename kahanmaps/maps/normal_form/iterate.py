@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
     from kahanmaps.maps.normal_form.rational_iterate import OrbitInPlanes
 
-_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is walked around
+_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is iterated completely
 
 
 class NthIterate:

@@ -177,7 +177,7 @@ class LevelCubic:
         """
         if not self.is_zero(self.multiple(order, P)):
             return False
-        # The number of points of the curve, where T of this order leaves no choice in the Hasse interval.
+        # The number of points of the curve, if the Hasse interval contains only one multiple of the order of T.
         radius = isqrt(4 * q)
         points = -(-(q + 1 - radius) // order) * order
         if points + order <= q + 1 + radius:
@@ -194,7 +194,7 @@ class LevelCubic:
             part, base = self.multiple(order // power, P), self.multiple(order // power, T)
             top, unit = self.multiple(power // prime, base), 1
             while unit < power:
-                # The part is unit (...) and what has been taken off, so far.
+                # `part` is reduced by the digits found so far; `step` runs through the multiples of `top`.
                 cofactor, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
                 while not same_point(cofactor, step):
                     digit, step = digit + 1, self.add(step, top)

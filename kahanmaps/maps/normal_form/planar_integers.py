@@ -30,7 +30,7 @@ class LevelBlock(ABC):
 
     block: PlanarBlock
     start: Triple
-    table: Any = None  # of tau functions, for points that are taken one after the other
+    table: Any = None  # of tau functions, for consecutive points
 
     @property
     def is_constant(self) -> bool:

@@ -88,7 +88,7 @@ class OrbitInPlanes:
             raise self._end
         if self._period is not None:
             return self._walked[n % self._period]
-        step, value, bits = self._sighted(n)
+        step, value, bits = self._step_within_budget(n)
         pole = self._first_pole(step, value)
         if pole is not None:
             preimage = self._point(pole - 1)
@@ -102,7 +102,7 @@ class OrbitInPlanes:
         self._far = max(self._far, n)
         return value
 
-    def _sighted(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
+    def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
         """Return (n, value, 0), or for an earlier step over the budget that step, None and its bits (None: not known).
 
         The value is None if it was not computed, or is at a pole.
@@ -120,12 +120,12 @@ class OrbitInPlanes:
                 return target, value, bits
             current = target, value.bits
             if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
-                # At four times the budget, by a line, it certainly is over.
+                # Linear extrapolation: at four times the budget it is certainly exceeded.
                 beyond = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
                 if beyond <= min(n - target, _MAX_MODULAR_STEPS):
                     return target + beyond, None, None
             previous = current
-            # Four times the size is borne, but not more: heights may grow like n^2.
+            # Heights may grow like n^2: the step is doubled only if four times the size is within the limit.
             target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
 
     def _point(self, n: int) -> PlanesPoint:

@@ -24,9 +24,9 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.tau import first_chi
 
-# Base points that are tried until no small value vanishes that has to be divided by.
+# Base points that are tried until no divisor vanishes.
 _BASES = 12
-_STEPPED = 16  # up to this n one steps
+_STEPPED = 16  # up to this n the point is computed by single steps
 
 
 class NoTranslation(Exception):
@@ -238,7 +238,7 @@ def _doubled(
     block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
 ) -> Triple | None:
     """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor vanishes."""
-    # Lifts that are natural around this base point: the first two of them decide the rest.
+    # Natural lifts around this base point: the first two determine the others.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):
         denominator = P[k - 1][2]

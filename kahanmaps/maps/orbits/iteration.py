@@ -52,7 +52,7 @@ class OrbitEnd:
     period: int | None = None
 
     @property
-    def is_whole(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether all requested steps were taken."""
         return self.status in ("completed", "periodic")
 

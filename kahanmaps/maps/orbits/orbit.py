@@ -238,7 +238,7 @@ class Trajectory:
         if self.orbit.end is None:
             _ = self.points
         end: OrbitEnd = self.orbit.end
-        return OrbitEnd("precision", end.steps, self._remark) if self._remark and end.is_whole else end
+        return OrbitEnd("precision", end.steps, self._remark) if self._remark and end.is_complete else end
 
     @cached_property
     def points(self) -> list[OrbitPoint]:

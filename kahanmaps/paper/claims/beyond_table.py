@@ -32,8 +32,8 @@ Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coo
 def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
     """Return all statements for all variations in dimension 2m: proved if they hold, refuted if they fail.
 
-    Refuted cells are expected to be, and count as controls. Returns a Report with one Finding a cell; raises InputError
-    as `verify` does.
+    Refuted cells are expected, and count as controls. Returns a Report with one Finding for each cell; raises
+    InputError as `verify` does.
 
     >>> cells = {found.claim: found for found in beyond_table(1).findings}
     >>> cells["eps^{-1} x^T J^{-1} x~ is conserved by f: H inhomogeneous"].evidence.summary

@@ -51,7 +51,7 @@ _MAX_LISTED = 20_000  # monomials up to a degree, before they are grouped by wei
 _SPARE = 8  # orders of a series beyond the number of monomials
 _MAX_CHOICES = 400  # of zeros on a line, and of pairs of choices
 _PRIMES = 12  # the first one usually suffices
-_PRECISION = 24  # exponent of a prime: 1,464 bits
+_PRECISION = 24  # exponent of a prime power, which has 1,464 bits
 _MAX_CONJUGATES = 8
 _LINES = 4  # modulo each prime
 

@@ -217,7 +217,7 @@ class _Reduced:
             eliminant[i] = int(c)
         _require(eliminant[-1] != 0)
         for factor, number in nmod_poly(eliminant, self.prime).factor()[1]:
-            if number < 4:  # less than 2^2: a chain of simple points, each infinitely near to the one before
+            if number < 4:  # less than 2^2: a chain of simple points, each infinitely near to the preceding one
                 self._add_simple(int(factor.degree()), int(number), near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
