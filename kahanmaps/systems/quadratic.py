@@ -166,7 +166,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
             return SystemOver.of(field_of_numbers, self, values)
         system = self._over.get(field_of_numbers)
         if system is None:
-            if len(self._over) >= 8:  # random primes come and go
+            if len(self._over) >= 8:  # systems modulo random primes are used only for a while
                 self._over.clear()
             system = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
         return system
@@ -283,7 +283,7 @@ def as_system(value: Any) -> QuadraticSystem:
     """Convert a value to a quadratic system; it takes the arguments of `maps.kahan.as_map`, except other maps."""
     if isinstance(value, QuadraticSystem):
         return value
-    system: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
+    system: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # imported from a higher layer
     return system
 
 

@@ -84,7 +84,7 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
                 if not any(np.allclose(point, other.point, atol=1e-3) for other in all_equilibria):
                     all_equilibria.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
                 break
-            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
+            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # least squares, since equilibria need not be isolated
             if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
                 break
     return all_equilibria
@@ -191,7 +191,7 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
     for count in range(_MAX_STEPS):
         pace = speed(x)
         spent += step / pace if pace > 0 else np.inf
-        # Separatrices begin slowly, at their saddle, and have all the time.
+        # Separatrices start slowly at their saddle: their time is not limited.
         slow = pace <= stop and (count > 2 * _FINE or not np.isinf(time or 0.0))
         if slow or (time is not None and spent > abs(time)) or np.abs((x - middle) / size).max() > 1.5:
             break

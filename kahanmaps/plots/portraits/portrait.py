@@ -147,7 +147,7 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     """
     rows = np.flatnonzero(~np.isnan(points).any(axis=1))[:_MAX_NEIGHBOURS]
     held = points[rows]
-    _, first = np.unique(held.round(12), axis=0, return_index=True)  # a cycle comes to the same points again
+    _, first = np.unique(held.round(12), axis=0, return_index=True)  # a cycle repeats its points
     rows, held = rows[np.sort(first)], held[np.sort(first)]
     if len(rows) < _MIN_NEIGHBOURS:
         return None
@@ -244,7 +244,7 @@ def plot_portrait(
         if portrait.euler is not None:
             # Lines continue to the edge of the plane; points far outside may be too large to draw.
             around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in portrait.window)
-            # Dashes, for in a gray copy the colors say less.
+            # Dashed, since colors are hard to distinguish in a gray copy.
             dashes: dict[str, Any] = {
                 "linewidth": 0.6,
                 "linestyle": (0, (5, 2)),
@@ -332,7 +332,7 @@ def _draw_colored(
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize
 
-    # Without the lightest part of the map: dots are small, and paper is white.
+    # Without the lightest part of the color map: small dots would be invisible on white paper.
     colors = ListedColormap(mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, 256)))
     is_image = shown.shape[0] * shown.shape[1] > MAX_VECTOR_POINTS
     how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colors, "rasterized": is_image, "zorder": 2}

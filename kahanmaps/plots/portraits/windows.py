@@ -14,11 +14,11 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
-_SHARE = 10.0  # percent of the points, at either end, that do not say how far the picture reaches
+_SHARE = 10.0  # percent of the points at either end that do not determine the range
 _REACH = 3.0  # ... unless they are within this multiple of the length that the others fill
 _UNBOUNDED, _SHOWN = 1e12, 10  # times the reach of the starts
 _MARGIN = 0.04
-_LARGEST = 1e307  # what matplotlib can still subtract
+_LARGEST = 1e307  # largest number that matplotlib can subtract
 _LOOKED_AT = 4000  # points, when axes are chosen
 _VARIABLES = 16
 _CELLS = {1: 400, 2: 24, 3: 10}  # along each axis
@@ -73,7 +73,7 @@ def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[
     if low < first - _REACH * (last - first) or high > last + _REACH * (last - first):
         low = max(low, first - (last - first) / 2)
         high = min(high, last + (last - first) / 2)
-    if high - low < 1e-9 * max(abs(low), abs(high)):  # one value, up to rounding: it stands in the middle
+    if high - low < 1e-9 * max(abs(low), abs(high)):  # one value, up to rounding, which is put in the middle
         low, high = low - max(abs(low), abs(high)) / 10, high + max(abs(low), abs(high)) / 10
     return low * unit, high * unit
 

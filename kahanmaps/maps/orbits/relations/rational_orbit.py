@@ -14,7 +14,7 @@ from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 
 # The search for relations starts when the steps so far took about as long as it will (which depends on the bit length
-# of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: otherwise there are none. The
+# of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: otherwise relations do not exist. The
 # coefficients of relations are about as long as the initial point, so points must be longer than that. If the
 # coefficients turn out to be longer, the search is repeated when points are _AGAIN times as long.
 _MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second times the square of (dimension + 1)
