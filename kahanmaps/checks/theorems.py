@@ -24,7 +24,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHOD = "hypotheses"
 PROVED = Certainty.PROVED
-# All rational associated systems: 128 for as many factors, and 8128 pairs of them.
+# Number of factors of chi up to which all rational associated systems are compared: 128 systems, 8128 pairs.
 MAX_FACTORS = 8
 
 

@@ -49,7 +49,7 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 class SystemFile(HtmlDisplay):
     """A system or map with the parameters and claims of its file.
 
-    `map` is the map that is meant, of a differential equation its Kahan map; `hamiltonian` and `member` are there when
+    `map` is the map, for a differential equation its Kahan map; `hamiltonian` and `member` are there when
     the file (or the Python object it was made from) says so. `integrals` and `density` are claims: rational functions
     in the variables and `eps`. `document` is the file as plain data, parameters not yet inserted.
     """

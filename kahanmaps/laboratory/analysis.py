@@ -33,7 +33,7 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import end_with_parent, processors
 
-# Units of work at effort 1 by dimension: as many for the independent steps, and as many for the others.
+# Units of work at effort 1 by dimension, for the independent steps and again for the other steps.
 # Most maps use a small part of them.
 _UNITS = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
 _MAX_UNITS = 150e6

@@ -41,7 +41,7 @@ MAX_SIGN_VECTORS = 32
 
 
 class MemberObjects(PaperObjects):
-    """A given member at a point: at a point the letters for which the library has code of its own come from it.
+    """A given member at a point: values for which the library has its own code are computed by that code.
 
     Inside derivatives (dual numbers) and in variations they are computed as everywhere else.
     """

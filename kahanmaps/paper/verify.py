@@ -495,7 +495,7 @@ class Verifier:
         """The claim on input broken by a control, at a point at which it fails; else the last outcome.
 
         One point refutes an equation, a rational one unless m is large; that something differs, exists or has a certain
-        rank is refuted where several points in a row do not show it. Over Q ranks and steps of broken maps, where
+        rank is refuted if several consecutive points do not show it. Over Q ranks and steps of broken maps, where
         nothing cancels, take minutes from m = 5 on.
         """
         at_one = claim.kind is ClaimKind.EQUAL

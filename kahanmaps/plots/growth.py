@@ -117,7 +117,7 @@ def plot_degrees(
 
 
 def _degree_label(growth: DegreeGrowth) -> str:
-    """A line of the legend behind the name: the meaning of d_n, the dynamical degree, and a mark for estimates."""
+    """Return the text after the name in the legend: meaning of d_n, dynamical degree, and a mark for estimates."""
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
@@ -180,7 +180,9 @@ def plot_heights(
             mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
             for curve in some:
                 rows = np.flatnonzero(curve.steps >= (1 if from_one else 0))
-                if len(rows) > _MARKS:  # as many marks as stand apart along the axis, the first and the last among them
+                if (
+                    len(rows) > _MARKS
+                ):  # as many marks as can be distinguished along the axis, with the first and the last
                     steps = curve.steps[rows].astype(np.float64)
                     spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
                     rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]

@@ -101,7 +101,10 @@ def plot_scan(
                 curves.append((component.text, pieces))
         labels: list[tuple[str, Sequence[tuple[float, ...]]]]
         labels = [(component.text, [_place(component)]) for component in some if component.is_rational_point]
-        for text, pieces in curves:  # on the longest piece, preferably off its middle, where other curves rarely cross it
+        for (
+            text,
+            pieces,
+        ) in curves:  # on the longest piece, preferably off its middle, where other curves rarely cross it
             longest = max(pieces, key=len)
             ends = _resampled(longest, _PLACES + 1)
             parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))

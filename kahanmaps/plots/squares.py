@@ -359,7 +359,7 @@ def _in_two_digits(number: float) -> str:
 def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:
     """A text beside a point, away from the middle of them all; long ones above or below, moved so as to stay inside.
 
-    `side` says how a long one is aligned, to which there is another one beside it.
+    `side` is the alignment of a long name that has another one beside it.
     """
     if not np.isfinite(point).all():
         return

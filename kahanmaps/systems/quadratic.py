@@ -283,7 +283,9 @@ def as_system(value: Any) -> QuadraticSystem:
     """Convert a value to a quadratic system; it takes the arguments of `maps.kahan.as_map`, except other maps."""
     if isinstance(value, QuadraticSystem):
         return value
-    system: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # imported from a higher layer
+    system: QuadraticSystem = (
+        import_module("kahanmaps.documents.inline").as_file(value).system
+    )  # imported from a higher layer
     return system
 
 

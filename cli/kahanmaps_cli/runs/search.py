@@ -51,7 +51,7 @@ def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
 
 
 def scope(result: Any) -> str:
-    """Return text behind the name of the map: for which eps and symbols the formulas hold."""
+    """Return the text that follows the name of the map: for which eps and symbols the formulas hold."""
     if getattr(result, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(result.symbols)}" if result.symbols else "")
     step = lib.eps_suffix(result.eps, result.file.map)

@@ -50,7 +50,7 @@ def as_typed(words: Iterable[str]) -> str:
 class Progress:
     """Show progress inside a `with` block, whose end clears the line: call it with a sentence at any rate.
 
-    On a terminal a thread updates the elapsed time behind the last sentence, since a step may take minutes.
+    On a terminal a thread updates the elapsed time after the last sentence, since a step may take minutes.
     """
 
     def __init__(self, quiet: bool = False) -> None:

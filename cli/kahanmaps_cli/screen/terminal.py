@@ -83,7 +83,7 @@ def formula(text: str, width: int = 400) -> str:
 def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
     """Print lines of cells separated by tabs; on a terminal the first cell is a label in front of the others.
 
-    Verdicts are colored, and lines that start with # are headings. `hang` is the column behind the label.
+    Verdicts are colored, and lines that start with # are headings. `hang` is the column after the label.
     """
     for line in printable(text).split("\n"):
         cells = line.split("\t")

@@ -148,7 +148,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
 
 
 def _unknown(name: str) -> InputError:
-    if not name or len(name) > 60 or not name.isprintable():  # no name that anybody meant
+    if not name or len(name) > 60 or not name.isprintable():  # not a name of a system
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
     normalized = name.lower().replace("-", "_").replace(" ", "_")
     known_names = (*names(), *map_names())

@@ -125,8 +125,8 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
 def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
     """The generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of a fraction.
 
-    Its denominator has the roots to the power -n, so that it is no longer than the given one: exact. Raises
-    ArithmeticError where its coefficients have more than 520 bits.
+    Exact. The roots of its denominator are the n-th powers of the given ones, so that its degree does not grow. Raises
+    ArithmeticError if its coefficients have more than 520 bits.
 
     >>> every_nth((fmpz_poly([1]), fmpz_poly([1, -1, -1])), 3)
     ((-1)*x + 1, (-1)*x^2 + (-4)*x + 1)

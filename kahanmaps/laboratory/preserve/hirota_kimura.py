@@ -407,7 +407,7 @@ def sparse_relations(
         lower = _descending_exponents(maps[0].dim, degree - 1)
         leads = [lower[next(k for k, c in enumerate(row) if c)] for row in _relations(maps[0], degree - 1)]
     relations, context = [], ring(variables)
-    # Letters for the names c1, c2, ... and e1, e2, ... such that no variable is named like that.
+    # Letters for the names c1, c2, ... and e1, e2, ... that no variable has as its name.
     taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
     integral, function = (next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES"))
     names: dict[tuple[int, int, int], str] = {}

@@ -262,7 +262,7 @@ class TestCurve:
             steps = hit
 
     def orbit_data(self, first: int) -> OrbitData:
-        """The orders along the curve, for as many steps as it takes until they are known for all, or the limits end it.
+        """Return the orbit data along the curve, with more steps until it is settled or the limits are reached.
 
         `first` is the number of steps to begin with. The image may move on a critical hypersurface until something
         happens, so that orders have to repeat for as long as curves are followed.

@@ -48,7 +48,7 @@ class Letters(tuple[Equation, ...]):
 
 
 def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
-    """Return the equations of the step 1, 2, ...: one letter of a word, else all."""
+    """Return the equations of the step 1, 2, ...: those of one map of a word, otherwise all."""
     return (equations[(step - 1) % len(equations)],) if isinstance(equations, Letters) else equations
 
 

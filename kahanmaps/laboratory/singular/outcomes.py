@@ -75,9 +75,9 @@ def critical_points(
     """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
     `equations` are those of the factors of the map over the field, linear in the point, and `inverses` those of their
-    inverses; of several factors the product of their E is meant. Without inverses det M stands for E, and the points
-    are the poles that are not at infinity. Returns the points and, for each multiplicity, the number of zeros over the
-    closure of GF(p): there may be zeros without points in GF(p).
+    inverses; for several factors E is the product of those of the factors. Without inverses det M stands for E, and the
+    points are the poles that are not at infinity. Returns the points and, for each multiplicity, the number of zeros
+    over the closure of GF(p): there may be zeros without points in GF(p).
     """
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))

@@ -247,7 +247,7 @@ def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) 
 
 
 def _named(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
-    """The polynomials over Q[eps] of what a map, or that of this number in a word, contracts, by those at one eps."""
+    """Find the polynomials over Q[eps] of the hypersurfaces that a map contracts, from those at one eps."""
     variables = map_.variables
     if map_.symbols or "eps" in variables or "Z" in variables:
         return {}

@@ -83,8 +83,8 @@ def commutator_equations(
     eps.
 
     `weights` are polynomials in b. Exact: coefficients of eps^2, ..., eps^order of the commutator at small random
-    integer points, as many until two in a row bring nothing new, or the `budget` is spent. Returns linearly independent
-    polynomials in b. Source: kahan-1993.
+    integer points, until two consecutive points give no new equation or the `budget` is spent. Returns linearly
+    independent polynomials in b. Source: kahan-1993.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])

@@ -313,7 +313,7 @@ def _value(polynomial: fmpq_poly, at: acb) -> acb:
 
 
 def _round_to_doubles(row: Sequence[arb]) -> list[float]:
-    """Round the entries to doubles; entries surely negligible compared with the largest become 0."""
+    """Round the entries to doubles; entries that are certainly negligible compared with the largest become 0."""
     largest = max((abs(entry) for entry in row), key=lambda entry: entry.mid())
     doubles = []
     for entry in row:

@@ -81,7 +81,7 @@ class OrbitInPlanes:
         self._far = len(self._walked) - 1  # the last step that is known to be within the budget and before all poles
 
     def value(self, n: int) -> PlanesPoint:
-        """Phi^n(start). Raises SingularStep or OverBudget, whichever an orbit that is stepped comes to first."""
+        """Return Phi^n(start). Raises SingularStep or OverBudget, whichever occurs at an earlier step."""
         if n < len(self._walked):
             return self._walked[n]
         if self._end is not None:

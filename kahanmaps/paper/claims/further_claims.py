@@ -1,4 +1,4 @@
-"""Beyond the paper: what lies behind its theorems, how far they reach, and where they end."""
+"""Claims beyond the paper: the structure behind its theorems, generalizations, and counterexamples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The differential equation behind a portrait: its direction, equilibria, separatrices and solutions as curves.
+"""The differential equation of a portrait: its direction, equilibria, separatrices and solutions as curves.
 
 Curves are followed by their length, not by time: x' = f/|f| by RK4 with steps of a fraction of the window, so that
 they pass through what would be a pole in time, and are as smooth as can be seen everywhere. Around an equilibrium are
@@ -64,7 +64,7 @@ class Equilibrium:
 
 
 def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
-    """The real equilibria to which Newton's method comes from sixty starts, each once.
+    """Find the real equilibria to which Newton's method converges from sixty initial points, each once.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> sorted((one.point.round(6).tolist(), one.kind) for one in equilibria(pendulum))
@@ -80,11 +80,11 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
             if np.abs(value).max() <= bound:
                 nearest = np.round(x, 9)
                 point = nearest if np.abs(f(nearest)).max() <= bound else x
-                # Where an equilibrium is degenerate, Newton's method ends somewhat beside it: once is enough.
+                # Near a degenerate equilibrium Newton's method ends at slightly different points: keep one of them.
                 if not any(np.allclose(point, other.point, atol=1e-3) for other in all_equilibria):
                     all_equilibria.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
                 break
-            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # least squares, since equilibria need not be isolated
+            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria may not be isolated
             if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
                 break
     return all_equilibria

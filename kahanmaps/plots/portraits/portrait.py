@@ -215,7 +215,7 @@ def plot_portrait(
         aspect = _ASPECT
         if in_space:
             aspect = 0.9 if portrait.values is None else 0.8
-        elif equal:  # height over width as the window asks for it, a color bar beside it
+        elif equal:  # height over width follows from the window and the color bar beside it
             (x0, x1), (y0, y1) = portrait.window
             aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if portrait.values is not None else 1.0)))
         figure = new_figure(style, aspect)

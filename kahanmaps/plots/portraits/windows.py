@@ -25,7 +25,7 @@ _CELLS = {1: 400, 2: 24, 3: 10}  # along each axis
 
 
 def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
-    """A window for points (n, d) that a few points far away do not spoil: it need not hold all of them.
+    """Return a window for points (n, d) that ignores a few points far away.
 
     Along each axis, the range of all points; or where some of the outer tenth at either end are farther away than three
     times the length that the others and the `starts` fill, that length and half of it at either end. Where most orbits

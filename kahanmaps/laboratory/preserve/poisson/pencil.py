@@ -274,7 +274,7 @@ class _Reduced:
 
 
 def _polynomial(K: Any, coefficients: list[Any]) -> Any:
-    return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub forgets lists
+    return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub does not allow lists
 
 
 def _root(K: Any, coefficients: list[Any]) -> Any:

@@ -14,7 +14,7 @@ from kahanmaps.maps.orbits.relations.bilinear_steps import bilinear_forms
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 
 # The search for relations starts when the steps so far took about as long as it will (which depends on the bit length
-# of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: otherwise relations do not exist. The
+# of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: otherwise there are none. The
 # coefficients of relations are about as long as the initial point, so points must be longer than that. If the
 # coefficients turn out to be longer, the search is repeated when points are _AGAIN times as long.
 _MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second times the square of (dimension + 1)
@@ -33,7 +33,7 @@ class Relations(Protocol):
         """Return the point with this number from the last ones; None if the relations do not determine it."""
 
     def skip(self, number: int) -> bool:
-        """Return whether the orbit surely has a point with this number and later points can be computed without it."""
+        """Return whether the orbit certainly has a point with this number, and later points do not need it."""
 
     def point(self, number: int) -> IntegerPoint | None:
         """Return the point with this number if it can be computed directly, otherwise None."""
