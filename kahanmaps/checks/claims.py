@@ -86,7 +86,7 @@ class Finding(HtmlDisplay, WithoutTruthValue):
     formula: str = ""
     source: str = ""
     control: bool = False
-    place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
+    place: Mapping[str, Any] = field(default_factory=dict)  # the place of the claim, as plain data
     applies: bool = True  # False: the claim is for generic input and this input is special; its verdict does not count
 
     @property

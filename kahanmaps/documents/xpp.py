@@ -131,9 +131,7 @@ class _Lines:
                 end = k + 1 + (tokens[k + 1 : k + 2] == ["-"] or tokens[k + 1 : k + 2] == ["+"])
                 if tokens[end + 1 : end + 2] == ["/"]:  # XPP stops reading here, without a message
                     end += 2
-                    self.notes.append(
-                        f"{name} = {''.join(tokens[k + 1 : end + 1])} is read as it stands, unlike in XPP"
-                    )
+                    self.notes.append(f"{name} = {''.join(tokens[k + 1 : end + 1])} is read literally, unlike in XPP")
                 value, k = "".join(tokens[k + 1 : end + 1]), end + 1
             elif values is self.parameters:  # XPP takes 0, which is rarely intended
                 raise InputError(f"found the parameter {quoted(name)} without a value, expected one: par {name}=0")

@@ -1,6 +1,6 @@
 """Conversion of a system, its Kahan map, integrals and density to a file for another program.
 
-Expressions are written by the code printers of SymPy (the extra `[sympy]`), for PARI by our own; what stands around
+Expressions are written by the code printers of SymPy (the extra `[sympy]`), for PARI by our own; the code around
 them is in languages.toml. Exact numbers stay exact in all languages but C, Fortran and NumPy, whose numbers are floats.
 """
 

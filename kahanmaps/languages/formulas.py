@@ -44,7 +44,7 @@ class Formulas:
         self.file = file
         if isinstance(file.map, AlgebraicMap):
             if symbols:
-                raise InputError(f"found symbols beside a {file.map.root}, expected none: it is one")
+                raise InputError(f"found symbols together with a {file.map.root}, expected none: it is a symbol itself")
             self.map: MapFamily = file.map.given
         else:
             self.map = map_with_symbols(file, symbols)

@@ -17,7 +17,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import MapFamily
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
-NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
+NO_TIME_STEP = "eps enters the map as its file defines it; there is no time step"
 NO_EPS = "the map does not depend on eps"
 
 

@@ -570,7 +570,7 @@ class ClaimAtPoints:
                 why = "chi splits" if self._roots else "all denominators are units, so it fails over Q"
                 text = f"fails at a point over {outcome.objects.K.name}, where {why}"
                 evidence = Evidence("point over GF(p)", text)
-                # A rational point is better to look at.
+                # A rational point is easier to read.
                 exact = (self._verifier.exact_point(self._roots, exact_number) for exact_number in range(12))
                 if failure := next((failure for failure in outcomes(self._claim, exact) if not failure.holds), None):
                     outcome = failure

@@ -1,4 +1,4 @@
-"""How pictures look: sizes as a journal states them, colors that color-blind readers can distinguish.
+"""The style of pictures: sizes as a journal states them, colors that color-blind readers can distinguish.
 
 The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up
 to four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown by
@@ -65,7 +65,7 @@ class Style:
         if given > _MAX_PIXELS:
             raise InputError(
                 f"found {given:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
-                f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MAX_PIXELS:.2g}: take fewer dots per "
+                f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MAX_PIXELS:.2g}: use fewer dots per "
                 f"inch than {self.dpi}"
             )
 

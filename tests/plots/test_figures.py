@@ -1,4 +1,4 @@
-"""Figures: the size asked for, the same bytes every time, whole files or none, matplotlib's settings left alone."""
+"""Figures: the requested size, the same bytes every time, complete files or none, matplotlib's settings left alone."""
 
 import re
 import xml.etree.ElementTree as ElementTree
@@ -64,14 +64,14 @@ def test_settings_of_a_user_do_not_get_into_a_picture_and_are_left_as_they_were(
 
 
 @together(
-    "path, asked, expected",
+    "path, requested, expected",
     [
         *(("a.pdf", None, "pdf"), ("a.PNG", None, "png"), ("a.b.svg", None, "svg")),
         *(("a.pdf", "png", "png"), ("a", "svg", "svg")),
         *((path, None, None) for path in ("a", "a.jpg", "a.pdf.gz", ".svg")),
     ],
 )
-def test_the_format_is_that_of_the_ending_or_the_one_asked_for(path, requested, expected):
+def test_the_format_is_that_of_the_ending_or_the_one_requested(path, requested, expected):
     if expected is None:
         with pytest.raises(InputError, match=r"expected \.pdf, \.svg or \.png"):
             format_of(path, requested)

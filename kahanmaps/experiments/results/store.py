@@ -352,9 +352,9 @@ class Store(HtmlDisplay):
             kind = Unavailable if code in _OF_THE_MACHINE else StoreError
             if kind is Unavailable:
                 reason = (
-                    f"cannot be read or written: {error}; what was stored before is safe, look after the disk, its "
+                    f"cannot be read or written: {error}; what was stored before is safe; check the disk, its free "
                 )
-                reason += "room and whoever uses the file, and run it again"
+                reason += "space and other users of the file, and run it again"
             elif code == sqlite3.SQLITE_NOTADB:
                 reason = "is not an SQLite database: check the name"
             elif code in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):

@@ -69,7 +69,7 @@ def components(
 ) -> list[HypersurfaceComponent]:
     """The components of the zero sets of forms on the surface curve(t) + u direction, in projective space over GF(p).
 
-    With each of the forms over Q stands whether it is one at the image of the point under the map of the equation.
+    Each form over Q comes with a flag: whether it is evaluated at the image of the point under the map of the equation.
     `direction` is a random vector: then degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
     """
     field = GF(equation.over.characteristic)

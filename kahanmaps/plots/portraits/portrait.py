@@ -201,7 +201,7 @@ def plot_portrait(
 ) -> Figure:
     """Draw a portrait: dots, or with `lines` orbits joined; `equal` gives both axes the same unit.
 
-    `note` stands above the right corner, small. Raises InputError for more than a million points to be joined.
+    `note` is printed above the right corner. Raises InputError for more than a million points to be joined.
     """
     count = portrait.points[..., 0].size
     if lines and count > _MAX_JOINED:

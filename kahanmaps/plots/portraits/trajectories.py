@@ -97,9 +97,7 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
     require_steps(steps)
     most = min(MAX_POINTS, _MAX_NUMBERS // ensemble.system.dim)
     if (steps + 1) * ensemble.n > most:
-        raise InputError(
-            f"found {steps} steps of {ensemble.n} orbits, expected at most {most} points: take fewer steps"
-        )
+        raise InputError(f"found {steps} steps of {ensemble.n} orbits, expected at most {most} points: use fewer steps")
     points = np.concatenate(list(ensemble.records(steps, 1, progress=progress)))
     words = {"overflow": "left the range of floating-point numbers", "singular": "met a singular matrix I - eps f'"}
     ended = {text: int((ensemble.status == status).sum()) for status, text in words.items()}
