@@ -61,7 +61,7 @@ class Identity:
     entries: tuple[str, ...] = ()  # names of the entries, if a witness should show only one that differs
     scope: str = ""  # the values for which it is stated, as text, if these are not only those of eps
     has_eps: bool = True  # whether the sides depend on eps
-    no_value: str = "a denominator seems to vanish identically"  # the likely reason if it is defined nowhere
+    undefined_reason: str = "a denominator seems to vanish identically"  # the likely reason if it is defined nowhere
     root: Root | None = None  # the algebraic number in the coefficients, if any
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
@@ -178,7 +178,7 @@ class Decidable(Protocol):
     def where(self) -> str: ...
 
     @property
-    def no_value(self) -> str: ...
+    def undefined_reason(self) -> str: ...
 
     @property
     def bound(self) -> tuple[CoefficientSize, int]: ...
@@ -216,7 +216,7 @@ def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS
         undefined += 1
         if undefined > statement.max_failures:
             text = f"the {statement.name} is not defined at any of {undefined} random points over GF(p)"
-            return _undecided(f"{text}: {statement.no_value}", poles_met=undefined)
+            return _undecided(f"{text}: {statement.undefined_reason}", poles_met=undefined)
     else:
         return _undecided("no prime was found at which chi splits into distinct factors", points=0)
     if not is_bounded:

@@ -537,7 +537,7 @@ class ClaimAtPoints:
     """A claim at the points of a verifier, in the form that `decide` requires."""
 
     name = "claim"
-    no_value = "a denominator seems to vanish identically"
+    undefined_reason = "a denominator seems to vanish identically"
     max_failures = _MAX_UNDEFINED
 
     def __init__(self, verifier: Verifier, claim: Claim) -> None:

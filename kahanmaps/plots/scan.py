@@ -117,7 +117,7 @@ def plot_scan(
 
 @dataclass(frozen=True)
 class _Kind:
-    """What has one color: points, pieces of curves, and conditions at the places where they are written."""
+    """The objects of one color: points, pieces of curves, and conditions with the places where they are written."""
 
     name: str
     points: Sequence[tuple[float, ...]]

@@ -34,7 +34,7 @@ _LARGEST_ORDER = 60  # of a matrix of integers with at most _MAX_DIMENSION rows
 
 @dataclass(frozen=True)
 class GrowthProof:
-    """What is proved about the degrees of all iterates.
+    """A proved statement about the degrees of all iterates.
 
     `growth` with its `power` (k for n^k, times an exponential where the `rate` is more than 1), `rate` the dynamical
     degree, and `reason` the proof in a phrase. With `period` N the iterate N is linear; `is_identity`: it is the

@@ -163,7 +163,7 @@ class Recurrence:
     def closed_form(self) -> str | None:
         """a_n as a polynomial in n, one for each class of n modulo the period; None for exponential growth.
 
-        It holds from n = `preperiod` on. None also where there are more than 12 classes.
+        It holds from n = `preperiod` on. None also if there are more than 12 classes.
         """
         if not self.is_polynomial or not self.factors:
             return "0" if not self.factors else None

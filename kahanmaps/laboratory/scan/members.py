@@ -80,7 +80,7 @@ def solutions(
 
 @dataclass(frozen=True)
 class Scanned:
-    """What is scanned: the file and its map with the parameters `names` as symbols, eps among them if it is the last.
+    """A scanned family: the file and its map with the parameters `names` as symbols, eps among them if it is the last.
 
     `eps` is an exact number, or None for generic eps.
     """

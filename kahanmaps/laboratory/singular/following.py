@@ -157,7 +157,7 @@ class Tracked:
     critical: int = 0
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """The rows of `OrbitData` for steps along a curve. Where nothing is tracked det M(x) stands for it."""
+        """Return the rows of `OrbitData` for steps along a curve; without tracked functions those of det M(x)."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
         pairs = zip(divided(run, self.first, self.excess), run, strict=True)

@@ -167,9 +167,9 @@ class Hypersurface:
     happen). `steps` are the first steps, at the first of two points, modulo the first of the `primes`.
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
-    happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
-    cannot be said: its pattern has not settled. `orbit_data` is this pattern. In a composition that is
-    followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
+    happened before: nothing, repetition, or growth by a linear recurrence. `settled_at` is None if its pattern has not
+    settled. `orbit_data` is this pattern. In a composition that is followed map by map all steps are those of single
+    maps, and the map of number `stage`, from 0, contracts it; otherwise `stage` is None.
     `generic` is its polynomial over Q[eps], empty if it is not known.
     """
 

@@ -77,7 +77,7 @@ class OrbitInPlanes:
             if step == _EXACT_STEPS or value.bits > _EXACT_BITS:
                 break
         else:
-            self._end = _no_value(len(self._walked) - 1)
+            self._end = _undefined_step(len(self._walked) - 1)
         self._far = len(self._walked) - 1  # the last step that is known to be within the budget and before all poles
 
     def value(self, n: int) -> PlanesPoint:
@@ -94,7 +94,7 @@ class OrbitInPlanes:
             preimage = self._point(pole - 1)
             if excess_bits := preimage.exceeding(self._limit):
                 raise OverBudget(pole - 1, excess_bits)
-            raise _no_value(pole - 1)
+            raise _undefined_step(pole - 1)
         if bits != 0:
             raise OverBudget(step, bits)
         if value is None:
@@ -132,7 +132,7 @@ class OrbitInPlanes:
         """Return Phi^n(start), ignoring poles at earlier steps. Raises SingularStep if step n is a pole."""
         triples = [_reached(block, plane.reduced(n)) for block, plane in zip(self._blocks, self._planes, strict=True)]
         if any(W == 0 for _, _, W in triples):
-            raise _no_value(n - 1)
+            raise _undefined_step(n - 1)
         return PlanesPoint(self._assembly, triples)
 
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
@@ -170,7 +170,7 @@ def _halved(n: int, step: int) -> int:
     return n
 
 
-def _no_value(step: int) -> SingularStep:
+def _undefined_step(step: int) -> SingularStep:
     return SingularStep(f"the map is not defined at step {step}")
 
 
@@ -228,7 +228,7 @@ def _reached(block: Block, n: int) -> Triple:
     if n <= _SINGLE_STEPS or block.is_constant or block.level is None:
         points = list(islice(tau.triples(block), n + 1))
         if len(points) <= n:
-            raise _no_value(len(points) - 1)
+            raise _undefined_step(len(points) - 1)
         return points[n]
     point = tau.iterate(block, n)
     if point is not None:

@@ -92,7 +92,7 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """What is drawn of x' = f(x) below the orbits of the map.
+    """The parts of the phase portrait of x' = f(x) that are drawn below the orbits of the map.
 
     `places` and `arrows` (count, 2) are points of the plane and the direction there in units of the window;
     `equilibria` are points (2,) with the word for their kind, `separatrices` and `solutions` curves (n, 2 or 3).

@@ -42,7 +42,7 @@ ORBIT = "orbit"
 
 @dataclass(frozen=True, eq=False)
 class Portrait:
-    """What a portrait shows.
+    """The data that a portrait shows.
 
     `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN where there is no point; `labels` and
     `window` are one for each axis. `values` (records, orbits) color the points by `value_label`; None is by orbit.

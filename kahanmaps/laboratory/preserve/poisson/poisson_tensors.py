@@ -314,7 +314,7 @@ def with_brackets(result: PoissonSearch, integrals: Sequence[FoundIntegral], bud
         laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed)
         tensors = tuple(_with_brackets(laboratory, tensor, integrals, budget) for tensor in tensors)
     if tensors and budget.is_spent:
-        cut = f"some identities were not expanded, or some Casimirs not sought: {SPENT}"
+        cut = f"some identities were not expanded, or some Casimirs not searched for: {SPENT}"
         result = replace(result, reason="; ".join(filter(None, [result.reason, cut])))
     return replace(result, tensors=tensors, integrals=tuple(integrals))
 
