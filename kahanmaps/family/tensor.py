@@ -1,9 +1,9 @@
 """Systems over an algebra K = Q[t]/(chi) as systems over Q, and the search for such a structure.
 
 A quadratic system in n variables over K is one in n m variables over Q, m = deg chi: x = x_0 + x_1 t + ... for every
-variable. Its Kahan map is that over K, and inherits what that has, roots of chi repeated or not: docs/mathematics.md,
-"The tensor theorem". The systems over Q that come about in this way are those with a matrix C that commutes with f'(x)
-for all x and makes Q^(n m) a free module over Q[C].
+variable. Its Kahan map is the Kahan map over K and inherits its properties, even if chi has repeated roots:
+docs/mathematics.md, "The tensor theorem". A system over Q arises in this way if and only if there is a matrix C that
+commutes with f'(x) for all x and makes Q^(n m) a free module over Q[C].
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Cycles of a map on projective space over GF(p): how many there are of each length.
 
-All points of P^n(GF(p)) where they are few enough, else random ones. Every count is exact, for one prime and one eps.
+All points of P^n(GF(p)) are followed if they are few enough, otherwise random ones. Every count is exact, for one prime
+and one eps.
 
-The lengths are compared with no bound. That of Hasse and Weil, p + 1 + 2 sqrt p, is one for a cycle on an irreducible
+No bound for the lengths is applied. The bound of Hasse and Weil, p + 1 + 2 sqrt p, holds for a cycle on an irreducible
 curve of genus 1 that the map sends to itself. Levels of integrals may have several components, and the map may exchange
-levels, so integrable maps have longer cycles as well. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
+levels, so that integrable maps have longer cycles, too. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
 """
 
 from __future__ import annotations

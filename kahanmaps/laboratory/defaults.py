@@ -1,6 +1,6 @@
 """Default limits of analyses: one table for `analyze` and for the commands that run a single analysis.
 
-They are bounded by units of counted work (algebra/work.py). `analyze` gives each of its parts a share of units by
+Analyses are bounded by units of counted work (algebra/work.py). `analyze` gives each of its parts a share of units by
 dimension, of which no share exceeds the values here, so that no command finds less than `analyze` does.
 """
 

@@ -1,4 +1,4 @@
-"""The exceptional hypersurfaces of a map without their polynomials: by points, and by what happens along curves there.
+"""The exceptional hypersurfaces of a map without their polynomials: by points, and by curves through these points.
 
 Let M and M' be the matrices of a map F and of its inverse, both linear in the point. The image of a hypersurface that F
 contracts lies in the indeterminacy locus of the inverse. So the hypersurface is a pole, a factor of det M(X), or

@@ -1,8 +1,8 @@
 """The polynomials of the hypersurfaces that a map may contract; for a composition, those of each of its maps.
 
-A composition multiplied out has the hypersurfaces of all its maps, moved back by those before: long polynomials. Map by
-map they are as short as those of the maps. Curves through them are followed through the word of the maps, one map a
-step, and begin where the map stands that contracts them. Powers of a word repeat it.
+The exceptional hypersurfaces of a composition are preimages of those of its maps, under the maps applied before: long
+polynomials. Map by map the polynomials are short. Curves through the hypersurfaces are followed through the word of the
+maps, one map a step, starting with the map that contracts the hypersurface. Powers of a word repeat it.
 
 For every eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
 Hilbert's irreducibility theorem its factors stay irreducible at all but few eps, so that those at one eps are their
