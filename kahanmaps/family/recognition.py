@@ -319,7 +319,7 @@ def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
 
 
 def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
-    """The factors of chi of X = E X E on the image of E; zero on the image of I - E does not count."""
+    """Return the factors of chi of X = E X E, restricted to the image of E."""
     dim, factors = int(trace(E).p), []
     for factor in factors_of_chi(X):
         multiplicity = factor.multiplicity - (X.nrows() - dim) // 2 * (factor.root == 0)

@@ -64,7 +64,7 @@ class PeriodicLevels:
         (5/729,)
         """
         if discriminant == 0 or eps == 0:
-            raise InputError("found disc(h) = 0 or eps = 0, expected a plane with smooth levels and a step")
+            raise InputError("found disc(h) = 0 or eps = 0, expected a plane with smooth levels and a nonzero eps")
         return tuple((1 - gamma) / (64 * eps**6 * discriminant) for gamma in self.gammas)
 
 

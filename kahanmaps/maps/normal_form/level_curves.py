@@ -77,7 +77,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
         field = fq_default_ctx(q, 1) if context is None else context
         a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, 64 * gamma * gamma))
         trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
-        # The representative of the trace next to 0: then all candidates of the interval are near `middle`.
+        # The representative of the trace that is closest to 0: then all candidates are near `middle`.
         middle -= trace if 2 * trace <= unit else trace - unit
     k = _annihilator(curve, middle, unit, radius // unit + 2)
     for factor, exponent in fmpz(k).factor():

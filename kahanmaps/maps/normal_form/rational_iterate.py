@@ -138,11 +138,11 @@ class OrbitInPlanes:
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
         """Return the first undefined step up to n; `value` is the n-th point, to be compared modulo a prime."""
         known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
-        busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
+        undecided_planes = [i for i, plane in enumerate(self._planes) if not plane.lazy]
         generator = random.Random()
         for _ in range(_PRIMES):
             poles: list[int] = []
-            for i in busy:
+            for i in undecided_planes:
                 block, residue = self._blocks[i], None
                 while residue is None:  # a homomorphism to the residues modulo a random prime
                     residue = block.residue_map(random_prime(generator))
