@@ -54,8 +54,8 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
     `section` is `SystemFile.catalog`. Empty where the section has none. Raises InputError for functions that cannot be
     read. Source: petrera-pfadler-suris-2009.
 
-    >>> [found] = relations({"relations": [{"monomials": "degree <= 1", "dimension": 1}]}, ["x", "y"])
-    >>> found.functions, found.dimension
+    >>> [result] = relations({"relations": [{"monomials": "degree <= 1", "dimension": 1}]}, ["x", "y"])
+    >>> result.functions, result.dimension
     ((1, x, y), 1)
     """
     return tuple(

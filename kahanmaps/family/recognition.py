@@ -141,10 +141,10 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> H = parse_polynomial("x1^3 + x3^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
-    >>> found = find_family_structure(CubicHamiltonian(H, standard_structure(4)))
-    >>> found.text
+    >>> structure = find_family_structure(CubicHamiltonian(H, standard_structure(4)))
+    >>> structure.text
     'H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)'
-    >>> [g.label for g in found.member.associated()]
+    >>> [g.label for g in structure.member.associated()]
     ['++', '+-']
     >>> H = parse_polynomial("x1^3 + x1*x2*x3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
     >>> find_family_structure(CubicHamiltonian(H, standard_structure(4))) is None

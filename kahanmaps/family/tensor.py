@@ -66,8 +66,8 @@ def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[Rat
     they are too large.
 
     >>> x, eps = ring(["x", "eps"]).gens()
-    >>> for one in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
-    ...     print(one.numerator)
+    >>> for integral in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
+    ...     print(integral.numerator)
     x_0^2 + 2*x_1^2
     2*x_0*x_1
     """

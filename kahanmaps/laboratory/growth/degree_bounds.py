@@ -102,8 +102,8 @@ def bound_dynamical_degree(
     Source: docs/mathematics.md.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = bound_dynamical_degree(load("lotka_volterra").map, None)
-    >>> found.lower, found.upper
+    >>> result = bound_dynamical_degree(load("lotka_volterra").map, None)
+    >>> result.lower, result.upper
     ('1.973638', '2')
     >>> bound_dynamical_degree(load("nahm_tetrahedral").map, None, effort=-6) is None
     True

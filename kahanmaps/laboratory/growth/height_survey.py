@@ -152,8 +152,8 @@ def height_survey(
         InputError: for wrong values.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
-    >>> found.kind, found.text
+    >>> survey = height_survey(load("weierstrass").system, starts=2, steps=40)
+    >>> survey.kind, survey.text
     (<Growth.QUADRATIC: 'quadratic'>, 'bit lengths grow quadratically on all 4 exact orbits tried, at 2 values of eps')
     """
     eps = resolve_eps(eps, time_step)

@@ -78,10 +78,10 @@ class Recurrence:
     from the recurrence of the others. `checked` of the terms were not needed to find it. If the recurrence was derived
     from other results, only the first `measured` values were measured, and the recurrence gives the others.
 
-    >>> found = find_recurrence([2 * n * n + 1 for n in range(12)])
-    >>> found.characteristic, found.order, found.checked, str(found.growth)
+    >>> recurrence = find_recurrence([2 * n * n + 1 for n in range(12)])
+    >>> recurrence.characteristic, recurrence.order, recurrence.checked, str(recurrence.growth)
     (x^3 + (-3)*x^2 + 3*x + (-1), 3, 6, 'quadratic')
-    >>> found.closed_form, found.rate.text
+    >>> recurrence.closed_form, recurrence.rate.text
     ('2*n^2 + 1', '1')
     """
 

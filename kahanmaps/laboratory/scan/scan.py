@@ -132,8 +132,8 @@ def scan(
     ... parameters.g = 1
     ... [system]
     ... rhs = ["x*(x + 2*y)", "-y*((g + 1)*x + g*y)"]''')
-    >>> found = scan(lines, ["g"], terms=4, primes=[31, 37, 41])
-    >>> [one.text for one in found.components if one.growth.growth == "quadratic"]
+    >>> scanned = scan(lines, ["g"], terms=4, primes=[31, 37, 41])
+    >>> [component.text for component in scanned.components if component.growth.growth == "quadratic"]
     ['2', '1']
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)

@@ -385,10 +385,10 @@ def find_commuting(
     Raises InputError for other maps, and where `commuting_systems` does.
 
     >>> from kahanmaps.documents.inline import System
-    >>> found = find_commuting(System("x' = a*x^2; y' = y^2", a="root of t^2 - 2").map)
-    >>> [g.rhs for g in found.solutions]
+    >>> systems = find_commuting(System("x' = a*x^2; y' = y^2", a="root of t^2 - 2").map)
+    >>> [g.rhs for g in systems.solutions]
     [['0', '0'], ['x^2*a', 'y^2'], ['-x^2*a', '-y^2']]
-    >>> [[g.rhs for g in family.directions] for family in found.families]
+    >>> [[g.rhs for g in family.directions] for family in systems.families]
     [[['x^2*a', 'y^2'], ['2*x^2', '0'], ['x^2*a', '0'], ['0', 'y^2*a']]]
     """
     options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "effort": effort, "progress": progress}

@@ -80,7 +80,7 @@ class FixedPoints:
             eps: an exact number, or None for all but finitely many.
 
         >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
-        >>> [one.are_fixed_by_map(fmpq(1)) for one in fixed_points(pendulum).found]
+        >>> [points.are_fixed_by_map(fmpq(1)) for points in fixed_points(pendulum).found]
         [False, True]
         >>> line = fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "0"])).found[0]
         >>> line.where, line.are_fixed_by_map(None)
@@ -130,9 +130,9 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     >>> print(fixed_points(pendulum))
     fixed point (0, 0), eigenvalues of f': (lambda - 1)*(lambda + 1) = 0
     fixed point (1, 0), eigenvalues of f': lambda^2 + 1 = 0
-    >>> [one.where for one in fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "x^2 - 2*x"])).found]
+    >>> [points.where for points in fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "x^2 - 2*x"])).found]
     ['fixed point (2, 0)', 'line of fixed points (0, y)']
-    >>> [one.text for one in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"])).found]
+    >>> [points.text for points in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"])).found]
     ["2 fixed points (x) with x^2 - 2 = 0, eigenvalues of f': lambda - 2*x = 0"]
     """
     system = as_system(system)

@@ -204,8 +204,8 @@ class Trajectory:
     them. `integrals` are functions of x and eps (PhaseFunction) by name, whose values are added to tables and files.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
-    >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
-    >>> len(found), found[-1].x, found.rows()[0]
+    >>> result = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
+    >>> len(result), result[-1].x, result.rows()[0]
     (4, (1/2,), {'step': 0, 'x': '1/5'})
     """
 

@@ -35,7 +35,7 @@ def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
     Refuted cells are expected, and count as controls. Returns a Report with one Finding for each cell; raises
     InputError as `verify` does.
 
-    >>> cells = {found.claim: found for found in beyond_table(1).findings}
+    >>> cells = {result.claim: result for result in beyond_table(1).findings}
     >>> cells["eps^{-1} x^T J^{-1} x~ is conserved by f: H inhomogeneous"].evidence.summary
     'fails for m = 1, H = u1^3 + v1'
     """

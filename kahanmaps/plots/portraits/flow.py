@@ -67,7 +67,7 @@ def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
     """Find the real equilibria to which Newton's method converges from sixty initial points, each once.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
-    >>> sorted((one.point.round(6).tolist(), one.kind) for one in equilibria(pendulum))
+    >>> sorted((equilibrium.point.round(6).tolist(), equilibrium.kind) for equilibrium in equilibria(pendulum))
     [([0.0, 0.0], 'saddle'), ([1.0, 0.0], 'center')]
     """
     n = system.dim

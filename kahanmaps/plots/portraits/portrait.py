@@ -87,8 +87,8 @@ def portrait_of(
     of axes.
 
     >>> from kahanmaps.plots.point_functions import point_function
-    >>> found = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
-    >>> portrait_of(found, ["step", point_function("x", ["x"])]).points[:, 0].tolist()
+    >>> result = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
+    >>> portrait_of(result, ["step", point_function("x", ["x"])]).points[:, 0].tolist()
     [[0.0, 1.0], [1.0, 3.0]]
     """
     if len(axes) not in (2, 3):

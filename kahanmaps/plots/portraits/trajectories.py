@@ -90,8 +90,8 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
     """Take `steps` steps and keep every point. Raises InputError for more than MAX_POINTS points.
 
     >>> system = QuadraticSystem.from_text(["x"], ["x"])
-    >>> found = walked(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)
-    >>> found.points[:, :, 0].tolist(), found.ended
+    >>> result = walked(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)
+    >>> result.points[:, :, 0].tolist(), result.ended
     ([[1.0, 2.0], [3.0, 6.0], [9.0, 18.0]], {})
     """
     require_steps(steps)
