@@ -131,8 +131,8 @@ def bound_dynamical_degree(
 def is_birational(map_: Map, rng: random.Random) -> bool:
     """Return whether a map over GF(p) is birational; True is a proof.
 
-    False is returned also if the inverse is not known. For every factor, the equation of its inverse at the image of a
-    generic point must annihilate that point, as an identity of forms, and nothing else, which one point shows.
+    False is returned also if the inverse is not known. For every factor, the equation of the inverse, at the image
+    of a point, must have this point as a solution, as an identity of forms, and no other; one point shows the latter.
     """
     for factor in map_.factors:
         try:

@@ -301,7 +301,7 @@ class Patterns:
     def terms_needed(self, order: int) -> int:
         """The number of terms, including d_0, that determine a recurrence of this order.
 
-        With two rational generating functions of degrees r and R that agree in r + R + 1 terms they are the same; R is
+        Two rational generating functions of degrees r and R are equal if they agree in r + R + 1 terms. Here R is
         at most 1 more than the sum of the lengths of different patterns (hypersurfaces of the same pattern count once).
         """
         return order + sum(self.lengths) + 2
