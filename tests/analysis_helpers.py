@@ -49,35 +49,35 @@ def minimal_polynomial(text: str) -> fmpz_poly:
     return fmpz_poly([terms.get(k, 0) for k in range(max(terms) + 1)])
 
 
-def same_measures(found: Analysis, known: Value) -> bool:
+def same_measures(analysis: Analysis, known: Value) -> bool:
     """Whether every density found is the known one times an integral, modulo two primes at several points."""
-    for map_ in Laboratory(found.file).maps:
-        for one in found.densities.densities:
+    for map_ in Laboratory(analysis.file).maps:
+        for density in analysis.densities.densities:
             for x, image in map_.pairs(3):
                 a, b = known(map_, x), known(map_, image)
-                c, d = (at_residues(one.function, map_, point) for point in (x, image))
+                c, d = (at_residues(density.function, map_, point) for point in (x, image))
                 if a == 0 or c == 0 or (a * d - b * c) % map_.prime:
                     return False
     return True
 
 
-def differences(found: Analysis, answer: Answer, least_degrees: int = 5) -> set[str]:
+def differences(analysis: Analysis, answer: Answer, least_degrees: int = 5) -> set[str]:
     """In what an analysis contradicts the answer or falls short of it; so many degrees at least have to be compared."""
     wrong = set()
-    degrees = found.degrees.degrees[1:]
+    degrees = analysis.degrees.degrees[1:]
     common = min(len(degrees), len(answer.degrees))
     if answer.degrees and (
         common < min(least_degrees, len(answer.degrees)) or degrees[:common] != answer.degrees[:common]
     ):
         wrong.add("degrees")
-    conclusion = found.conclusion
+    conclusion = analysis.conclusion
     if answer.growth is not None and conclusion.growth != answer.growth:
         wrong.add("growth")
     if answer.verdict is not None and conclusion.kind not in (
         (answer.verdict, "linear") if answer.verdict == "linearisable" else (answer.verdict,)
     ):
         wrong.add("verdict")
-    rate = found.degrees.dynamical_degree  # None without a recurrence, and then there is nothing to compare
+    rate = analysis.degrees.dynamical_degree  # None without a recurrence, and then there is nothing to compare
     if (
         answer.dynamical_degree is not None
         and rate is not None
@@ -86,14 +86,14 @@ def differences(found: Analysis, answer: Answer, least_degrees: int = 5) -> set[
         wrong.add("dynamical degree")
     if answer.integrals is not None and conclusion.integrals != answer.integrals:
         wrong.add("count")
-    functions = [one.function for one in found.integrals.integrals]
-    number, _, together = ranks(functions, answer.formulas, Laboratory(found.file).maps[0])
+    functions = [integral.function for integral in analysis.integrals.integrals]
+    number, _, together = ranks(functions, answer.formulas, Laboratory(analysis.file).maps[0])
     if number != len(functions) or (answer.integrals is not None and together > answer.integrals):
         wrong.add("formulas")
-    if not all(one.verdict.holds for one in (*found.integrals.integrals, *found.densities.densities)):
+    if not all(entry.verdict.holds for entry in (*analysis.integrals.integrals, *analysis.densities.densities)):
         wrong.add("proofs")
-    if answer.density is not None and not (found.densities.densities and same_measures(found, answer.density)):
+    if answer.density is not None and not (analysis.densities.densities and same_measures(analysis, answer.density)):
         wrong.add("density")
-    if answer.without_density and found.densities.densities:
+    if answer.without_density and analysis.densities.densities:
         wrong.add("density")
     return wrong

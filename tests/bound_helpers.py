@@ -81,8 +81,8 @@ def written(identity):
 
 def differences(identity):
     """Numerator and denominator, in lowest terms, of the difference of the sides in each entry that differs."""
-    found = (left - right for left, right in written(identity))
-    return [lowest(difference) for difference in found if not difference.numerator.is_zero()]
+    results = (left - right for left, right in written(identity))
+    return [lowest(difference) for difference in results if not difference.numerator.is_zero()]
 
 
 def check(identity, *, differs=False):
@@ -92,9 +92,9 @@ def check(identity, *, differs=False):
     and coefficients by Gelfond's inequality, by which those of a factor are at most 2^degree times as large.
     """
     equation, poles = identity.bound
-    found = differences(identity)
-    assert bool(found) or not differs
-    for numerator, denominator in found:
+    result = differences(identity)
+    assert bool(result) or not differs
+    for numerator, denominator in result:
         assert true_size(numerator)[0] <= equation.degree
         assert true_size(numerator)[1] <= equation.bits + equation.degree
         assert sum(true_size(factor)[0] for factor, _ in denominator.factor_squarefree()[1]) <= poles

@@ -216,7 +216,7 @@ def verify_commute_witness(witness: Witness | None, f: QuadraticSystem, g: Quadr
 
 
 def commute_at(f: QuadraticSystem, g: QuadraticSystem, eps: Fraction, x: Sequence[Fraction]) -> bool | None:
-    """Whether the two maps commute at one point, None where one of them has no value."""
+    """Whether the two maps commute at one point, None if one of them is not defined there."""
     after_f, after_g = kahan_step(f, eps, x), kahan_step(g, eps, x)
     if after_f is None or after_g is None:
         return None

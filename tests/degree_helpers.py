@@ -19,20 +19,22 @@ def polynomial_degrees(system: QuadraticSystem, count: int, seed: int, eps: Any 
     p, n = field.prime, system.dim
     eps = field.random(rng) if eps is None else field.convert(fmpq(*map(int, eps.split("/"))))
     local = system.over(field)
-    zero, one = nmod_poly([0], p), field.one
+    zero, item = nmod_poly([0], p), field.one
     X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(p)], p) for _ in range(n))]
-    found = []
+    results = []
     for _ in range(count):
         matrix = [
             [
-                X[0] * ((i == j) * one - eps * local.B[i, j])
+                X[0] * ((i == j) * item - eps * local.B[i, j])
                 - sum((X[k + 1] * (eps * local.tensor[i * n + j, k]) for k in range(n)), zero)
                 for j in range(n)
             ]
             for i in range(n)
         ]
         right = [
-            sum((X[j + 1] * ((i == j) * one + eps * local.B[i, j]) for j in range(n)), X[0] * (2 * eps * local.c[i, 0]))
+            sum(
+                (X[j + 1] * ((i == j) * item + eps * local.B[i, j]) for j in range(n)), X[0] * (2 * eps * local.c[i, 0])
+            )
             for i in range(n)
         ]
         image = [determinant(matrix)]
@@ -42,8 +44,8 @@ def polynomial_degrees(system: QuadraticSystem, count: int, seed: int, eps: Any 
         for entry in image[1:]:
             common = common.gcd(entry)
         X = [entry // common for entry in image]
-        found.append(max(entry.degree() for entry in X))
-    return found
+        results.append(max(entry.degree() for entry in X))
+    return results
 
 
 def by_formulas(variables: str, image: str) -> ImplicitMap:

@@ -14,8 +14,8 @@ START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (
 
 def over(name: str, eps: str = "3/11") -> Map:
     """The map of a system of the catalogue."""
-    found: Map = load(name).map.at(eps)
-    return found
+    result: Map = load(name).map.at(eps)
+    return result
 
 
 def begin(map_over: Map) -> IntegerPoint:

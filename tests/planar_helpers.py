@@ -188,9 +188,9 @@ def invertible(n: int, seed: int) -> fmpq_mat:
 def structure_and_system(name: str) -> tuple[Any, QuadraticSystem]:
     """The structure of a member of the table below and its system."""
     system, hamiltonian = MEMBERS[name]
-    found = system_normal_form(system, hamiltonian)
-    assert isinstance(found, SystemNormalForm)
-    return found, system
+    normal_form = system_normal_form(system, hamiltonian)
+    assert isinstance(normal_form, SystemNormalForm)
+    return normal_form, system
 
 
 def _plain(cubics: Sequence[Sequence[int]]) -> tuple[QuadraticSystem, CubicHamiltonian]:

@@ -87,10 +87,10 @@ def values_on_orbits(
 
     An orbit ends at a pole of the map; where it starts at a pole of the formula, another takes its place.
     """
-    found: list[set[Fraction]] = []
+    results: list[set[Fraction]] = []
     for step in eps:
         kahan = KahanMap(file.system, step)
-        wanted = len(found) + starts
+        expected = len(results) + starts
         for x in islice(random_starts(file.system.dim, 5), 10 * starts):
             values = set()
             try:
@@ -99,9 +99,9 @@ def values_on_orbits(
                     x = kahan.step(x)
             except (SingularStep, ZeroDivisionError):
                 pass
-            if values and len(found) < wanted:
-                found.append(values)
-    return found
+            if values and len(results) < expected:
+                results.append(values)
+    return results
 
 
 def gradient(function: RationalFunction, map_: ModularMap, point: Sequence[int]) -> list[int]:
@@ -117,10 +117,10 @@ def gradient(function: RationalFunction, map_: ModularMap, point: Sequence[int])
     ]
 
 
-def ranks(found: Sequence[RationalFunction], known: Sequence[RationalFunction], map_: ModularMap) -> tuple[int, ...]:
+def ranks(result: Sequence[RationalFunction], known: Sequence[RationalFunction], map_: ModularMap) -> tuple[int, ...]:
     """The numbers of independent functions among those found, those known, and all of them."""
     point = map_.random_point()
-    rows = [[gradient(one, map_, point) for one in functions] for functions in (found, known)]
+    rows = [[gradient(entry, map_, point) for entry in functions] for functions in (result, known)]
     return rank(rows[0], map_.prime), rank(rows[1], map_.prime), rank([*rows[0], *rows[1]], map_.prime)
 
 

@@ -22,12 +22,12 @@ PROGRESS = re.compile(r"^.* \(\d+ s\)\n", re.MULTILINE)
 
 def sessions(page: Path) -> list[tuple[str, str]]:
     """Commands and expected output of the ```console blocks of a page, in order."""
-    found = []
+    results = []
     for block in re.findall(r"```console\n(.*?)```", page.read_text(), re.DOTALL):
         for piece in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
             command, _, output = piece.partition("\n")
-            found.append((command, output))
-    return found
+            results.append((command, output))
+    return results
 
 
 def files(page: Path) -> dict[str, str]:

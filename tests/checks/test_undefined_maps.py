@@ -1,6 +1,6 @@
 """Theorems presuppose that the map exists: where det(I - eps f'(x)) is zero for all x, nothing is proved.
 
-For H = q p the determinant is 1 - eps^2, so at eps = 1 and eps = -1 the Kahan map has no value anywhere.
+For H = q p the determinant is 1 - eps^2, so at eps = 1 and eps = -1 the Kahan map is defined nowhere.
 """
 
 import pytest

@@ -11,7 +11,7 @@ import pytest
 
 def claims(report):
     """Claim -> the rest, without the control."""
-    return {found["claim"]: found for found in report["claims"] if "control" not in found}
+    return {entry["claim"]: entry for entry in report["claims"] if "control" not in entry}
 
 
 def image(kahanmaps, system, point, eps):
@@ -66,5 +66,5 @@ def test_integrals_of_the_command_line_are_checked_first_and_those_known_where_t
 ):
     report = kahanmaps(f"check-integrals euler_top {options} --json").json
     signs = {"refuted": "-", "proved": ""}
-    told = [signs[one["verdict"]] + one["claim"].removesuffix(" is conserved") for one in report["claims"]]
-    assert told == expected.split()
+    messages = [signs[entry["verdict"]] + entry["claim"].removesuffix(" is conserved") for entry in report["claims"]]
+    assert messages == expected.split()

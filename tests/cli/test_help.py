@@ -14,9 +14,9 @@ def parsed(words: list[str]) -> None:
     context = click.Context(cli)
     name = "kahanmaps"
     while isinstance(command, click.Group) and words:
-        found = command.get_command(context, words[0])
-        assert found is not None, words[0]
-        name, command, words = words[0], found, words[1:]
+        result = command.get_command(context, words[0])
+        assert result is not None, words[0]
+        name, command, words = words[0], result, words[1:]
     try:
         command.make_context(name, list(words), parent=context)
     except click.BadParameter as error:

@@ -59,9 +59,9 @@ def test_a_map_with_eps_needs_it_and_one_without_does_not(kahanmaps):
 def test_what_is_found_out_about_any_map(kahanmaps, name, command):
     file = read_system(path := EXAMPLES[NAMES.index(name)])
     command = command.replace("q,p", ",".join(file.variables))
-    found = kahanmaps(f"{command} {path} --json -q")
-    assert found.status in (0, 3)
-    record = json.loads(found.out)
+    result = kahanmaps(f"{command} {path} --json -q")
+    assert result.status in (0, 3)
+    record = json.loads(result.out)
     if not file.map.has_eps:
         assert record["convention"] == NO_EPS
     plain = kahanmaps(f"{command} {path} -q").out
@@ -72,9 +72,9 @@ def test_what_is_found_out_about_any_map(kahanmaps, name, command):
     "command", ["check-integrals --vars x,y --image 'y;(3+y)/x' --integral x", "check-commute lyness fibonacci"]
 )
 def test_a_witness_of_a_map_without_eps_has_none(kahanmaps, command):
-    found = kahanmaps(f"{command} --json -q")
-    assert found.status == 1
-    record = json.loads(found.out)
+    result = kahanmaps(f"{command} --json -q")
+    assert result.status == 1
+    record = json.loads(result.out)
     assert record["claims"][0]["witness"]["eps"] is None
     assert not re.search(r"\beps\b", kahanmaps(f"{command} -q").out)
 

@@ -32,6 +32,6 @@ def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
 @pytest.mark.usefixtures("unrendered")
 def test_a_record_of_an_incomplete_survey_is_reported(kahanmaps, tmp_path):
     record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").json
-    (tmp_path / "r.json").write_text(json.dumps({**record, "whole": False}))
+    (tmp_path / "r.json").write_text(json.dumps({**record, "complete": False}))
     done = kahanmaps("plot heights -o - --format svg --from", tmp_path / "r.json")
     assert (done.status, "stopped early" in done.err) == (3, True)

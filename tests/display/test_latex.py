@@ -31,7 +31,7 @@ def plain(latex):
 def polynomials():
     exponents = st.tuples(*[st.integers(0, 12)] * len(NAMES))
     terms = st.dictionaries(exponents, rationals().filter(bool), max_size=6)
-    return terms.map(lambda found: RING.from_dict(found))
+    return terms.map(lambda result: RING.from_dict(result))
 
 
 @given(polynomials())

@@ -31,7 +31,7 @@ def test_every_text_is_well_formed_once_it_is_escaped(text):
     ],
 )
 def test_no_text_becomes_an_element(html):
-    assert "script" not in {one.tag for one in well_formed(html).iter()}
+    assert "script" not in {entry.tag for entry in well_formed(html).iter()}
     assert "alert" in "".join(well_formed(html).itertext())
 
 

@@ -179,9 +179,9 @@ LARGE = {
 
 @together("text, expected, words", wrong_files())
 def test_the_mistakes_of_a_wrong_file_are_reported_by_key(text, expected, words):
-    found = mistakes(text)
-    assert [key for key, _ in found] == expected
-    assert [one for one in words if not any(one in sentence for _, sentence in found)] == []
+    result = mistakes(text)
+    assert [key for key, _ in result] == expected
+    assert [word for word in words if not any(word in sentence for _, sentence in result)] == []
 
 
 @pytest.mark.parametrize(("text", "expected"), LARGE.values(), ids=LARGE)

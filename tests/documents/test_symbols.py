@@ -15,12 +15,12 @@ FIELD = GF(PRIME)
 WITH_PARAMETERS = [name for name in names() if load(name).parameters and load(name).kind != "family"]
 
 
-def same_maps(one, other, seed=0):
+def same_maps(first, second, seed=0):
     rng = random.Random(seed)
     for _ in range(3):
-        x = [FIELD.random(rng) for _ in range(other.dim)]
-        assert list(one.polarised(x, x)) == list(other.value(x))
-        assert one.jacobian(x) == other.jacobian(x)
+        x = [FIELD.random(rng) for _ in range(second.dim)]
+        assert list(first.polarised(x, x)) == list(second.value(x))
+        assert first.jacobian(x) == second.jacobian(x)
 
 
 @pytest.mark.parametrize("name", WITH_PARAMETERS)

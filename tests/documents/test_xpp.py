@@ -66,7 +66,7 @@ def test_values_and_definitions_stand_in_the_places_of_their_names(lines, rhs):
         ("par eps=1\nx'=eps*x", "rename it"),
         ("x'=x^3", 'discretization = "polarised"'),
         ("\x00\x1b[31m", "line 1"),
-        ("q=x\n" + "q=q*q\n" * 100 + "x'=q", "characters with its definitions put in"),
+        ("q=x\n" + "q=q*q\n" * 100 + "x'=q", "characters after its definitions are inserted"),
         ("\n".join(f"f{k}(x)=x" for k in range(1000)), "and 950 more"),
     ],
 )

@@ -66,12 +66,12 @@ def test_a_file_that_says_the_same_as_another_is_named_with_it_or_left_out(spec,
     (tmp_path / "members" / "copy").mkdir()
     (tmp_path / "members" / "copy" / "a.toml").write_text(GOOD)
     text = spec(ORBITS.replace('"members/*.toml"', '["members/a.toml", "members/copy/*.toml"]'))
-    told = "found a twice, expected every system once: members/copy/a.toml says the same as members/a.toml"
-    with pytest.raises(SpecError, match=f"system.2.: {told}"):
+    messages = "found a twice, expected every system once: members/copy/a.toml says the same as members/a.toml"
+    with pytest.raises(SpecError, match=f"system.2.: {messages}"):
         read_spec(text)
     [experiment] = read_spec(text, skip_bad=True).experiments
     assert [task.system["name"] for task in experiment.tasks()] == ["a"]
-    assert experiment.skipped == (("members/copy/a.toml", told),)
+    assert experiment.skipped == (("members/copy/a.toml", messages),)
 
 
 def test_the_list_is_in_the_database_and_follows_the_plan(spec, tmp_path):

@@ -39,16 +39,16 @@ def test_a_batch_takes_all_kinds_of_map_and_says_of_each_task_that_does_not(tmp_
     text = SPEC.replace("{files}", ", ".join(f'"{path}"' for path in FILES))
     database = tmp_path / "maps.db"
     list(run(parse_spec(text, "maps.toml"), database))
-    found, verdicts = {}, set()
+    answer, verdicts = {}, set()
     with Store.open(database) as store:
         for row in store.rows():
-            found.setdefault(row.task.kind, []).append((row.record.outcome, row.record.result or {}))
+            answer.setdefault(row.task.kind, []).append((row.record.outcome, row.record.result or {}))
             verdicts.add((row.task.kind, row.record.verdict))
-    assert sorted(result["degrees"][3] for _, result in found["degrees"]) == [8, 9, 19, 19, 74]
-    assert [outcome for outcome, _ in found["singularities"]] == ["ok"] * 5
-    assert {(outcome, result["status"]) for outcome, result in found["orbit"]} == {("ok", "completed")}
+    assert sorted(result["degrees"][3] for _, result in answer["degrees"]) == [8, 9, 19, 19, 74]
+    assert [outcome for outcome, _ in answer["singularities"]] == ["ok"] * 5
+    assert {(outcome, result["status"]) for outcome, result in answer["orbit"]} == {("ok", "completed")}
     assert {verdict for kind, verdict in verdicts if kind == "check-measure"} == {"proved"}
-    assert [outcome for outcome, _ in found["find-integrals"]] == ["ok"] * 5
+    assert [outcome for outcome, _ in answer["find-integrals"]] == ["ok"] * 5
 
 
 WITHOUT_EPS = """

@@ -52,20 +52,20 @@ SYSTEMS = CASES.pop("a system")
 
 @together("text, expected", [case for cases in CASES.values() for case in cases])
 def test_a_mistake_is_reported_once_with_its_key(text, expected):
-    wanted = [words.split(": ", 1) for words in expected.split(" ;; ")]
-    found = mistakes(text)
-    assert [key for key, _ in found] == [key for key, _ in wanted]
-    assert all(told.startswith(words) for (_, told), (_, words) in zip(found, wanted, strict=True))
+    required = [words.split(": ", 1) for words in expected.split(" ;; ")]
+    result = mistakes(text)
+    assert [key for key, _ in result] == [key for key, _ in required]
+    assert all(message.startswith(words) for (_, message), (_, words) in zip(result, required, strict=True))
 
 
 @pytest.mark.parametrize(("system", "expected"), SYSTEMS)
 def test_a_wrong_system_is_reported_once_with_its_key(folder, monkeypatch, system, expected):
     monkeypatch.chdir(folder)
     text = LORENZ.replace('"lorenz"', system) + "axes = {eps = 1" + (", m = 2}" if "family" in system else "}")
-    ((found, told),) = mistakes(text, folder=folder)
+    ((result, messages),) = mistakes(text, folder=folder)
     key, sentence = expected.split(": ", 1)
-    assert found == f"experiments.a.{key}"
-    assert told.startswith(sentence.replace("FOLDER", str(folder)))
+    assert result == f"experiments.a.{key}"
+    assert messages.startswith(sentence.replace("FOLDER", str(folder)))
 
 
 def test_nothing_in_a_message_is_obeyed_by_a_terminal():
@@ -91,9 +91,9 @@ def test_nothing_in_a_message_is_obeyed_by_a_terminal():
     ],
 )
 def test_invalid_toml_is_refused_in_a_sentence(text, sentence):
-    ((key, told),) = mistakes(text)
+    ((key, messages),) = mistakes(text)
     assert key == "TOML"
-    assert told.split(" (")[0] == sentence.split(" (")[0]
+    assert messages.split(" (")[0] == sentence.split(" (")[0]
 
 
 KEYS = ["task", "system", "options", "axes", "zip", "limits", "eps", "time_step", "m", "seed", "parameters", "name"]

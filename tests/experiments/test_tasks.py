@@ -54,7 +54,7 @@ def normal_form(system: SystemFile) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("name", "system", "asked", "call"),
+    ("name", "system", "requested", "call"),
     [
         ("check-commute", MEMBER, {"eps": "1/3"}, lambda: check_commute(MEMBER, None, Settings(eps="1/3"))),
         (
@@ -82,8 +82,8 @@ def normal_form(system: SystemFile) -> Any:
         ),
     ],
 )
-def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(name, system, asked, call):
-    result, report = perform(name, system, report=True, **asked), call()
+def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(name, system, requested, call):
+    result, report = perform(name, system, report=True, **requested), call()
     assert result["verdict"] == str(report.verdict)
     assert result["report"] == json.loads(json.dumps(report.to_json()))
     counted = [f for f in report.findings if f.applies and not f.control]
@@ -128,25 +128,29 @@ def test_a_start_is_drawn_from_the_seed_unless_given(name):
 
 @pytest.mark.parametrize(("system", "steps", "growth"), [(MEMBER, 40, "quadratic"), (LORENZ, 9, "exponential")])
 def test_heights_are_those_of_the_library(system, steps, growth):
-    found = height_growth(
+    outcome = height_growth(
         KahanMap(system.system, "1/10"), start_of(system), steps, normal_form=normal_form(system)
     ).to_json()
     result = perform("heights", system, eps="1/10", steps=steps)
-    assert result["growth"] == found["kind"] == growth
-    assert (result["heights"], result["constant"], result["reached"]) == (found["heights"], found["constant"], steps)
+    assert result["growth"] == outcome["kind"] == growth
+    assert (result["heights"], result["constant"], result["reached"]) == (
+        outcome["heights"],
+        outcome["constant"],
+        steps,
+    )
 
 
 @pytest.mark.parametrize("prime", [None, 10007])
 def test_a_period_is_that_of_the_library(prime):
-    found = period_of(normal_form(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
+    period = period_of(normal_form(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
     result = perform("period", MEMBER, eps="1/10", **({} if prime is None else {"prime": prime}))
-    assert result["period"] == (None if found.period is None else str(found.period))
-    assert (result["status"], result["meets_pole"]) == (found.status, found.meets_pole)
-    assert result["planes"] == [plane.text for plane in found.planes]
+    assert result["period"] == (None if period.period is None else str(period.period))
+    assert (result["status"], result["meets_pole"]) == (period.status, period.meets_pole)
+    assert result["planes"] == [plane.text for plane in period.planes]
 
 
 @pytest.mark.parametrize(
-    ("name", "system", "asked", "words"),
+    ("name", "system", "requested", "words"),
     [
         ("check-commute", LORENZ, {}, "kind \\[family\\]"),
         ("check-commute", LORENZ, {"other": RIVALS}, "lorenz has dimension 3 and lotka_volterra 2"),
@@ -163,6 +167,6 @@ def test_a_period_is_that_of_the_library(prime):
         ("period", MEMBER, {"eps": "1/7", "prime": 7}, "the prime 7 divides the denominator of 1/7"),
     ],
 )
-def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
+def test_an_impossible_task_is_refused_in_a_sentence(name, system, requested, words):
     with pytest.raises(InputError, match=words):
-        perform(name, system, **asked)
+        perform(name, system, **requested)

@@ -1,7 +1,7 @@
 """The normal form of a system, declared or found.
 
-Specified here: what is declared is taken as it is, what is not is looked for; the structure steps like the system, also
-for another J; and where there is none the reason is said.
+Specified here: a declared structure is used unchanged, otherwise it is searched for; the structure steps like the
+system, also for another J; and if there is none, the reason is given.
 """
 
 import pytest
@@ -38,10 +38,10 @@ def steps_like(normal_form: SystemNormalForm, system: QuadraticSystem) -> bool:
 
 def test_a_declared_member_keeps_its_a():
     member = random_member_with_eigenvalues(["1/2", -7], 3)
-    found = system_normal_form(member.chosen.system, member=member)
-    assert (found.declared, found.T) == (True, None)
-    assert found.form.A == member.A
-    assert found.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
+    normal_form = system_normal_form(member.chosen.system, member=member)
+    assert (normal_form.declared, normal_form.T) == (True, None)
+    assert normal_form.form.A == member.A
+    assert normal_form.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
 
 
 @over_members
@@ -55,11 +55,11 @@ def test_the_structure_steps_like_the_system(name):
 def test_with_another_J_there_is_a_change_of_coordinates(n):
     member = random_member_with_eigenvalues([1, -2, 3][: n // 2], 2)
     other = moved(CubicHamiltonian(member.H, standard_structure(n)), invertible(n, 5))
-    found = system_normal_form(other.system, other)
-    assert found.T * standard_structure(n) * found.T.transpose() == other.J
-    assert steps_like(found, other.system)
+    normal_form = system_normal_form(other.system, other)
+    assert normal_form.T * standard_structure(n) * normal_form.T.transpose() == other.J
+    assert steps_like(normal_form, other.system)
     # x = S z alone, without T, are other coordinates
-    assert not steps_like(SystemNormalForm(found.form, None, False, ""), other.system)
+    assert not steps_like(SystemNormalForm(normal_form.form, None, False, ""), other.system)
 
 
 # None, with the reason.
@@ -76,6 +76,6 @@ REASONS = [
 
 @pytest.mark.parametrize(("system", "reason"), REASONS)
 def test_without_a_structure_the_reason_is_said(system, reason):
-    found = system_normal_form(system)
-    assert isinstance(found, NoNormalForm)
-    assert found.reason.startswith(reason)
+    normal_form = system_normal_form(system)
+    assert isinstance(normal_form, NoNormalForm)
+    assert normal_form.reason.startswith(reason)

@@ -41,9 +41,9 @@ relations = [{monomials = "degree <= 2", dimension = 0}]
 FOUR = ("x y", "y", "-x + x^2")  # q'' = -q + q^2: at eps = 1 the fourth iterate is the identity
 
 
-def results(found):
+def results(result):
     """Everything but the file itself."""
-    return {key: value for key, value in found.to_json().items() if key != "document"}
+    return {key: value for key, value in result.to_json().items() if key != "document"}
 
 
 # What a file claims is not read
@@ -51,11 +51,11 @@ def results(found):
 
 @pytest.mark.parametrize(("symbols", "eps"), [((), None), (("b",), "1/3")])
 def test_the_claims_and_facts_of_a_file_are_not_read(symbols, eps):
-    found = [
+    result = [
         results(analyze(parse_system(PLANE + claims, "same"), symbols=symbols, eps=eps)) for claims in ("", NONSENSE)
     ]
-    assert found[0] == found[1]
-    assert found[0]["verdict"]["integrals"] == 1
+    assert result[0] == result[1]
+    assert result[0]["verdict"]["integrals"] == 1
 
 
 # One eps says nothing of others
@@ -78,18 +78,18 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
 
 
 def test_where_the_budget_is_spent_steps_are_skipped_and_reported():
-    found = analyze(load("lagrange_top"), effort=-20)
-    skipped = [text.partition(": ")[0] for text in found.skipped]
-    assert found.skipped == [f"{part}: work limit reached; raise --effort" for part in skipped]
+    analysis = analyze(load("lagrange_top"), effort=-20)
+    skipped = [text.partition(": ")[0] for text in analysis.skipped]
+    assert analysis.skipped == [f"{part}: work limit reached; raise --effort" for part in skipped]
     assert {"integrals", "densities", "heights", "commuting systems"} <= set(skipped) <= set(PARTS)
-    assert found.work == "effort -20, 0.0 million units"
-    assert [line.text for line in dict(found.sections)["not done"]] == found.skipped
-    assert (found.conclusion.kind, found.conclusion.growth) == ("undecided", "unknown")
+    assert analysis.work == "effort -20, 0.0 million units"
+    assert [line.text for line in dict(analysis.sections)["not done"]] == analysis.skipped
+    assert (analysis.conclusion.kind, analysis.conclusion.growth) == ("undecided", "unknown")
     # none was found, which is not that there is none
-    assert found.conclusion.sentence.startswith("The growth is undecided: ")
-    assert found.conclusion.sentence.endswith("; the integrals were not counted.")
-    data = json.loads(json.dumps(found.to_json()))
-    assert (data["verdict"]["integrals"], data["integrals"], data["skipped"]) == (None, None, found.skipped)
+    assert analysis.conclusion.sentence.startswith("The growth is undecided: ")
+    assert analysis.conclusion.sentence.endswith("; the integrals were not counted.")
+    data = json.loads(json.dumps(analysis.to_json()))
+    assert (data["verdict"]["integrals"], data["integrals"], data["skipped"]) == (None, None, analysis.skipped)
 
 
 def test_a_part_that_gives_up_leaves_the_others(monkeypatch):
@@ -97,11 +97,11 @@ def test_a_part_that_gives_up_leaves_the_others(monkeypatch):
         raise InputError("found 1, expected 2")
 
     monkeypatch.setattr(table, "linear_symmetries", refuses)
-    found = analyze(load("nahm_tetrahedral"))
-    assert found.skipped == ["symmetries: found 1, expected 2"]
-    assert found.symmetries is None
-    assert found.commuting is not None
-    assert found.conclusion.kind == "integrable"
+    analysis = analyze(load("nahm_tetrahedral"))
+    assert analysis.skipped == ["symmetries: found 1, expected 2"]
+    assert analysis.symmetries is None
+    assert analysis.commuting is not None
+    assert analysis.conclusion.kind == "integrable"
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
@@ -119,16 +119,16 @@ def test_mistakes_and_interrupts_are_not_swallowed(monkeypatch, error):
 
 def test_the_flow_of_a_polarised_map_is_part_of_the_report():
     steps = [step for step in ANALYSES if step.name in ("integrals", "densities", "the flow")]
-    found = analyze(load("duffing_polarised"), analyses=steps)
-    assert dict(found.sections)["the flow"]
-    assert [line for line in found.skipped if "flow" in line] == []
+    analysis = analyze(load("duffing_polarised"), analyses=steps)
+    assert dict(analysis.sections)["the flow"]
+    assert [line for line in analysis.skipped if "flow" in line] == []
 
 
 # Degenerate systems
 
 
-def lines_of(found, title):
-    return [line.text for name, lines in found.sections if name == title for line in lines]
+def lines_of(result, title):
+    return [line.text for name, lines in result.sections if name == title for line in lines]
 
 
 QUICK_STEPS = [
@@ -145,8 +145,8 @@ LOST = [
 
 @pytest.mark.parametrize(("eps", "expected"), [(None, KEPT), ("1/2", KEPT), ("1", LOST)])
 def test_what_is_said_of_hyperplanes_holds_at_the_eps_in_force(eps, expected):
-    found = analyze(load("lotka_volterra"), eps=eps, analyses=QUICK_STEPS)
-    assert [line for line in lines_of(found, "structure") if "invariant" in line] == expected
+    analysis = analyze(load("lotka_volterra"), eps=eps, analyses=QUICK_STEPS)
+    assert [line for line in lines_of(analysis, "structure") if "invariant" in line] == expected
 
 
 SAME = "flow and map have the same fixed points"
@@ -166,8 +166,8 @@ NONE = "at eps = 1 det(I - eps f'(x)) is 0 at all of them, where the map is not 
     ],
 )
 def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expected):
-    found = analyze(given, eps=eps, analyses=QUICK_STEPS)
-    assert lines_of(found, "vector field")[-1].startswith(expected)
+    analysis = analyze(given, eps=eps, analyses=QUICK_STEPS)
+    assert lines_of(analysis, "vector field")[-1].startswith(expected)
 
 
 NOWHERE = "at eps = 1 the map is defined nowhere: det(I - eps f'(x)) is identically 0"
@@ -184,28 +184,30 @@ SINGULAR = "at eps = 1 the map is not invertible: det(I + eps f'(x)) is 0 at all
     ],
 )
 def test_of_a_map_that_is_not_birational_symmetries_and_hyperplanes_are_those_of_the_flow(rhs, eps, defect):
-    found = analyze(system("x y", *rhs), eps=eps, analyses=QUICK_STEPS)
-    assert found.defect == defect
-    assert (f"these are symmetries of the vector field only: {defect}" in lines_of(found, "symmetry")) == bool(defect)
-    (planes,) = [line for line in lines_of(found, "structure") if line.startswith("the lines")]
+    analysis = analyze(system("x y", *rhs), eps=eps, analyses=QUICK_STEPS)
+    assert analysis.defect == defect
+    assert (f"these are symmetries of the vector field only: {defect}" in lines_of(analysis, "symmetry")) == bool(
+        defect
+    )
+    (planes,) = [line for line in lines_of(analysis, "structure") if line.startswith("the lines")]
     assert planes.endswith("are invariant for the flow" if defect else "are invariant, for flow and map")
-    algebra = [line for line in lines_of(found, "structure") if "over K" in line]
+    algebra = [line for line in lines_of(analysis, "structure") if "over K" in line]
     assert all(("Kahan map over K" in line) == (not defect) for line in algebra)
 
 
 @pytest.mark.parametrize(("eps", "kind"), [("1", "singular"), ("1/2", "linear"), (None, "linear")])
 def test_a_linear_system_has_a_linear_map_where_it_has_one(eps, kind):
-    found = analyze(system("x y", "x", "-y"), eps=eps, analyses=QUICK_STEPS)
-    assert found.conclusion.kind == kind
+    analysis = analyze(system("x y", "x", "-y"), eps=eps, analyses=QUICK_STEPS)
+    assert analysis.conclusion.kind == kind
 
 
 def test_where_an_iterate_is_constant():
-    found = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
-    assert found.conclusion.sentence == (
+    analysis = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
+    assert analysis.conclusion.sentence == (
         "An iterate of the map is a constant map (measured): orbits end in one point. "
         "All this holds at eps = 1/2; other eps may differ."
     )
-    assert (found.conclusion.kind, found.conclusion.growth) == ("linearisable", "zero")
+    assert (analysis.conclusion.kind, analysis.conclusion.growth) == ("linearisable", "zero")
     linear = analyze(system("x", "x"), eps=-1)
     assert linear.conclusion.sentence.startswith(
         "The system is linear, and so is its Kahan map; the integrals were not counted."
@@ -226,14 +228,14 @@ def test_where_an_iterate_is_constant():
     ],
 )
 def test_a_verdict_says_in_which_sense_and_on_what_ground(name, sense, ground):
-    found = analysis_of(name).conclusion
-    assert (found.sense, found.ground) == (sense, ground)
-    assert ground != "proved" or "proved" in found.sentence or sense == "linear"
+    result = analysis_of(name).conclusion
+    assert (result.sense, result.ground) == (sense, ground)
+    assert ground != "proved" or "proved" in result.sentence or sense == "linear"
 
 
 def test_what_is_proved_of_a_verdict_goes_with_its_proof():
-    found = analysis_of("lotka_volterra")
-    unproved = replace(found, degrees=replace(found.degrees, enclosure=None))
+    analysis = analysis_of("lotka_volterra")
+    unproved = replace(analysis, degrees=replace(analysis.degrees, enclosure=None))
     assert (unproved.conclusion.sense, unproved.conclusion.ground) == ("not integrable", "derived")
     underived = replace(unproved, degrees=replace(unproved.degrees, patterns=None))
     assert (underived.conclusion.kind, underived.conclusion.ground) == ("not integrable", "measured")
@@ -241,6 +243,6 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     assert (estimated.conclusion.kind, estimated.conclusion.ground) == ("not integrable", "estimated")
     # A proof of entropy beside an integral is a contradiction, and no verdict.
     integrable = analysis_of("weierstrass")
-    both = replace(integrable, degrees=found.degrees)
+    both = replace(integrable, degrees=analysis.degrees)
     assert both.conclusion.kind == "undecided"
     assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence

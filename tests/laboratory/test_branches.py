@@ -24,8 +24,12 @@ FAMILY = system("x y z", f"{DY}*{KZ}", f"-{DX}*{KZ}", f"{DX}*{KY}", **VALUES)
 
 @cache
 def found_with(symbols, seed):
-    found = find_integrals(FAMILY, symbols=symbols.split(), seed=seed)
-    return [one.text for one in found.integrals], {one.verdict for one in found.integrals}, found.reason
+    search = find_integrals(FAMILY, symbols=symbols.split(), seed=seed)
+    return (
+        [integral.text for integral in search.integrals],
+        {integral.verdict for integral in search.integrals},
+        search.reason,
+    )
 
 
 @pytest.mark.parametrize("seed", quick([1, 2, 3], [1]))
@@ -40,9 +44,9 @@ def test_two_alike_pencils_give_the_same_formulas_for_every_seed(seed):
 
 def spaces(prime, values, numbers, order):
     """Spaces 1, x + c y of degree 1 in the plane with these c, shuffled."""
-    found = [DarbouxSpace(2, 1, [[1, 0, 0], [0, c(prime, *values) % prime, 1]]) for c in numbers]
-    random.Random(f"{order} {prime} {values}").shuffle(found)
-    return found
+    results = [DarbouxSpace(2, 1, [[1, 0, 0], [0, c(prime, *values) % prime, 1]]) for c in numbers]
+    random.Random(f"{order} {prime} {values}").shuffle(results)
+    return results
 
 
 def root_of(n, prime):
@@ -72,8 +76,8 @@ def test_shuffled_spaces_are_put_in_order_on_every_map(order):
     assert ordered[0] == ordered[1]
     which = [
         [
-            next(k for k, c in enumerate(numbers) if c(m.prime, *m.values, m.eps) % m.prime == one.basis[1][1])
-            for one in g
+            next(k for k, c in enumerate(numbers) if c(m.prime, *m.values, m.eps) % m.prime == entry.basis[1][1])
+            for entry in g
         ]
         for m, g in zip((first, second), ordered[1:], strict=True)
     ]

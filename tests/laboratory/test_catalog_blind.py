@@ -29,8 +29,8 @@ def blind(name):
     return analyze(SystemFile.from_system(load(name).system, "somebody"))
 
 
-def marked(found):
-    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in found]
+def marked(result):
+    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in result]
 
 
 def facts_of(name):
@@ -54,10 +54,10 @@ def facts_of(name):
 
 @pytest.mark.parametrize("name", marked(FACTS))
 def test_the_facts_of_the_file_are_found_blind(name):
-    found, answer = blind(name), facts_of(name)
-    assert differences(found, answer) == set()
-    nullities = found.integrals.profile.nullities
-    for known in relations(load(name).catalog, found.file.variables):
+    result, answer = blind(name), facts_of(name)
+    assert differences(result, answer) == set()
+    nullities = result.integrals.profile.nullities
+    for known in relations(load(name).catalog, result.file.variables):
         degree = _degree(known)
         if degree is not None and degree <= len(nullities):
             assert nullities[degree - 1] == known.dimension

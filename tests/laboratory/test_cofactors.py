@@ -25,16 +25,16 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
     laboratory = Laboratory(load(name))
     map_ = laboratory.maps[0]
     D = determinant_polynomial(laboratory.map)
-    whole = Cofactor("D", 1, D)
+    complete = Cofactor("D", 1, D)
     for x, image in map_.pairs(3):
-        assert whole.sides(map_, x, image) == DETERMINANT.sides(map_, x, image)
+        assert complete.sides(map_, x, image) == DETERMINANT.sides(map_, x, image)
     context = D.context()
-    rest = D
-    for one in determinant_factors(laboratory.map):
-        assert one.polynomial.subs({"eps": 0}) == context.constant(1)
-        while not (rest % one.polynomial):
-            rest = rest // one.polynomial
-    assert all(not any(monomial[: map_.dim]) for monomial in rest.monoms())
+    others = D
+    for entry in determinant_factors(laboratory.map):
+        assert entry.polynomial.subs({"eps": 0}) == context.constant(1)
+        while not (others % entry.polynomial):
+            others = others // entry.polynomial
+    assert all(not any(monomial[: map_.dim]) for monomial in others.monoms())
 
 
 def test_polynomials_with_a_given_cofactor():

@@ -44,11 +44,11 @@ def is_common(map_, space):
 )
 def test_spaces_of_known_maps(name, degree, sizes):
     map_ = first_map(load(name))
-    found = darboux_spaces(map_, degree)
-    assert all(is_common(map_, space) for space in found)
+    spaces = darboux_spaces(map_, degree)
+    assert all(is_common(map_, space) for space in spaces)
     if sizes is not None:
-        assert sorted(len(space.basis) for space in found) == sizes
-    assert gradient_rank(map_, found) <= load(name).catalog["codimension"]
+        assert sorted(len(space.basis) for space in spaces) == sizes
+    assert gradient_rank(map_, spaces) <= load(name).catalog["codimension"]
 
 
 def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
@@ -56,8 +56,8 @@ def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
     for size in (2, 3):
         vectors = [[rng.randrange(SMALL) for _ in range(comb(4, 2))] for _ in range(size)]
         weights = [[1, 5, 7][:size], [0, 1, 9][:size], [0, 0, 1]][:size]
-        one = DarbouxSpace.spanned_by(2, 2, vectors, SMALL)
-        assert one == DarbouxSpace.spanned_by(2, 2, combine(weights, vectors, SMALL), SMALL)
+        entry = DarbouxSpace.spanned_by(2, 2, vectors, SMALL)
+        assert entry == DarbouxSpace.spanned_by(2, 2, combine(weights, vectors, SMALL), SMALL)
 
 
 @given(st.randoms(use_true_random=False))
@@ -74,6 +74,6 @@ def test_no_members_of_a_pencil_are_sparser(rng):
     }
     by_size = sorted(supports, key=lambda places: (sum(exponents[places[-1]]), len(places), places))
     basis = DarbouxSpace.spanned_by(2, 2, [P, Q], p).basis
-    found = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
-    assert found == by_size[:2]
+    results = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
+    assert results == by_size[:2]
     assert rank([*basis, P, Q], p) == rank(basis, p) == 2

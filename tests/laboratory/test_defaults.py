@@ -15,16 +15,24 @@ from kahanmaps.laboratory.symmetry.commuting import find_commuting
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
 SEARCHES: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
-    ("integrals", integrals_of, lambda found: [one.text for one in found.integrals]),
-    ("densities", lambda name: find_densities(load(name)), lambda found: [one.text for one in found.densities]),
-    ("poisson", lambda name: find_poisson(load(name)), lambda found: [one.text for one in found.tensors]),
+    ("integrals", integrals_of, lambda result: [integral.text for integral in result.integrals]),
+    (
+        "densities",
+        lambda name: find_densities(load(name)),
+        lambda result: [density.text for density in result.densities],
+    ),
+    ("poisson", lambda name: find_poisson(load(name)), lambda result: [tensor.text for tensor in result.tensors]),
     (
         "symmetries",
         lambda name: linear_symmetries(load(name).system),
-        lambda found: [one.text for one in found.generators],
+        lambda result: [generator.text for generator in result.generators],
     ),
-    ("commuting", lambda name: find_commuting(load(name).system), lambda found: [str(g.rhs) for g in found.solutions]),
-    ("degrees", lambda name: degree_growth(load(name).map), lambda found: [found.growth_text]),
+    (
+        "commuting",
+        lambda name: find_commuting(load(name).system),
+        lambda result: [str(g.rhs) for g in result.solutions],
+    ),
+    ("degrees", lambda name: degree_growth(load(name).map), lambda result: [result.growth_text]),
 ]
 
 
@@ -47,6 +55,6 @@ def test_what_analyze_finds_the_command_finds(
 
 
 def test_the_three_tensors_of_the_euler_top_are_found_without_a_degree() -> None:
-    found = find_poisson(load("euler_top"), integrals=())
-    assert (found.degree, len(found.tensors)) == (3, 3)
+    search = find_poisson(load("euler_top"), integrals=())
+    assert (search.degree, len(search.tensors)) == (3, 3)
     assert find_poisson(load("euler_top"), 2, integrals=()).tensors == ()

@@ -52,12 +52,12 @@ def test_the_hypersurfaces_of_a_map_of_dimension_5_are_written():
     [("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"), ("a,b,c,d,e", DIMENSION_5)],
 )
 def test_published_maps_of_dimension_4_and_5_have_derived_quadratic_growth(variables, image):
-    found = degree_growth(by_formulas(variables, image), max_terms=20)
-    assert (str(found.growth), found.derived is not None) == ("quadratic", True)
+    growth = degree_growth(by_formulas(variables, image), max_terms=20)
+    assert (str(growth.growth), growth.derived is not None) == ("quadratic", True)
 
 
 @pytest.mark.parametrize(("k", "rate"), [(3, "3"), (5, "5"), (4, "t^2 - 4*t + 1"), (6, "t^2 - 6*t + 1")])
 def test_the_published_rates_of_a_planar_family(k, rate):
-    found = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), enclosed=False)
-    assert found.derived is not None
-    assert found.dynamical_degree.text.endswith(rate)
+    growth = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), enclosed=False)
+    assert growth.derived is not None
+    assert growth.dynamical_degree.text.endswith(rate)

@@ -19,30 +19,30 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 def checked(system: QuadraticSystem) -> ConstantStructures:
     """What is found, after checking every claim of it exactly."""
-    found = constant_structures(system)
-    for K, H in zip(found.forms, found.functions, strict=True):
+    structures = constant_structures(system)
+    for K, H in zip(structures.forms, structures.functions, strict=True):
         assert linear_combinations(K, system.rhs) == gradient(H)
-    if found.hamiltonian is None:
-        assert found.reason
-        assert found.casimirs == ()
-        return found
-    assert found.reason == ""
-    assert found.hamiltonian.system.rhs == system.rhs
-    J = found.hamiltonian.J
-    assert len(found.casimirs) == system.dim - rank(QQ, J)
-    for casimir in found.casimirs:
+    if structures.hamiltonian is None:
+        assert structures.reason
+        assert structures.casimirs == ()
+        return structures
+    assert structures.reason == ""
+    assert structures.hamiltonian.system.rhs == system.rhs
+    J = structures.hamiltonian.J
+    assert len(structures.casimirs) == system.dim - rank(QQ, J)
+    for casimir in structures.casimirs:
         slopes = fmpq_mat([[slope.leading_coefficient() for slope in gradient(casimir)]])
         assert all(entry == 0 for entry in (slopes * J).entries())
         assert linear_combinations(slopes, system.rhs)[0].is_zero()
-    return found
+    return structures
 
 
-def conserved(found: ConstantStructures, seed: int = 1) -> bool:
+def conserved(structures: ConstantStructures, seed: int = 1) -> bool:
     """Whether the Kahan map conserves the integral and the measure at one exact point."""
-    integral, density = ModifiedHamiltonian(found.hamiltonian), DeterminantDensity(found.system)
+    integral, density = ModifiedHamiltonian(structures.hamiltonian), DeterminantDensity(structures.system)
     eps = fmpq(1, 9)
-    phi = KahanMap(found.system, eps)
-    x = random_point(found.system.dim, seed)
+    phi = KahanMap(structures.system, eps)
+    x = random_point(structures.system.dim, seed)
     if phi.determinant(x) == 0 or phi.determinant(phi.step(x)) == 0:
         return True
     image = phi.step(x)
@@ -55,23 +55,23 @@ def test_the_hamiltonian_systems_of_the_catalogue(name: str) -> None:
     file = load(name)
     known = file.hamiltonian
     assert known is not None
-    found = checked(file.system)
-    assert found.hamiltonian is not None
-    assert found.hamiltonian.is_standard == known.is_standard
+    report = checked(file.system)
+    assert report.hamiltonian is not None
+    assert report.hamiltonian.is_standard == known.is_standard
     if known.is_standard:
-        assert (found.hamiltonian.H - known.H).is_constant()
-    assert found.casimirs == ()
-    assert conserved(found)
+        assert (report.hamiltonian.H - known.H).is_constant()
+    assert report.casimirs == ()
+    assert conserved(report)
 
 
 def test_degenerate_structures() -> None:
     for name in ("dressing_chain_3", "volterra_periodic_3"):
-        found = checked(load(name).system)
-        assert [str(casimir) for casimir in found.casimirs] == ["x1 + x2 + x3"]
-        assert conserved(found)
-    assert found.hamiltonian is not None
-    assert str(found.hamiltonian.H) == "-x1*x2*x3"
-    assert found.hamiltonian.J == fmpq_mat([[0, 1, -1], [-1, 0, 1], [1, -1, 0]])
+        report = checked(load(name).system)
+        assert [str(casimir) for casimir in report.casimirs] == ["x1 + x2 + x3"]
+        assert conserved(report)
+    assert report.hamiltonian is not None
+    assert str(report.hamiltonian.H) == "-x1*x2*x3"
+    assert report.hamiltonian.J == fmpq_mat([[0, 1, -1], [-1, 0, 1], [1, -1, 0]])
 
 
 @pytest.mark.parametrize(
@@ -84,9 +84,9 @@ def test_degenerate_structures() -> None:
     ],
 )
 def test_systems_without_a_constant_structure_say_why(system, proved, words) -> None:
-    found = checked(system)
-    assert (found.hamiltonian, found.proved) == (None, proved)
-    assert words in found.reason
+    report = checked(system)
+    assert (report.hamiltonian, report.proved) == (None, proved)
+    assert words in report.reason
 
 
 @st.composite
@@ -107,11 +107,11 @@ def hamiltonians(draw: st.DrawFn) -> CubicHamiltonian:
 @settings(max_examples=20)
 @given(hamiltonians(), st.integers(0, 50))
 def test_random_structures(hamiltonian: CubicHamiltonian, seed: int) -> None:
-    found = checked(hamiltonian.system)
+    report = checked(hamiltonian.system)
     if hamiltonian.J.det() != 0:
-        assert found.hamiltonian is not None
-        assert found.casimirs == ()
-    if found.hamiltonian is None:
-        assert not found.proved  # there is one, with a kernel that was not tried
+        assert report.hamiltonian is not None
+        assert report.casimirs == ()
+    if report.hamiltonian is None:
+        assert not report.proved  # there is one, with a kernel that was not tried
     else:
-        assert conserved(found, seed)
+        assert conserved(report, seed)

@@ -52,21 +52,21 @@ CASES = [
 
 @pytest.mark.parametrize(("file", "affine", "modified"), CASES)
 def test_the_numbers_of_integrals_that_theorems_give(file, affine, modified):
-    found = inherited_integrals(file.system)
-    assert (len(found.quotient.integrals), len(found.forms)) == (affine, modified)
-    assert [found.count(map_) for map_ in Laboratory(file).maps] == [affine + modified] * 2
+    integrals = inherited_integrals(file.system)
+    assert (len(integrals.quotient.integrals), len(integrals.forms)) == (affine, modified)
+    assert [integrals.count(map_) for map_ in Laboratory(file).maps] == [affine + modified] * 2
 
 
 @pytest.mark.parametrize("file", [DRIVEN, DEGENERATE])
 def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singular_form(file):
-    found, rng = inherited_integrals(file.system), random.Random(3)
-    for k, form in enumerate(found.forms):
-        H, values = found.hamiltonian(k), []
+    result, rng = inherited_integrals(file.system), random.Random(3)
+    for k, form in enumerate(result.forms):
+        H, values = result.hamiltonian(k), []
         kahan = KahanMap(file.system, fmpq(1, 9))
         x = kahan.point([fmpq(rng.randint(-9, 9), rng.randint(2, 5)) for _ in range(file.system.dim)])
         energies = set()
         for _ in range(4):
-            values.append(found.modified(k, QQ, fmpq(1, 9), x))
+            values.append(result.modified(k, QQ, fmpq(1, 9), x))
             energies.add(H(*x))
             x = kahan.step(x)
         assert len(set(values)) == 1
@@ -76,9 +76,9 @@ def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singul
 
 @pytest.mark.parametrize("eps", [None, "1/9"])
 def test_what_a_theorem_gives_is_written_out_where_relations_show_nothing(eps):
-    (one,) = find_integrals(DRIVEN, eps=eps, max_degree=1).integrals
-    assert (one.origin, one.verdict) == ("modified Hamiltonian (cmoq-2013)", Certainty.PROVED)
-    values = values_on_orbits(DRIVEN, one.text, ["1/9"])
+    (entry,) = find_integrals(DRIVEN, eps=eps, max_degree=1).integrals
+    assert (entry.origin, entry.verdict) == ("modified Hamiltonian (cmoq-2013)", Certainty.PROVED)
+    values = values_on_orbits(DRIVEN, entry.text, ["1/9"])
     assert [len(each) for each in values] == [1, 1, 1]
     assert len(set().union(*values)) > 1
 
@@ -86,21 +86,21 @@ def test_what_a_theorem_gives_is_written_out_where_relations_show_nothing(eps):
 @pytest.mark.parametrize(("file", "products"), [(lotka_volterra(6, 3), 1)])
 def test_no_search_reports_fewer_integrals_than_theorems_give(file, products):
     """Relations of degree 1 show the affine integrals only; products of invariant hyperplanes are found beside them."""
-    found = find_integrals(file, max_degree=1)
-    assert found.codimension == found.by_theorems + products > found.profile.codimension
-    assert not found.is_exact
-    assert f"in all at least {found.codimension} independent ({found.by_theorems} by theorems" in found.count_text
-    as_json = found.to_json()
-    assert (as_json["codimension"], as_json["by_theorems"]) == (found.codimension, found.by_theorems)
+    search = find_integrals(file, max_degree=1)
+    assert search.codimension == search.by_theorems + products > search.profile.codimension
+    assert not search.is_exact
+    assert f"in all at least {search.codimension} independent ({search.by_theorems} by theorems" in search.count_text
+    as_json = search.to_json()
+    assert (as_json["codimension"], as_json["by_theorems"]) == (search.codimension, search.by_theorems)
     assert as_json["codimension_is_exact"] is False
 
 
 def test_with_symbols_theorems_are_asked_at_random_values():
     file = system("x y z", "y + a*x^2", "-2*a*x*y - x", "x*z + b", a="1", b="0")
-    found = find_integrals(file, symbols=["a", "b"], max_degree=1)
-    assert (found.by_theorems, found.codimension, found.integrals) == (1, 1, ())
-    assert "1 of the 1 independent integrals has no closed form" in found.reason
-    assert "1 by theorems: 1 modified Hamiltonian, at random values of a, b" in found.count_text
+    search = find_integrals(file, symbols=["a", "b"], max_degree=1)
+    assert (search.by_theorems, search.codimension, search.integrals) == (1, 1, ())
+    assert "1 of the 1 independent integrals has no closed form" in search.reason
+    assert "1 by theorems: 1 modified Hamiltonian, at random values of a, b" in search.count_text
     # x' has no y at a = 0: what holds there only is no theorem for every a
     special = system("x y", "x*y", "-x*y + a*x", a="0")
     assert find_integrals(special, symbols=["a"], max_degree=2).by_theorems == 0

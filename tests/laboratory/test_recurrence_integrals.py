@@ -52,10 +52,10 @@ def image_of(names, last, scales, order):
 def test_all_integrals_of_recurrences_are_found(case, count, scales, order):
     names, last, known = case
     file = image_of(names, last, scales, order)
-    found = find_integrals(file)
-    assert (len(found.integrals), found.codimension, found.reason) == (count, count, "")
-    assert all(one.verdict is Certainty.PROVED for one in found.integrals)
+    search = find_integrals(file)
+    assert (len(search.integrals), search.codimension, search.reason) == (count, count, "")
+    assert all(integral.verdict is Certainty.PROVED for integral in search.integrals)
     texts = ["".join(f"({scales[names.index(c)]}*{c})" if c in names else c for c in text) for text in known]
     functions = [parse_rational_function(text, [*file.variables, "eps"]) for text in texts]
-    number, _, of_all = ranks([one.function for one in found.integrals], functions, Laboratory(file).maps[0])
+    number, _, of_all = ranks([integral.function for integral in search.integrals], functions, Laboratory(file).maps[0])
     assert number == of_all == count  # the known ones are functions of those found

@@ -105,24 +105,24 @@ def cases(*names):
 @pytest.mark.parametrize(("name", "how"), cases("lorenz", "euler", "conjugate", "double", "weighted"))
 def test_darboux_polynomials_of_flows(name, how):
     same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (darboux_polynomials(one.file, 2, flow=True) for one in (same, image))
-    assert (found.reason, moved.reason) == ("", "")
-    wanted = {primitive(P) for space in found.spaces for P in space.polynomials}
-    assert {primitive(image.back(P).numerator) for space in moved.spaces for P in space.polynomials} == wanted
+    result, moved = (darboux_polynomials(entry.file, 2, flow=True) for entry in (same, image))
+    assert (result.reason, moved.reason) == ("", "")
+    expected = {primitive(P) for space in result.spaces for P in space.polynomials}
+    assert {primitive(image.back(P).numerator) for space in moved.spaces for P in space.polynomials} == expected
     if name != "weighted":  # and with a wrong scale they are no others
         wrong = Image(image.file, [*image.scale[:-1], image.scale[-1] * 2], image.place, image.speed)
-        assert {primitive(wrong.back(P).numerator) for one in moved.spaces for P in one.polynomials} != wanted
+        assert {primitive(wrong.back(P).numerator) for entry in moved.spaces for P in entry.polynomials} != expected
 
 
 @pytest.mark.parametrize(("name", "how"), cases("euler", "volterra", "lyness", "todd", "fibonacci"))
 def test_darboux_polynomials_of_maps(name, how):
     same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (darboux_polynomials(one.file, 3) for one in (same, image))
-    assert (found.reason, moved.reason) == ("", "")
-    assert found.spaces
-    wanted = sorted(span(space.polynomials) for space in found.spaces)
+    result, moved = (darboux_polynomials(entry.file, 3) for entry in (same, image))
+    assert (result.reason, moved.reason) == ("", "")
+    assert result.spaces
+    expected = sorted(span(space.polynomials) for space in result.spaces)
     back = [[image.back(P).numerator for P in space.polynomials] for space in moved.spaces]
-    assert sorted(map(span, back)) == wanted
+    assert sorted(map(span, back)) == expected
     assert all(space.verdict.holds for space in moved.spaces)
 
 
@@ -136,27 +136,27 @@ INTEGRALS = ["euler", "lorenz", "volterra", "conjugate", "lyness", "todd"]
 def test_integrals(name, how, flow):
     """As many as there, and moved back they are integrals there: all is proved."""
     same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (find_integrals(one.file, flow=flow, max_degree=4) for one in (same, image))
-    assert (len(found.integrals), found.reason) == (len(moved.integrals), moved.reason)
-    assert len(found.time_dependent) == len(moved.time_dependent)
+    result, moved = (find_integrals(entry.file, flow=flow, max_degree=4) for entry in (same, image))
+    assert (len(result.integrals), result.reason) == (len(moved.integrals), moved.reason)
+    assert len(result.time_dependent) == len(moved.time_dependent)
     laboratory = Laboratory(same.file, flow=flow)
-    assert all(laboratory.verdict_on(image.back(one.function))[0].holds for one in moved.integrals)
-    for one in moved.time_dependent:
-        back, speed = image.back(one.integral.function), fmpq(image.speed.numerator, image.speed.denominator)
-        factor = RationalFunction(one.factor.numerator / speed, one.factor.denominator)
+    assert all(laboratory.verdict_on(image.back(integral.function))[0].holds for integral in moved.integrals)
+    for item in moved.time_dependent:
+        back, speed = image.back(item.integral.function), fmpq(image.speed.numerator, image.speed.denominator)
+        factor = RationalFunction(item.factor.numerator / speed, item.factor.denominator)
         assert laboratory.verdict_on(back, factor=factor)[0].holds
     if how == "scaled" and moved.integrals and not flow:  # what is not moved back is none
-        refuted = [laboratory.verdict_on(one.function)[0].holds for one in moved.integrals]
+        refuted = [laboratory.verdict_on(integral.function)[0].holds for integral in moved.integrals]
         assert not all(refuted)
 
 
 @pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "double", "predators", "lyness", "todd"))
 def test_densities(name, how):
     same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (find_densities(one.file).densities for one in (same, image))
-    assert found
-    wanted = sorted(primitive(one.function.numerator) for one in found)
-    assert sorted(primitive(image.back(one.function).numerator) for one in moved) == wanted
+    result, moved = (find_densities(entry.file).densities for entry in (same, image))
+    assert result
+    expected = sorted(primitive(entry.function.numerator) for entry in result)
+    assert sorted(primitive(image.back(entry.function).numerator) for entry in moved) == expected
 
 
 @pytest.mark.parametrize(("name", "how"), cases("predators", "volterra", "conjugate", "lyness"))
@@ -164,21 +164,21 @@ def test_poisson_tensors(name, how):
     """{y_i, y_j} is scale_i scale_j {x_i, x_j}: all tensors together span the same space."""
     same, image = image_of(name, "same"), image_of(name, how)
     spaces = []
-    for one, tensors in ((same, find_poisson(same.file, 3)), (image, find_poisson(image.file, 3))):
-        n, entries = len(one.place), []
+    for item, tensors in ((same, find_poisson(same.file, 3)), (image, find_poisson(image.file, 3))):
+        n, entries = len(item.place), []
         context = ring([*"xyzw"[:n], "eps", *(f"d{i}" for i in range(n))])
         d = context.gens()[n + 1 :]
-        for found in tensors.tensors:
-            rows, total = found.tensor.rows, context.constant(0)
+        for tensor in tensors.tensors:
+            rows, total = tensor.tensor.rows, context.constant(0)
             for i in range(n):
                 for j in range(i):
-                    back = one.back(rows[one.place[i]][one.place[j]])
+                    back = item.back(rows[item.place[i]][item.place[j]])
                     assert back.denominator.is_constant()
-                    c = one.scale[i] * one.scale[j]
+                    c = item.scale[i] * item.scale[j]
                     moved = back.numerator.compose(*context.gens()[: n + 1], ctx=context) * d[i] * d[j]
                     total += moved / fmpq(c.numerator, c.denominator) / back.denominator.leading_coefficient()
             entries.append(primitive_part(total)[1])
-        spaces.append(sorted(str(one if one.leading_coefficient() > 0 else -one) for one in entries))
+        spaces.append(sorted(str(entry if entry.leading_coefficient() > 0 else -entry) for entry in entries))
     assert spaces[0]
     assert spaces[0] == spaces[1]
 
@@ -187,27 +187,27 @@ def test_poisson_tensors(name, how):
 def test_symmetries(name, how):
     """Matrix and all: S for y is M S M^-1; in dimension 4 only permutations of scaled variables are sought."""
     same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (linear_symmetries(one.file.system) for one in (same, image))
-    assert (found.order, found.reversing_order) == (moved.order, moved.reversing_order)
-    assert len(found.infinitesimal) == len(moved.infinitesimal)
+    result, moved = (linear_symmetries(entry.file.system) for entry in (same, image))
+    assert (result.order, result.reversing_order) == (moved.order, moved.reversing_order)
+    assert len(result.infinitesimal) == len(moved.infinitesimal)
     M = image.matrix
-    wanted = {(str(M * t.S * M.inv()), t.reversing) for t in (*found.signed, *found.others)}
-    assert {(str(t.S), t.reversing) for t in (*moved.signed, *moved.others)} == wanted
-    assert len(wanted) > 1
+    expected = {(str(M * t.S * M.inv()), t.reversing) for t in (*result.signed, *result.others)}
+    assert {(str(t.S), t.reversing) for t in (*moved.signed, *moved.others)} == expected
+    assert len(expected) > 1
 
 
 @pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "predators", "double"))
 def test_commuting_fields(name, how):
     """g for y is M g(M^-1 y), and runs faster as f does."""
     same, image = image_of(name, "same"), image_of(name, how)
-    found, moved = (commuting_systems(one.file.system, "quadratic") for one in (same, image))
-    assert found.complete
+    result, moved = (commuting_systems(entry.file.system, "quadratic") for entry in (same, image))
+    assert result.complete
     assert moved.complete
-    assert len(found.families) == len(moved.families)
-    assert found.dimension == moved.dimension
+    assert len(result.families) == len(moved.families)
+    assert result.dimension == moved.dimension
     inverse, speed = image.matrix.inv(), fmpq(image.speed.numerator, image.speed.denominator)
     back = {
         str(g.system.composed(image.matrix, [fmpq(0)] * len(image.place)).transformed(inverse).scaled(1 / speed))
         for g in moved.solutions
     }
-    assert back == {str(g.system) for g in found.solutions}
+    assert back == {str(g.system) for g in result.solutions}

@@ -31,12 +31,12 @@ parameters = { A = 1, B = 1, C = 1 }
 rhs = ["x*(C*y + z)", "y*(x + A*z)", "z*(B*x + y)"]"""
 
 
-def slow(found, *kinds):
+def slow(result, *kinds):
     """The texts of the components whose growth is of these kinds."""
     return {
-        one.text
-        for degrees, some in found.classes
-        for one in some
+        entry.text
+        for degrees, some in result.classes
+        for entry in some
         if any(o.growth is not None and o.growth.growth in kinds for o in some)
     }
 
@@ -59,7 +59,7 @@ def test_the_classification_of_three_lines_is_found(three_lines):
 
 
 def test_everything_is_confirmed_and_nothing_is_left(three_lines):
-    assert all(one.is_confirmed and one.tried == 3 for one in three_lines.components)
+    assert all(component.is_confirmed and component.tried == 3 for component in three_lines.components)
     assert not any(three_lines.unassigned)
     # all permutations of the exponents (g1 : g2 : 1), which exchanges and one cycle generate
     assert three_lines.symmetric == (("g2", "g1"), ("g1/g2", "1/g2"))
@@ -73,13 +73,13 @@ def test_a_wrong_condition_is_not_confirmed():
     g1, g2 = ring(["g1", "g2"]).gens()
     good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
     wrong = replace(good, equations=(g1 + g2 - 7,))
-    found = [_confirm(one, family, [], random.Random(1)) for one in (good, wrong)]
-    assert [(one.confirmed, one.tried, one.is_confirmed) for one in found] == [(3, 3, True), (0, 3, False)]
+    results = [_confirm(entry, family, [], random.Random(1)) for entry in (good, wrong)]
+    assert [(entry.confirmed, entry.tried, entry.is_confirmed) for entry in results] == [(3, 3, True), (0, 3, False)]
     # One member speaks for others only as long as their degrees agree.
     member, _ = family.member({"g1": fmpq(2), "g2": fmpq(3)})
     known = degree_growth(member.map, enclosed=False)
     points = [Component((g1 - a, g2 - b), 0, known.degrees[1:8], ()) for a, b in ((3, 2), (1, 2))]
-    assert [_continues_as(one, known, family) for one in points] == [True, False]
+    assert [_continues_as(point, known, family) for point in points] == [True, False]
 
 
 def test_a_curve_in_a_plane_of_parameters_is_found_beside_the_surface_through_it():
@@ -89,23 +89,23 @@ parameters = {a = 1, b = 1, c = 0}
 image = ["y", "x + (c - 1)*y^2 + (a*b + 1)*y^3"]
 inverse = ["y - (c - 1)*x^2 - (a*b + 1)*x^3", "x"]
 """
-    found = scan(parse_system(text), ["a", "b", "c"], primes=(11, 13, 17), terms=2)
-    assert {one.text: one.degrees for one in found.components} == {
+    scanned = scan(parse_system(text), ["a", "b", "c"], primes=(11, 13, 17), terms=2)
+    assert {component.text: component.degrees for component in scanned.components} == {
         "a*b + 1 = 0": (2, 4),
         "a*b + 1 = 0, c - 1 = 0": (1, 1),
     }
-    assert not any(found.unassigned)
+    assert not any(scanned.unassigned)
 
 
 def test_the_conditions_of_lotka_volterra_in_space_are_found():
-    found = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
-    conditions = {one.text: one for one in found.components}
+    scanned = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
+    conditions = {component.text: component for component in scanned.components}
     assert conditions["A*B*C + 1 = 0"].degrees == (3, 7, 15)
     # the curves in it on which the map is integrable
-    for one in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
-        assert conditions[one].growth.growth is Growth.QUADRATIC
-        assert conditions[one].dimension == 1
-    assert not any(found.unassigned)
+    for entry in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
+        assert conditions[entry].growth.growth is Growth.QUADRATIC
+        assert conditions[entry].dimension == 1
+    assert not any(scanned.unassigned)
 
 
 def planar(first, second, *names):
@@ -123,10 +123,10 @@ def planar(first, second, *names):
     ],
 )
 def test_what_splits_over_a_number_field_is_found_as_one(second, names, text, dimension):
-    found = scan(planar("y", second, *names), [*names], terms=4)
-    one = next(one for one in found.components if one.text == text)
-    assert (one.dimension, one.is_confirmed, one.growth.growth) == (dimension, True, Growth.QUADRATIC)
-    assert not any(found.unassigned)
+    scanned = scan(planar("y", second, *names), [*names], terms=4)
+    entry = next(component for component in scanned.components if component.text == text)
+    assert (entry.dimension, entry.is_confirmed, entry.growth.growth) == (dimension, True, Growth.QUADRATIC)
+    assert not any(scanned.unassigned)
 
 
 REPAIRED = """variables = ["x", "y"]
@@ -136,34 +136,34 @@ rhs = ["2*x*y", "A*y^2 - 4*x^2 - 6*x - 6"]"""
 
 
 def test_a_condition_with_eps_is_found_where_eps_varies_too():
-    found = scan(parse_system(REPAIRED), ["eps", "A"], primes=(43, 47, 53), terms=5)
-    assert found.over == ("A", "eps")
+    scanned = scan(parse_system(REPAIRED), ["eps", "A"], primes=(43, 47, 53), terms=5)
+    assert scanned.over == ("A", "eps")
     # the catalogue's repaired_octahedral
-    one = next(one for one in found.components if one.text == "24*eps^2 + A + 2 = 0")
-    assert one.is_confirmed
-    assert one.growth.growth is Growth.QUADRATIC
-    assert one.values["A"] == -2 - 24 * one.values["eps"] ** 2
+    entry = next(component for component in scanned.components if component.text == "24*eps^2 + A + 2 = 0")
+    assert entry.is_confirmed
+    assert entry.growth.growth is Growth.QUADRATIC
+    assert entry.values["A"] == -2 - 24 * entry.values["eps"] ** 2
     without = scan(parse_system(REPAIRED), ["A"], primes=(43, 47, 53), terms=5)
-    assert [one.text for one in without.components] == ["-1"]  # the one that holds for every eps
+    assert [component.text for component in without.components] == ["-1"]  # the one that holds for every eps
 
 
 def test_four_parameters_give_what_has_codimension_2_as_well():
     text = LOTKA_VOLTERRA.replace("C = 1", "C = 1, D = 1").replace("x + A*z", "D*x + A*z")
-    found = scan(parse_system(text), ["A", "B", "C", "D"], terms=3)
-    conditions = {one.text: one for one in found.components}
+    scanned = scan(parse_system(text), ["A", "B", "C", "D"], terms=3)
+    conditions = {component.text: component for component in scanned.components}
     assert conditions["A*B*C + D = 0"].dimension == 3
     # at D = 1 these are the curves that are known
-    for one in ("A*B + D = 0, C - 1 = 0", "B*C + D = 0, A - 1 = 0", "A*C + 1 = 0, B - D = 0"):
-        assert (conditions[one].dimension, conditions[one].is_confirmed) == (2, True)
-        assert conditions[one].growth.growth is Growth.QUADRATIC
-    assert "24 random planes of parameter space modulo 19, 23, 29, 31" in found.coverage
-    assert "codimension 2" in found.coverage
+    for entry in ("A*B + D = 0, C - 1 = 0", "B*C + D = 0, A - 1 = 0", "A*C + 1 = 0, B - D = 0"):
+        assert (conditions[entry].dimension, conditions[entry].is_confirmed) == (2, True)
+        assert conditions[entry].growth.growth is Growth.QUADRATIC
+    assert "24 random planes of parameter space modulo 19, 23, 29, 31" in scanned.coverage
+    assert "codimension 2" in scanned.coverage
 
 
 def test_the_budget_may_be_spent_before_anything_is_known():
-    found = scan(load("henon_heiles"), ["c"], effort=Budget(1))
-    assert (found.ended, found.components, found.height) == ("budget", (), 0)
-    assert "not done\tmembers modulo 10" in found.text
+    scanned = scan(load("henon_heiles"), ["c"], effort=Budget(1))
+    assert (scanned.ended, scanned.components, scanned.height) == ("budget", (), 0)
+    assert "not done\tmembers modulo 10" in scanned.text
 
     def over():
         raise TimeOver
@@ -174,9 +174,9 @@ def test_the_budget_may_be_spent_before_anything_is_known():
 
 def test_a_curve_that_is_missed_is_said_to_be_one():
     # over a cubic field: modulo 1/3 of the primes all three lines are there, modulo 1/2 one of them
-    found = scan(planar("y", "x^2 + b*x + (a^3 - 2)*y", "a", "b"), ["a", "b"], terms=4)
-    assert found.components == ()
-    assert "as many as a curve has, so one may have been missed" in found.text
+    scanned = scan(planar("y", "x^2 + b*x + (a^3 - 2)*y", "a", "b"), ["a", "b"], terms=4)
+    assert scanned.components == ()
+    assert "as many as a curve has, so one may have been missed" in scanned.text
 
 
 @pytest.mark.parametrize("stage", ["_confirm", "_measure_growth", "symmetries", "conditions"])
@@ -185,7 +185,7 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
         raise TimeLimit
 
     monkeypatch.setattr(scan_module, stage, stop)
-    found = scan(parse_system(THREE_LINES), ["g1"], primes=(17, 19, 23), terms=3)
+    scanned = scan(parse_system(THREE_LINES), ["g1"], primes=(17, 19, 23), terms=3)
     left_out = {
         "conditions": "all conditions for",
         "_confirm": "the confirmation of",
@@ -193,10 +193,10 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
         "symmetries": "changes of parameters",
     }
     known = list(left_out)
-    assert found.ended == "interrupted"
-    assert found.omitted[0].startswith(left_out[stage])
-    assert bool(found.components) is (stage != "conditions")
-    assert any(one.tried for one in found.components) is (known.index(stage) > 1)
+    assert scanned.ended == "interrupted"
+    assert scanned.omitted[0].startswith(left_out[stage])
+    assert bool(scanned.components) is (stage != "conditions")
+    assert any(component.tried for component in scanned.components) is (known.index(stage) > 1)
 
 
 @pytest.mark.parametrize(

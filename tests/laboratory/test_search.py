@@ -36,15 +36,15 @@ def searched(file, eps=None):
     ],
 )
 def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
-    laboratory, found = searched(load(name))
-    assert [step.kind for step in found.steps] == kinds
-    assert gradient_rank(laboratory.maps[0], found.all_spaces) == independent
-    assert not may_be_conjugate(found)
+    laboratory, result = searched(load(name))
+    assert [step.kind for step in result.steps] == kinds
+    assert gradient_rank(laboratory.maps[0], result.all_spaces) == independent
+    assert not may_be_conjugate(result)
     reference, second = laboratory.primes[0], laboratory.maps[1]
-    again = repeat_search(found, second, reference)
+    again = repeat_search(result, second, reference)
     assert again is not None
     assert [[len(space.basis) for space in group] for group in again.spaces] == [
-        [len(space.basis) for space in group] for group in found.spaces
+        [len(space.basis) for space in group] for group in result.spaces
     ]
     assert gradient_rank(second, again.all_spaces) == independent
 
@@ -67,9 +67,9 @@ def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeyp
     profile, dim = orbit_profile(laboratory.maps), laboratory.map.dim
     assert profile.codimension == len(origins)
     over = denominators_among(candidates(laboratory, known, Budget()), dim)
-    found = search_spaces(laboratory.maps[0], profile, known, over, budget=Budget())
-    assert [step.text for step in found.steps] == origins
-    assert gradient_rank(laboratory.maps[0], found.all_spaces) == len(origins)
+    spaces = search_spaces(laboratory.maps[0], profile, known, over, budget=Budget())
+    assert [step.text for step in spaces.steps] == origins
+    assert gradient_rank(laboratory.maps[0], spaces.all_spaces) == len(origins)
     # Without the variables for denominators only the polynomial is found.
     with pytest.raises(pytest.fail.Exception):
         search_spaces(laboratory.maps[0], profile, known, budget=Budget())
@@ -97,6 +97,6 @@ def closed_forms(model, spaces_at, variables, symbols, eps_enters, budget):
 
 
 def test_coefficients_are_interpolated():
-    found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
-    assert [format_polynomial(P) for P in found.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
-    assert found.reason == ""
+    formulas = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
+    assert [format_polynomial(P) for P in formulas.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
+    assert formulas.reason == ""

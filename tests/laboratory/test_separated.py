@@ -40,8 +40,10 @@ def test_without_planes_over_Q_there_are_no_such_coordinates(name):
 
 
 def test_integrals_of_members_are_proved_where_their_planes_separate():
-    assert [one.verdict for one in integrals()] == [Certainty.PROVED] * 3
-    assert all(one.evidence.summary.endswith("in coordinates in which the planes separate") for one in integrals())
+    assert [integral.verdict for integral in integrals()] == [Certainty.PROVED] * 3
+    assert all(
+        integral.evidence.summary.endswith("in coordinates in which the planes separate") for integral in integrals()
+    )
 
 
 def test_what_is_not_preserved_is_refuted_there_too(monkeypatch):

@@ -34,14 +34,14 @@ INTEGRABLE = ["weierstrass", "planar_cubic_hamiltonian", "volterra_periodic_4", 
 @pytest.mark.parametrize("name", INTEGRABLE)
 def test_singularities_of_integrable_maps_are_confined(name):
     """zander-2021 for the planar systems; the others have integrals, and degrees that grow polynomially."""
-    found = runs(name)
-    assert [run.verdict for run in found] == ["confined", "confined"]
-    assert found[0].shape == found[1].shape
+    result = runs(name)
+    assert [run.verdict for run in result] == ["confined", "confined"]
+    assert result[0].shape == result[1].shape
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "lorenz"])
 def test_nothing_is_confined_where_degrees_are_the_largest_possible(name):
-    """The degrees 2^n and 3^n say that no contracted hypersurface ever meets a point without a value."""
+    """The degrees 2^n and 3^n say that no contracted hypersurface ever meets an indeterminacy point."""
     for run in runs(name, steps=60):
         assert run.verdict == "not confined"
         assert {h.status for h in run.hypersurfaces} == {NOT_CONFINED}
@@ -69,36 +69,36 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
         return {
             (h.multiplicity, h.status, h.contracted_at, h.confined_at, tuple(step.rank for step in h.steps))
             for h in run.hypersurfaces
-            if not h.is_pole and h.polynomial != "Z"
+            if not h.divides_denominator and h.polynomial != "Z"
         }
 
     assert outcomes(unwritten) == outcomes(written)
-    assert {h.polynomial for h in unwritten.hypersurfaces if h.is_pole} == {
-        h.polynomial for h in written.hypersurfaces if h.is_pole
+    assert {h.polynomial for h in unwritten.hypersurfaces if h.divides_denominator} == {
+        h.polynomial for h in written.hypersurfaces if h.divides_denominator
     }
     degrees = sum(h.degree for h in unwritten.hypersurfaces if h.polynomial == "?")
-    assert degrees == sum(h.degree for h in written.hypersurfaces if not h.is_pole and h.polynomial != "Z")
+    assert degrees == sum(h.degree for h in written.hypersurfaces if not h.divides_denominator and h.polynomial != "Z")
 
 
 def test_a_budget_that_is_spent_stops_it():
     top, before = load("euler_top").system, counted()
-    whole = singularities(top, "1/7")
+    complete = singularities(top, "1/7")
     run = singularities(top, "1/7", effort=Budget((counted() - before) / 2))
     assert run.stopped
     assert run.verdict == "undecided"
-    assert run.hypersurfaces[0] == whole.hypersurfaces[0]
+    assert run.hypersurfaces[0] == complete.hypersurfaces[0]
     assert run.hypersurfaces[-1].note == BUDGET_SPENT
 
 
 def test_a_time_limit_keeps_the_hypersurfaces_that_were_followed():
-    top, whole = load("euler_top").system, singularities(load("euler_top").system, "1/7")
+    top, complete = load("euler_top").system, singularities(load("euler_top").system, "1/7")
 
     def stop(sentence):
-        if sentence == f"following {whole.hypersurfaces[1].polynomial[:40]}":
+        if sentence == f"following {complete.hypersurfaces[1].polynomial[:40]}":
             raise TimeLimit("the time limit of 1 s is over")
 
     run = singularities(top, "1/7", progress=stop)
-    assert (run.stopped, run.hypersurfaces) == (True, whole.hypersurfaces[:1])
+    assert (run.stopped, run.hypersurfaces) == (True, complete.hypersurfaces[:1])
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         singularities(top, "1/7", effort=Budget(1e9), progress=stop)
 
@@ -166,12 +166,12 @@ def test_steps_by_elimination_are_those_by_minors(name, monkeypatch):
         tangents = outcomes._tangents(critical.point, critical.gradient, field)
         direction = [rng.randrange(PRIME) for _ in critical.point]
         for moved in (tangents, ()):
-            told = []
+            messages = []
             for dimension in (1, 100):
                 monkeypatch.setattr("kahanmaps.laboratory.singular.jets._MIN_ELIMINATION_DIMENSION", dimension)
                 steps = islice(images_of_curve(here.equations, critical.point, direction, 30, moved), 6)
-                told.append([(step.common, step.pole, step.denominator, step.rank) for step in steps])
-            assert told[0] == told[1]
+                messages.append([(step.common, step.pole, step.denominator, step.rank) for step in steps])
+            assert messages[0] == messages[1]
 
 
 @pytest.mark.parametrize("name", ["riccati", "lorenz", "volterra_periodic_5"])

@@ -71,7 +71,7 @@ def unknowns_on(relation, file, eps, points):
 
 @pytest.mark.parametrize(("name", "degree", "texts"), WRITTEN)
 def test_the_relations_of_the_literature(name, degree, texts):
-    assert [one.text for one in relations(name, degree)] == texts
+    assert [relation.text for relation in relations(name, degree)] == texts
 
 
 @pytest.mark.parametrize(("name", "degree"), [(name, degree) for name, degree, texts in WRITTEN if texts])
@@ -97,14 +97,14 @@ def test_a_wrong_relation_does_not_hold_on_exact_orbits():
 
 
 def test_what_depends_on_eps_alone_is_no_integral():
-    (found,) = relations("planar_cubic_hamiltonian", 3)
-    assert found.text.startswith("x^3 + e1*x^2*y + e2*x*y^2 + e3*y^3 + c1*x^2")
-    assert found.integrals == ("c1", "c2", "c3", "c4", "c5", "c6")
-    assert found.names == ("e1", "e2", "e3", *found.integrals)
+    (result,) = relations("planar_cubic_hamiltonian", 3)
+    assert result.text.startswith("x^3 + e1*x^2*y + e2*x*y^2 + e3*y^3 + c1*x^2")
+    assert result.integrals == ("c1", "c2", "c3", "c4", "c5", "c6")
+    assert result.names == ("e1", "e2", "e3", *result.integrals)
     file = load("planar_cubic_hamiltonian")
     for eps in (Fraction(1, 3), Fraction(-2, 7)):
-        one, other = (unknowns_on(found, file, eps, exact_orbit(file, eps, 11, seed)) for seed in (1, 2))
-        assert [name for name in found.names if one[name] == other[name]] == ["e1", "e2", "e3"]
+        entry, other = (unknowns_on(result, file, eps, exact_orbit(file, eps, 11, seed)) for seed in (1, 2))
+        assert [name for name in result.names if entry[name] == other[name]] == ["e1", "e2", "e3"]
 
 
 def test_what_lower_degrees_imply_is_left_out():

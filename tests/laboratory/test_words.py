@@ -29,10 +29,10 @@ def word(*letters, power=1):
 def derived(map_, terms, eps=None):
     """The word of a composition, and its degrees as its maps give them, followed one by one."""
     limits = Range(12, 60, 40, Budget(), 40)
-    found, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
-    pairs = [(h.degree, h.orders) for h in hypersurfaces]
-    series = degree_series(found.degrees, pairs, [h.stage for h in hypersurfaces])
-    return found, coefficients(every_nth(series, found.length), terms + 1)
+    result, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
+    pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
+    series = degree_series(result.degrees, pairs, [h.stage for h in hypersurfaces])
+    return result, coefficients(every_nth(series, result.length), terms + 1)
 
 
 @pytest.mark.parametrize(
@@ -48,8 +48,8 @@ def derived(map_, terms, eps=None):
 )
 def test_words_give_the_measured_degrees(letters, power, terms, expected):
     map_ = word(*letters, power=power)
-    found, degrees = derived(map_, terms)
-    assert found == expected
+    result, degrees = derived(map_, terms)
+    assert result == expected
     measured = degree_growth(
         map_, "3/11" if map_.has_eps else None, max_terms=terms, patterns=Patterns((), None, False)
     )
@@ -60,10 +60,10 @@ def test_a_hypersurface_of_another_map_gives_other_degrees():
     """Negative control: with the maps in the other order the same hypersurfaces stand for another composition."""
     map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
     limits = Range(12, 60, 40, Budget(), 40)
-    found, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
-    pairs = [(h.degree, h.orders) for h in hypersurfaces]
+    result, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
+    pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
     right, wrong = (
-        coefficients(every_nth(degree_series(found.degrees, pairs, stages), 2), 6)
+        coefficients(every_nth(degree_series(result.degrees, pairs, stages), 2), 6)
         for stages in ([h.stage for h in hypersurfaces], [1 - h.stage for h in hypersurfaces])
     )
     assert right == [1, 4, 13, 43, 141, 463]
@@ -72,10 +72,10 @@ def test_a_hypersurface_of_another_map_gives_other_degrees():
 
 @pytest.mark.parametrize(("name", "k", "square"), [("mcmillan", 7, 2), ("euler_top", 2, 2)])
 def test_powers_have_every_kth_degree(name, k, square):
-    found = degree_growth(word(name, power=k))
-    assert (found.ended, found.derived.closed_form) == ("derived", f"{square * k * k}*n^2 + 1")
-    assert found.patterns.word == Word((3,), k)
-    assert f"{k} maps make one iterate" in found.text
+    growth = degree_growth(word(name, power=k))
+    assert (growth.ended, growth.derived.closed_form) == ("derived", f"{square * k * k}*n^2 + 1")
+    assert growth.patterns.word == Word((3,), k)
+    assert f"{k} maps make one iterate" in growth.text
 
 
 def test_every_nth_coefficient_of_a_fraction():

@@ -82,20 +82,20 @@ def entries(language, text, function):
 
 def names_in(language, text, file):
     """The names of the variables in a converted file, which are told where they are others."""
-    told = " ".join(line.lstrip("%#!/*(\\ ") for line in text.split("\n\n")[0].splitlines())
-    found = dict(re.findall(r"(\w+) is called (\w+)", told))
-    return [found.get(name, name) for name in file.variables]
+    messages = " ".join(line.lstrip("%#!/*(\\ ") for line in text.split("\n\n")[0].splitlines())
+    results = dict(re.findall(r"(\w+) is called (\w+)", messages))
+    return [results.get(name, name) for name in file.variables]
 
 
 @pytest.mark.parametrize("language", VECTOR)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_expressions_are_read_back_as_the_same_polynomials_and_values(language, name):
     file = SYSTEMS[name]
-    text, asked = converted(language, file)
+    text, requested = converted(language, file)
     names = names_in(language, text, file)
     read = [km.parse_polynomial(piece, names) for piece in entries(language, text, "vector_field")]
     assert [polynomial.to_dict() for polynomial in read] == [polynomial.to_dict() for polynomial in file.system.rhs]
-    for question in asked:
+    for question in requested:
         if question.function == "kahan_map_formula":
             closed = entries(language, text, question.function)
             read = [km.parse_rational_function(piece, (*names, "eps")) for piece in closed]
@@ -172,9 +172,9 @@ def test_a_reserved_name_is_replaced_and_reported(name, expected, in_mathematica
 def test_different_names_stay_different_and_avoid_what_the_file_uses(language):
     names = ["a_1", "a1", "_a1", "I", "v_I", "vI", "x", "X", "point", "v_point", "image", "M", "m", "E", "__", "_"]
     file = km.SystemFile.from_system(km.QuadraticSystem.from_text(names, names))
-    found = names_in(language, convert(file, language, ["system"]), file)
-    assert len({name.lower() for name in found}) == len(names)  # Fortran does not tell x from X
-    assert not {"point", "eps", "image", "value"} & set(found)
+    result = names_in(language, convert(file, language, ["system"]), file)
+    assert len({name.lower() for name in result}) == len(names)  # Fortran does not tell x from X
+    assert not {"point", "eps", "image", "value"} & set(result)
 
 
 def test_integrals_whose_names_come_out_alike_get_functions_of_their_own():

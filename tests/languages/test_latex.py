@@ -15,33 +15,33 @@ DOCUMENTS = {name: convert(file, "latex", questions(file)[0]) for name, file in 
 
 def mistakes(document: str) -> list[str]:
     """Braces, environments and alignment marks that do not fit together."""
-    found = []
+    results = []
     body = "\n".join(line for line in document.splitlines() if not line.startswith("%"))
     text = body.replace("\\\\", " NEWLINE ").replace("\\{", "").replace("\\}", "")
     depth = 0
     for character in text:
         depth += {"{": 1, "}": -1}.get(character, 0)
         if depth < 0:
-            found.append("} without {")
+            results.append("} without {")
             break
     if depth > 0:
-        found.append("{ without }")
+        results.append("{ without }")
     opened: list[str] = []
     for what, name in re.findall(r"\\(begin|end)\{([a-z*]+)\}", body):
         if what == "begin":
             opened.append(name)
         elif not opened or opened.pop() != name:
-            found.append(f"\\end{{{name}}} does not close what is open")
-    found += [f"{name} is not closed" for name in opened]
+            results.append(f"\\end{{{name}}} does not close what is open")
+    results += [f"{name} is not closed" for name in opened]
     for rows in re.findall(r"\\begin\{align\*\}(.*?)\\end\{align\*\}", body, re.DOTALL):
         outer = re.sub(r"\\begin\{pmatrix\}.*?\\end\{pmatrix\}", "", rows, flags=re.DOTALL)
-        found += [f"not one & in {row}" for row in outer.split("\\\\") if row.count("&") != 1]
+        results += [f"not one & in {row}" for row in outer.split("\\\\") if row.count("&") != 1]
         if "\n\n" in rows:
-            found.append("an empty line in a display")
+            results.append("an empty line in a display")
     for matrix in re.findall(r"\\begin\{pmatrix\}(.*?)\\end\{pmatrix\}", body, re.DOTALL):
         if len({row.count("&") for row in matrix.split("\\\\")}) != 1:
-            found.append("rows of different length")
-    return found
+            results.append("rows of different length")
+    return results
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
@@ -67,9 +67,9 @@ def test_a_mistake_would_be_noticed(right, wrong):
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_the_lines_of_a_right_hand_side_together_are_all_of_it(name):
-    whole = re.sub(r" \\\\\n&\\quad", "", DOCUMENTS[name])
+    complete = re.sub(r" \\\\\n&\\quad", "", DOCUMENTS[name])
     for variable, polynomial in zip(SYSTEMS[name].variables, SYSTEMS[name].system.rhs, strict=True):
-        assert rf"\dot{{{latex_name(variable)}}} &= {km.latex_polynomial(polynomial)}" in whole
+        assert rf"\dot{{{latex_name(variable)}}} &= {km.latex_polynomial(polynomial)}" in complete
 
 
 def test_matrices_of_more_than_ten_columns_are_announced():

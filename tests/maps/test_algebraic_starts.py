@@ -35,8 +35,8 @@ def test_orbits_over_a_number_field_reduce_to_those_modulo_a_prime(name):
     exact = list(km.orbit(map_, point.over(root.number_field), "1/3", 3))
     modular = list(km.orbit(map_, point.over(field), "1/3", 3, arithmetic=f"mod:{2**61 - 1}"))
     at_root = root.over(field)
-    for one, other in zip(exact, modular, strict=True):
-        values = [sum(field.convert(c) * at_root**k for k, c in enumerate(entry.coefficients)) for entry in one.x]
+    for item, other in zip(exact, modular, strict=True):
+        values = [sum(field.convert(c) * at_root**k for k, c in enumerate(entry.coefficients)) for entry in item.x]
         assert [int(value) for value in values] == [int(entry) for entry in other.x]
 
 

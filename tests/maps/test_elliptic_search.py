@@ -40,15 +40,15 @@ def points_on_a_curve(degree, size, length):
 )
 def test_curves_of_any_degree(degree, size):
     points = points_on_a_curve(degree, size, 150)
-    found = None
+    result = None
     for needed in search.points_needed(size - 1):
         try:
-            found = found or search.curve(points[:needed], P)
+            result = result or search.curve(points[:needed], P)
         except ArithmeticError:
             continue
-    assert found is not None
-    assert found.sections.degree == degree
-    assert search.curve(points[: found.sections.points_used], P, found.sections) == found
+    assert result is not None
+    assert result.sections.degree == degree
+    assert search.curve(points[: result.sections.points_used], P, result.sections) == result
 
 
 @pytest.mark.parametrize("degree", range(2, 8))

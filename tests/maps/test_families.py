@@ -42,20 +42,22 @@ def members(count: int, prime: int, size: int = 40) -> np.ndarray:
 @pytest.mark.parametrize(("text", "names", "terms", "prime"), CASES)
 def test_the_compiled_loop_and_flint_give_the_same_degrees_on_the_same_lines(text, names, terms, prime):
     pytest.importorskip("numba")
-    one = family(text, names, prime)
+    entry = family(text, names, prime)
     points = members(len(names), prime)
-    found = [one.degrees(points, None, terms, 400, random.Random(3), kernel=kernel) for kernel in ("numba", "numpy")]
-    assert (found[0] == found[1]).all()
-    assert len({tuple(row) for row in found[0].tolist()}) > 1  # members are told from each other
+    results = [
+        entry.degrees(points, None, terms, 400, random.Random(3), kernel=kernel) for kernel in ("numba", "numpy")
+    ]
+    assert (results[0] == results[1]).all()
+    assert len({tuple(row) for row in results[0].tolist()}) > 1  # members are told from each other
 
 
 def test_special_members_have_smaller_degrees():
     points = np.array([[1, 1], [1, 2], [2, 3], [5, 6], [3, 12]])
-    found = np.max(
+    result = np.max(
         [family(THREE_LINES, ["g1", "g2"], 8179).degrees(points, None, 7, 300, random.Random(k)) for k in (1, 2)],
         axis=0,
     )
-    assert found.tolist() == [
+    assert result.tolist() == [
         [2, 4, 8, 13, 20, 28, 38],  # zander-2021
         [2, 4, 7, 12, 18, 25, 34],
         [2, 4, 7, 11, 16, 23, 31],
@@ -69,5 +71,5 @@ def test_an_iterate_defined_nowhere_is_reported(kernel):
     if kernel == "numba":
         pytest.importorskip("numba")
     vanishing = 'variables = ["x"]\nparameters.a = 1\n[bilinear]\nequations = ["a*(X - x) = eps*a*x*X"]'
-    found = family(vanishing, ["a"], 13).degrees(np.array([[2], [0]]), None, 2, 99, random.Random(1), kernel=kernel)
-    assert found.tolist() == [[1, 1], [NOWHERE, NOWHERE]]
+    result = family(vanishing, ["a"], 13).degrees(np.array([[2], [0]]), None, 2, 99, random.Random(1), kernel=kernel)
+    assert result.tolist() == [[1, 1], [NOWHERE, NOWHERE]]

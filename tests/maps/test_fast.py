@@ -33,9 +33,9 @@ def last(orbit: FloatOrbit) -> np.ndarray:
 
 @given(a=st.integers(-(10**30), 10**30), b=st.integers(1, 10**30))
 def test_a_number_is_rounded_to_the_nearest_double(a, b):
-    found = to_float(fmpq(a, b))
-    error = abs(fmpq(a, b) - exact(found))
-    for neighbour in (nextafter(found, -np.inf), nextafter(found, np.inf)):
+    result = to_float(fmpq(a, b))
+    error = abs(fmpq(a, b) - exact(result))
+    for neighbour in (nextafter(result, -np.inf), nextafter(result, np.inf)):
         assert error <= abs(fmpq(a, b) - exact(neighbour))
 
 
@@ -73,14 +73,14 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
         [sys.executable, "-c", ENDLESS.format(path=str(path))], stdout=subprocess.PIPE, text=True
     )
     try:
-        told = [int(process.stdout.readline()) for _ in range(2)]
+        messages = [int(process.stdout.readline()) for _ in range(2)]
         time.sleep(0.01)
     finally:
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
         process.stdout.close()
     points = np.load(path)
-    assert len(points) >= told[-1] // 50 + 1  # what was told is there, and perhaps a portion more
+    assert len(points) >= messages[-1] // 50 + 1  # what was told is there, and perhaps a portion more
     steps = 50 * (len(points) - 1)
     expected = np.concatenate(list(FloatEnsemble(EULER_TOP, "1/10", [START], kernel="numpy").records(steps, 50)))
     assert np.array_equal(points, expected[:, 0])

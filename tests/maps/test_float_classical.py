@@ -59,9 +59,9 @@ def test_midpoint_of_linear_equations_is_their_cayley_transform(rows):
     n = len(rows)
     names = ["x", "y", "z", "w"][:n]
     rhs = [" + ".join(f"{a}*{name}" for a, name in zip(row, names, strict=True)) for row in rows]
-    one, A = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)]), fmpq_mat(rows)
+    entry, A = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)]), fmpq_mat(rows)
     start = fmpq_mat(n, 1, [1, -2, 3, 5][:n])
-    expected = (one - A / 2).solve((one + A / 2) * start)
+    expected = (entry - A / 2).solve((entry + A / 2) * start)
     x, end = walk(QuadraticSystem.from_text(names, rhs), "1/2", [str(e) for e in start.entries()], 1, "midpoint")
     assert end.status == "completed"
     assert x[1].tolist() == pytest.approx([float(e.p) / float(e.q) for e in expected.entries()], rel=1e-12)

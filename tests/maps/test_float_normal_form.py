@@ -33,12 +33,12 @@ over_kernels = pytest.mark.parametrize("kernel", KERNELS)
 def test_lines_at_right_angles_are_not_parallel():
     """Their product is a ball around exactly 0, whose square is nan in python-flint 0.9.0."""
     for radius in (0, 1e-30):
-        one, small = acb(1), acb(arb(0, radius))
-        right, parallel = ([one, small], [small, one]), ([one, small], [one, small])
-        assert _sine(right, [[one, small], [small, one]]) == pytest.approx(1, abs=1e-15)
-        assert _sine(parallel, [[one, small], [small, one]]) == 0
+        entry, small = acb(1), acb(arb(0, radius))
+        right, parallel = ([entry, small], [small, entry]), ([entry, small], [entry, small])
+        assert _sine(right, [[entry, small], [small, entry]]) == pytest.approx(1, abs=1e-15)
+        assert _sine(parallel, [[entry, small], [small, entry]]) == 0
     with pytest.raises(_Unclear):
-        _sine(([one, one], [acb(arb(0, 1)), acb(arb(0, 1))]), [[one, one], [one, one]])
+        _sine(([entry, entry], [acb(arb(0, 1)), acb(arb(0, 1))]), [[entry, entry], [entry, entry]])
 
 
 def starts_of(dim: int, n: int, seed: int = 0) -> np.ndarray:

@@ -71,12 +71,12 @@ def starts_of(dim: int, n: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1, 1, (n, dim))
 
 
-def same(one: FloatEnsemble, other: FloatEnsemble, some=slice(None)) -> None:
+def same(ensemble: FloatEnsemble, other: FloatEnsemble, some=slice(None)) -> None:
     """Equal in everything that can be asked, NaN where NaN is."""
-    assert np.array_equal(one.x[some], other.x, equal_nan=True)
+    assert np.array_equal(ensemble.x[some], other.x, equal_nan=True)
     for name in ("status", "failed_at", "near_singular", "near_singular_at"):
-        assert np.array_equal(getattr(one, name)[some], getattr(other, name)), name
-    for left, right in zip(one.drift, other.drift, strict=True):
+        assert np.array_equal(getattr(ensemble, name)[some], getattr(other, name)), name
+    for left, right in zip(ensemble.drift, other.drift, strict=True):
         assert np.array_equal(left.largest[some], right.largest), left.name
         assert np.array_equal(left.last[some], right.last, equal_nan=True), left.name
 
@@ -98,12 +98,12 @@ def test_a_step_of_an_ensemble_is_that_of_the_exact_map(system, kernel, monkeypa
     orbits = FloatEnsemble(system, "1/50", starts, kernel=kernel)
     orbits.advance(1)
     phi = KahanMap(system, "1/50")
-    for start, found in zip(starts, orbits.x, strict=True):
+    for start, result in zip(starts, orbits.x, strict=True):
         x = [exact(entry) for entry in start.tolist()]
         expected = to_floats(phi.step(x))
         matrix = to_floats(phi.denominator_matrix(x).entries()).reshape(system.dim, system.dim)
         # some dozen roundings for each entry of the matrix and on the way through the elimination
-        assert abs(found - expected).max() <= 100 * 2.0**-53 * np.linalg.cond(matrix) * abs(expected).max()
+        assert abs(result - expected).max() <= 100 * 2.0**-53 * np.linalg.cond(matrix) * abs(expected).max()
 
 
 @over_members
@@ -176,11 +176,11 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
             rows[at : at + size] = [1 - 2.0**-43, *[0.0] * (size - 1)]
             starts[20 + r] = blocks.out @ rows
     system, form = MEMBERS[name].chosen.system, FORMS[name]
-    one, other = (FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sampled=10) for k in ("numpy", "numba"))
-    for it in (one, other):
+    entry, other = (FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sampled=10) for k in ("numpy", "numba"))
+    for it in (entry, other):
         it.advance(40)
-    same(one, other)
-    assert (one.near_singular[20 : 20 + len(lines)] > 0).tolist() == lines
+    same(entry, other)
+    assert (entry.near_singular[20 : 20 + len(lines)] > 0).tolist() == lines
 
 
 # Ends.

@@ -12,7 +12,7 @@ NONE = NoNormalForm("H is not a homogeneous cubic")
 
 
 @pytest.mark.parametrize(
-    ("wish", "arithmetic", "normal_form", "at", "expected"),
+    ("requested", "arithmetic", "normal_form", "at", "expected"),
     [
         (None, "exact", NONE, None, "generic"),
         (None, "mod", NONE, (10**9,), "generic"),
@@ -43,7 +43,7 @@ NONE = NoNormalForm("H is not a homogeneous cubic")
         (None, "exact", SPLIT, (), "normal-form"),
     ],
 )
-def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, normal_form, at, expected):
-    found = choose_method(wish, arithmetic, normal_form, at)
-    assert found.name == expected
-    assert found.text == f"method {expected}: {found.reason}"
+def test_the_method_follows_from_what_is_asked_for(requested, arithmetic, normal_form, at, expected):
+    result = choose_method(requested, arithmetic, normal_form, at)
+    assert result.name == expected
+    assert result.text == f"method {expected}: {result.reason}"

@@ -37,10 +37,10 @@ def walked(system, eps, field, start, steps):
     return [point.x for point in orbit], orbit.end
 
 
-def reached(found, start, n):
+def reached(result, start, n):
     """The n-th iterate, None where it is singular."""
     try:
-        return coordinates(found.value(start, n))
+        return coordinates(result.value(start, n))
     except SingularStep:
         return None
 
@@ -51,7 +51,7 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
     normal_form, system = structure_and_system(name)
     field, rng, eps = GF(prime), random.Random(prime), "3/13"
     try:
-        found = NthIterate(normal_form, eps, field)
+        iterate = NthIterate(normal_form, eps, field)
     except BadPrime:
         assert prime in (3, 5)  # of S or T
         return
@@ -59,7 +59,7 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
         start = [rng.randrange(prime) for _ in range(system.dim)]
         points, _ = walked(system, eps, field, start, NUMBERS[-1])
         for n in NUMBERS:
-            image = reached(found, start, n)
+            image = reached(iterate, start, n)
             if n < len(points):
                 assert image == points[n]
             elif len(points) <= (16 if n <= 16 else 4):  # a pole among the first steps
@@ -71,9 +71,9 @@ def test_over_q_it_is_the_point_of_the_orbit(name):
     normal_form, system = structure_and_system(name)
     start = random_point(system.dim, 6, height=3)
     points, _ = walked(system, "1/10", QQ, start, 27)
-    found = NthIterate(normal_form, "1/10", QQ)
+    iterate = NthIterate(normal_form, "1/10", QQ)
     for n in (0, 1, 7, 16, 17, 24, 25, 27):
-        assert coordinates(found.value(start, n)) == points[n]
+        assert coordinates(iterate.value(start, n)) == points[n]
 
 
 def poles():
@@ -90,12 +90,12 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
     start = (fmpq(U, W), u, fmpq(V, W), v)
     points, end = walked(system, "1/2", QQ, start, 60)
     assert (end.status, end.steps) == ("singular", last)
-    found = NthIterate(normal_form, "1/2", QQ)
+    iterate = NthIterate(normal_form, "1/2", QQ)
     for n in (last + 1, last + 2, last + 3, 57):
         with pytest.raises(SingularStep, match=f"not defined at step {last}$"):
-            found.value(start, n)
+            iterate.value(start, n)
     for n in (0, last):
-        assert coordinates(found.value(start, n)) == points[n]
+        assert coordinates(iterate.value(start, n)) == points[n]
 
 
 @over_members
@@ -103,10 +103,10 @@ def test_balls_enclose_the_exact_iterate(name):
     normal_form, system = structure_and_system(name)
     # Large numbers, so that the sixteen steps before the doublings already cost some hundred bits.
     start, field = random_point(system.dim, 6, height=3), RR(2000)
-    exact, found = NthIterate(normal_form, "1/10", QQ), NthIterate(normal_form, "1/10", field)
+    exact, result = NthIterate(normal_form, "1/10", QQ), NthIterate(normal_form, "1/10", field)
     for n in (0, 1, 10, 24, 30):
         try:
-            balls = found.value(start, n)
+            balls = result.value(start, n)
         except PrecisionLost:  # balls cannot decide that a level is degenerate
             assert "double root" in name
             continue
@@ -126,7 +126,7 @@ def test_a_wrong_doubling_is_noticed(monkeypatch):
 
 @together("name", STARTS)
 def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(name):
-    """The level is infinite where the map has no value, and 0 or delta = 1 as the names of the starts say."""
+    """The level is infinite where the map is not defined, and 0 or delta = 1 as the names of the starts say."""
     _, normal_form, start = side_by_side(name)
     kinds = {
         "h = 0": "at rest",
@@ -144,7 +144,7 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
 def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
     normal_form, _ = structure_and_system("m = 2")
     start = [1, 2, 3, fmpq(1, 4)]
-    wanted = coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30))
+    expected = coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30))
     steps_modulo, random_prime = rational_iterate._steps_modulo, rational_iterate.random_prime
     drawn = [1000003, 1000033, 1000037]  # with a pole at step 2, as if these divided W there
     monkeypatch.setattr(rational_iterate, "random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
@@ -153,5 +153,5 @@ def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
         "_steps_modulo",
         lambda *at: (2, (1, 1, 0)) if at[2](fmpz(0)).modulus() < 2**20 else steps_modulo(*at),
     )
-    assert coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30)) == wanted
+    assert coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30)) == expected
     assert drawn == []

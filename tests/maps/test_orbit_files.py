@@ -15,9 +15,9 @@ ARITHMETICS = ["exact", "float", "mod:101", "ball:100"]
 
 
 def walk(arithmetic="exact", **options):
-    found = km.orbit(TOP, [1, "1/2", "-1/3"], "1/10", **({"steps": 4} | options), arithmetic=arithmetic)
-    found.integrals = functions_along(TOP, [("", "F1"), ("p", "1/(x1 - 1)")], arithmetic == "float")
-    return found
+    orbit = km.orbit(TOP, [1, "1/2", "-1/3"], "1/10", **({"steps": 4} | options), arithmetic=arithmetic)
+    orbit.integrals = functions_along(TOP, [("", "F1"), ("p", "1/(x1 - 1)")], arithmetic == "float")
+    return orbit
 
 
 def read(path):

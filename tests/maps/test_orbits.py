@@ -78,7 +78,7 @@ def test_the_text_of_a_rational_point_is_in_lowest_terms_and_of_any_length():
 def test_an_orbit_that_meets_the_singular_set_ends_there(start, last):
     orbit = Orbit(KahanMap(RICCATI, "1/2"), [start], 100)
     points = [point.x for point in orbit]
-    assert (orbit.end.status, orbit.end.steps, orbit.end.is_whole) == ("singular", last, False)
+    assert (orbit.end.status, orbit.end.steps, orbit.end.is_complete) == ("singular", last, False)
     assert points[-1] == (1,)
     assert len(points) == last + 1
 
@@ -94,7 +94,7 @@ FOUR_CYCLES = [
 @pytest.mark.parametrize(("system", "eps", "start"), FOUR_CYCLES, ids=["henon_heiles", "w = 2", "w = 1/3"])
 def test_at_eps_times_w_equal_to_one_every_orbit_has_period_four(system, eps, start):
     end = ended(Orbit(KahanMap(system, eps), start, 10))
-    assert (end.status, end.period, end.steps, end.is_whole) == ("periodic", 4, 10, True)
+    assert (end.status, end.period, end.steps, end.is_complete) == ("periodic", 4, 10, True)
 
 
 @pytest.mark.parametrize(("prime", "start"), [(5, (1, 2)), (7, (3, 1)), (11, (2, 2)), (13, (1, 2))])

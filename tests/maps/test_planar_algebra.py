@@ -65,9 +65,9 @@ def member_of(text: str, seed: int = 5):
 @given(seed=st.integers(0, 10**6))
 def test_the_points_are_those_of_steps_in_the_field(name, seed):
     block = random_block(name, seed)
-    stepped, found = (list(islice(points, 11)) for points in (block.triples(), tau.triples(block)))
-    assert len(found) == len(stepped)
-    assert all(same_point(P, Q) for P, Q in zip(found, stepped, strict=True))
+    stepped, result = (list(islice(points, 11)) for points in (block.triples(), tau.triples(block)))
+    assert len(result) == len(stepped)
+    assert all(same_point(P, Q) for P, Q in zip(result, stepped, strict=True))
 
 
 @pytest.mark.parametrize("chi", CHI)
@@ -77,10 +77,10 @@ def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
     normal_form, system = member_of(chi)
     start = random_point(system.dim, seed, height=3)
     generic = [point.value for point in Orbit(KahanMap(system, eps), start, 8, max_digits=None)]
-    found = list(islice(NormalSteps(normal_form, fmpq(eps)).points(start), 9))
-    assert [IntegerPoint.from_rationals(point.rationals()) for point in found] == generic
-    assert [point.lowest_terms() for point in found] == [point.lowest_terms() for point in generic]
-    assert all(point.height <= point.bits + point._assembly.excess for point in found)
+    results = list(islice(NormalSteps(normal_form, fmpq(eps)).points(start), 9))
+    assert [IntegerPoint.from_rationals(point.rationals()) for point in results] == generic
+    assert [point.lowest_terms() for point in results] == [point.lowest_terms() for point in generic]
+    assert all(point.height <= point.bits + point._assembly.excess for point in results)
 
 
 def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):

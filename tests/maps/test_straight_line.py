@@ -32,14 +32,14 @@ def to_float(x):
 def code_of(pattern, careful):
     """The solution of M y = r as code of the entries of M that are not 0, row by row, and of r."""
     n = len(pattern)
-    code, asked = StraightLineProgram(sum(row.count("*") for row in pattern) + n), StepChecks(careful)
+    code, requested = StraightLineProgram(sum(row.count("*") for row in pattern) + n), StepChecks(careful)
     entries = iter(code.arguments)
     rows = [[next(entries) if mark == "*" else 0.0 for mark in row] for row in pattern]
     rows = [[*row, right] for row, right in zip(rows, entries, strict=True)]
     size = code.arguments[0]
     for x in code.arguments[1:]:
         size = size.code.emit("max", abs(size), abs(x))
-    code.outputs = [*solve(rows, lambda: abs(size), asked), *asked.outputs()]
+    code.outputs = [*solve(rows, lambda: abs(size), requested), *requested.outputs()]
     return code
 
 
@@ -59,17 +59,17 @@ def test_equations_of_any_pattern_have_the_exact_solution(pattern, small):
         expected = [to_float(x) for x in fmpq_mat(M).solve(fmpq_mat(n, 1, right)).entries()]
         given = [to_float(M[i][j]) for i in range(n) for j in range(n) if pattern[i][j] == "*"]
         given += [to_float(x) for x in right]
-        *found, near, singular, overflow = careful.function(float)(*given)
+        *result, near, singular, overflow = careful.function(float)(*given)
         assert (bool(near), bool(singular), bool(overflow)) == (False, False, False)
         condition = np.linalg.cond([[to_float(x) for x in row] for row in M])
         # some dozen roundings, and rows subtracted up to 8 times from others
-        assert found == pytest.approx(expected, rel=1e-13 * condition, abs=1e-13 * condition)
+        assert result == pytest.approx(expected, rel=1e-13 * condition, abs=1e-13 * condition)
         *quick, good = fast.function(float)(*given)
         if good:
             contented += 1
-            assert quick == found
+            assert quick == result
         arrays = careful.function(np.ndarray)(*(np.array([x]) for x in given))
-        assert [float(x[0]) for x in arrays[:n]] == found
+        assert [float(x[0]) for x in arrays[:n]] == result
     assert small or contented > 10
 
 

@@ -54,16 +54,16 @@ def test_a_pole_is_passed_over(steps):
     cubic, start = STARTS["a pole at step 2"]
     block = integer_block(cubic, before(cubic, start, steps))
     pole = steps + 2
-    found = {n: reduced(tau.iterate(block, n)) for n in range(pole - 1, 2 * pole)}
+    results = {n: reduced(tau.iterate(block, n)) for n in range(pole - 1, 2 * pole)}
     U, V, W = by_gcds(block, 2 * pole)[-1]
-    assert found[pole - 1] == (U, V, W)
-    assert same_point(found[pole], (U, V, 0))
-    assert found[pole + 1] == reduced((U, V, -W))
-    assert reduced(preimage(cubic, found[pole + 2])) == found[pole + 1]
+    assert results[pole - 1] == (U, V, W)
+    assert same_point(results[pole], (U, V, 0))
+    assert results[pole + 1] == reduced((U, V, -W))
+    assert reduced(preimage(cubic, results[pole + 2])) == results[pole + 1]
     for n in range(pole + 2, 2 * pole - 1):
-        above, below = block.block.level(found[n])
+        above, below = block.block.level(results[n])
         assert fmpq(above, below) == block.level
-        assert reduced(image(cubic, found[n])) == found[n + 1]
+        assert reduced(image(cubic, results[n])) == results[n + 1]
 
 
 @pytest.mark.parametrize("name", SMOOTH)
@@ -77,9 +77,9 @@ def test_no_number_is_longer_than_the_result(name, n, monkeypatch):
         return divide(values, divisor)
 
     monkeypatch.setattr(planar_integers, "divide_exactly", watched)
-    found = tau.iterate(integer_block(*STARTS[name]), n)
+    result = tau.iterate(integer_block(*STARTS[name]), n)
     # A tenth, for bad primes and the three points around the base.
-    assert max(lengths) < 1.1 * max(entry.bit_length() for entry in found)
+    assert max(lengths) < 1.1 * max(entry.bit_length() for entry in result)
     assert len(lengths) < 20 * n.bit_length()
 
 

@@ -26,8 +26,8 @@ def is_zero(element) -> bool:
 
 def planes(field, seed, amount):
     """Random planes with starts of every kind that are not constant."""
-    found = planes_over(field, random.Random(f"{field} {seed}"), 10**9)
-    return islice((case for case in found if not case[0].is_zero and case[1][:2] != (0, 0)), amount)
+    result = planes_over(field, random.Random(f"{field} {seed}"), 10**9)
+    return islice((case for case in result if not case[0].is_zero and case[1][:2] != (0, 0)), amount)
 
 
 def stepped(block, start, steps):
@@ -41,7 +41,7 @@ def stepped(block, start, steps):
     return points
 
 
-def found(block, start, n):
+def translated(block, start, n):
     """The n-th point, or what is said instead."""
     try:
         return iterate(block, start, n, is_zero, inexact=isinstance(start[0], flint.arb | flint.acb))
@@ -63,7 +63,7 @@ def test_over_a_finite_field_it_is_the_point_that_steps_lead_to(field, amount):
     for block, start in planes(field, 1, amount):
         points = stepped(block, start, NUMBERS[-1])
         for n in NUMBERS:
-            image = found(block, start, n)
+            image = translated(block, start, n)
             if n < len(points) and image is not None:
                 assert same_point(image, points[n])
                 compared += 1
@@ -85,7 +85,7 @@ def test_on_a_smooth_level_it_is_a_multiple_of_the_translation(field, amount):
     rng, passed = random.Random(field.q), 0
     for block, start, cubic in smooth(field, 4, min(amount, 40)):
         for n in (rng.randrange(17, 100), rng.randrange(field.q**2 + 100), rng.randrange(10**30)):
-            image = found(block, start, n)
+            image = translated(block, start, n)
             if isinstance(image, tuple):
                 assert any(image)
                 assert same_point(image, cubic.multiple(n, block.image(start)))
@@ -98,7 +98,7 @@ def test_with_another_gamma_or_other_digits_the_point_is_another(wrong, monkeypa
     block, start = next(iter(planes(Finite(10007), 1, 1)))
     by_curve, digits = translation._by_curve, translation._digits
     if wrong == "gamma":
-        monkeypatch.setattr(translation, "_by_curve", lambda P, gamma, *rest: by_curve(P, gamma + 1, *rest))
+        monkeypatch.setattr(translation, "_by_curve", lambda P, gamma, *others: by_curve(P, gamma + 1, *others))
     else:
         monkeypatch.setattr(translation, "_digits", lambda n: digits(n + 1))
-    assert not same_point(found(block, start, 50), stepped(block, start, 50)[50])
+    assert not same_point(translated(block, start, 50), stepped(block, start, 50)[50])

@@ -23,9 +23,9 @@ FAR = 10**12
 
 
 def found_structure(system) -> SystemNormalForm:
-    found = system_normal_form(system)
-    assert isinstance(found, SystemNormalForm)
-    return found
+    normal_form = system_normal_form(system)
+    assert isinstance(normal_form, SystemNormalForm)
+    return normal_form
 
 
 def ended(orbit) -> OrbitEnd:
@@ -41,7 +41,7 @@ def event(system, normal_form, eps, start, steps, digits):
     assert walks[0] == walks[-1]
     far = ended(Orbit(kahan, start, at=[steps], normal_form=normal_form, max_digits=digits))
     walk = walks[0]
-    if walk.is_whole:
+    if walk.is_complete:
         assert (far.status, far.steps) == ("completed", steps)
     elif walk.status == "singular":
         where = f"step {steps} cannot be reached: the map is not defined at step {walk.steps}"
@@ -61,7 +61,7 @@ def seen_from(cubic, eps, sixths, runs):
             walk = event(system, normal_form, eps, [u, v], steps, digits)
             seen.append(walk.status)
             far = ended(Orbit(KahanMap(system, eps), [u, v], at=[FAR], normal_form=normal_form, max_digits=digits))
-            if not walk.is_whole:
+            if not walk.is_complete:
                 assert far.status == walk.status
     return seen
 

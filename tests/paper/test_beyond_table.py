@@ -1,5 +1,6 @@
 """The table of what survives: what is proved, what is refuted, and that the counterexamples are smallest and right."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -22,13 +23,20 @@ def test_every_cell_is_proved_or_refuted_by_a_counterexample_and_the_page_shows_
         for _, formula, *_, signs in STATEMENTS
         for name, sign in zip(VARIATIONS, signs, strict=True)
     }
-    found = {(one.place["statement"], one.place["variation"]): one.verdict for one in report.findings}
+    results = {(finding.place["statement"], finding.place["variation"]): finding.verdict for finding in report.findings}
     words = {"+": Certainty.PROVED, "-": Certainty.REFUTED}
-    assert found == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
+    assert results == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
     assert table(report) in PAGE.read_text(encoding="utf-8")
-    for one in report.findings:
-        assert (one.verdict is Certainty.REFUTED) is one.control is (one.witness is not None)
-        assert one.witness is None or one.witness.left != one.witness.right
+    for entry in report.findings:
+        assert (entry.verdict is Certainty.REFUTED) is entry.control is (entry.witness is not None)
+        assert entry.witness is None or entry.witness.left != entry.witness.right
+
+
+def test_formulas_of_the_table_are_code_so_that_markdown_prints_their_stars():
+    text = table(beyond_table(1))
+    assert "u1^2*v1" in text
+    outside_code = re.sub(r"`[^`]*`", "", text)
+    assert not re.search(r"(?<!^)\*|_", outside_code, re.MULTILINE)  # only the stars of the list are left
 
 
 def test_without_a_term_of_lower_degree_the_counterexample_is_none():

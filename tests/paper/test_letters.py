@@ -34,9 +34,9 @@ LETTERS = {
 @pytest.mark.parametrize("name", ["m=2, split", "m=3, split"])
 @pytest.mark.parametrize("letter", LETTERS)
 def test_a_letter_of_the_library_is_that_of_the_formulas(name, letter):
-    found = member(name)
-    roots = specialize.rational_roots(found)
-    library = specialize.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
+    result = member(name)
+    roots = specialize.rational_roots(result)
+    library = specialize.point_over(result, QQ, roots, fmpq(1, 7), random.Random(name), 3)
     formulas = library.changed(base=None, known_chi=None, draw=library.vector)
     other = formulas.changed(third=library.third * fmpq(2), roots=roots[::-1], draw=library.vector)
     ours, theirs, wrong = ([values(LETTERS[letter](o, i)) for i in o.each] for o in (library, formulas, other))

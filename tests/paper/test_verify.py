@@ -79,23 +79,23 @@ def misprints(m):
 def test_every_claim_but_misprints_is_proved_for_a_member_with_distinct_roots(name):
     # One report, and what it has to be: neighbours would compute it again in another process.
     report, wrong = verify(file(name)), misprints(member(name).m)
-    found = by_key(report)
+    result = by_key(report)
     assert [finding.place["key"] for finding in report.findings] == stated(member(name).m)
     assert keys(report, REFUTED) == wrong
-    assert keys(report, PROVED) == set(found) - wrong
+    assert keys(report, PROVED) == set(result) - wrong
     assert report.verdict is PROVED
     assert report.holds is True
     for key in wrong:
-        assert found[key].control
-        assert found[key].place["misprint"]
-        assert found[key].witness.left != found[key].witness.right
+        assert result[key].control
+        assert result[key].place["misprint"]
+        assert result[key].witness.left != result[key].witness.right
 
 
-@pytest.mark.parametrize("asked", [1, 300])
-def test_beside_a_proof_stand_random_points_with_the_error_bound_asked_for(asked):
-    for finding in verify(file("m=2, irreducible"), Settings(error_bits=asked), SIXTH).findings:
+@pytest.mark.parametrize("requested", [1, 300])
+def test_beside_a_proof_stand_random_points_with_the_error_bound_asked_for(requested):
+    for finding in verify(file("m=2, irreducible"), Settings(error_bits=requested), SIXTH).findings:
         (points,) = [evidence for evidence in finding.also if evidence.method == "random points over GF(p)"]
-        assert bits(points) >= asked
+        assert bits(points) >= requested
 
 
 @pytest.mark.parametrize("name", quick(["m=3, irreducible", "m=2, complex"], ["m=2, complex"]))
@@ -185,9 +185,9 @@ def test_claims_that_need_distinct_roots_are_undecided_and_nothing_is_refuted_bu
         if claim.kind is ClaimKind.EQUAL:
             uses_roots = bool(list(claim.function(bounds))) and "roots" in bounds.used
         if claim.distinct_roots or uses_roots:
-            found = by_key(report)[claim.key]
-            assert (found.verdict, found.evidence.method) == (UNDECIDED, "outside the hypotheses")
-            assert "repeated roots" in found.evidence.summary
+            result = by_key(report)[claim.key]
+            assert (result.verdict, result.evidence.method) == (UNDECIDED, "outside the hypotheses")
+            assert "repeated roots" in result.evidence.summary
 
 
 # Special members
@@ -215,12 +215,12 @@ def test_identities_are_proved_for_a_special_member_and_what_is_said_in_general_
 def test_statements_that_something_differs_are_proved_where_the_roots_are_irrational():
     """chi = t^2 - 2: what needs the roots is shown at a point over a prime field in which chi splits."""
     verifier = verifier_of(random_member_with_chi(fmpq_poly([-2, 0, 1]), 1))
-    found = [
+    results = [
         verifier.verify_claim(claim) for claim in STATED if claim.kind is not ClaimKind.EQUAL and claim.makes_sense(2)
     ]
-    assert len(found) > 10
-    assert {finding.verdict for finding in found} == {PROVED}
-    assert {finding.evidence.method for finding in found} == {"exact rational point", "point over GF(p)"}
+    assert len(results) > 10
+    assert {finding.verdict for finding in results} == {PROVED}
+    assert {finding.evidence.method for finding in results} == {"exact rational point", "point over GF(p)"}
 
 
 @pytest.mark.parametrize(
@@ -255,9 +255,9 @@ def test_what_is_special_about_a_member_is_said(H, reason):
 def test_the_zero_hamiltonian_refutes_nothing():
     report = verify(SystemFile.from_member(of_two_planes("x1 - x1")), options=VerifyOptions(sections=(1, 3, 7, 8)))
     assert keys(report, REFUTED) <= misprints(2)
-    told = {key: finding.evidence.summary for key, finding in by_key(report).items()}
-    assert "both sides agree at 4 random points" in told["associated-fields-are-pairwise-different"]
-    assert "not attained at 4 random points" in told["hamiltonians-are-independent"]
+    messages = {key: finding.evidence.summary for key, finding in by_key(report).items()}
+    assert "both sides agree at 4 random points" in messages["associated-fields-are-pairwise-different"]
+    assert "not attained at 4 random points" in messages["hamiltonians-are-independent"]
     silent = [finding for finding in report.findings if "the misprint does not show" in finding.evidence.summary]
     special = [finding for finding in report.findings if finding.evidence.method == "special member"]
     assert silent
@@ -271,9 +271,9 @@ def test_the_signs_of_a_file_choose_the_system_that_is_examined(monkeypatch):
     examined = []
     original = Verifier.__init__
 
-    def spy(self, found, *arguments):
-        examined.append(found)
-        original(self, found, *arguments)
+    def spy(self, result, *arguments):
+        examined.append(result)
+        original(self, result, *arguments)
 
     monkeypatch.setattr(Verifier, "__init__", spy)
     plain = member("m=2, split")

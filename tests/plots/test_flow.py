@@ -31,17 +31,17 @@ def test_eigenvalues_tell_the_kind(rhs, kind):
 
 
 def test_arrows_have_the_direction_of_the_field_along_the_axes_as_they_are_drawn():
-    found = plane_flow(planar("x", "-y"), (1, 0), BOX)  # y to the right
-    to_the_right = found.places[:, 0] > 0
-    assert (found.arrows[to_the_right, 0] < 0).all()
-    lengths = np.linalg.norm(found.arrows, axis=1)
+    flow = plane_flow(planar("x", "-y"), (1, 0), BOX)  # y to the right
+    to_the_right = flow.places[:, 0] > 0
+    assert (flow.arrows[to_the_right, 0] < 0).all()
+    lengths = np.linalg.norm(flow.arrows, axis=1)
     assert np.allclose(lengths[lengths > 0], 1)
     assert (lengths == 0).sum() == 1, "the saddle"
 
 
 def test_separatrices_lie_on_the_level_of_their_saddle():
-    found = plane_flow(planar("y", "x - x^2"), (0, 1), BOX)  # H = y^2/2 - x^2/2 + x^3/3
-    inside = [curve[(np.abs(curve) <= 3).all(axis=1)].T for curve in found.separatrices]
+    flow = plane_flow(planar("y", "x - x^2"), (0, 1), BOX)  # H = y^2/2 - x^2/2 + x^3/3
+    inside = [curve[(np.abs(curve) <= 3).all(axis=1)].T for curve in flow.separatrices]
     assert len(inside) == 4
     # the offset from the saddle is 6e-3 and along the eigenvector H is of the third order
     assert max(np.abs(y**2 / 2 - x**2 / 2 + x**3 / 3).max() for x, y in inside) < 1e-6

@@ -105,7 +105,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
 def _run_record(file: lib.SystemFile, run: lib.SingularityRun) -> dict[str, Any]:
     of_run = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
-    of_each = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
+    of_each = ("polynomial", "degree", "divides_denominator", "multiplicity", "status", "contracted_at", "confined_at")
     steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
     return {
         **lib.attributes(run, *of_run, singular_everywhere="is_undefined", dominant="is_dominant"),
