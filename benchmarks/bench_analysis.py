@@ -103,12 +103,12 @@ def measure(quick: bool = False) -> list[Row]:
     degree = 3 if quick else DEGREE
     for name in QUICK if quick else WORKS:
         file = load(name)
-        seconds, found = timed(partial(ours, file, degree), most=3)
+        seconds, result = timed(partial(ours, file, degree), most=3)
         slow, expected = timed(partial(by_hand, file, degree), most=2)
-        require_equal(BY_HAND, expected, found)
-        whole, _ = timed(partial(analyze, file), most=1)
+        require_equal(BY_HAND, expected, result)
+        complete, _ = timed(partial(analyze, file), most=1)
         what = f"{name}, degree 1 to {degree}"
-        for label, took in ((OURS, seconds), (BY_HAND, slow), (WHOLE, whole)):
+        for label, took in ((OURS, seconds), (BY_HAND, slow), (WHOLE, complete)):
             rows.append(row(GROUP, label, what, took, took / seconds))
     return rows
 

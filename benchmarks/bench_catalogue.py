@@ -56,14 +56,14 @@ def pari(map_over: Any, steps: int, way: str = "") -> tuple[float, Pairs, str]:
     """One formulation by hand, or the quickest of some: its time, the last iterate, and what it is. Raises Absent."""
     start = ", ".join(map(str, START[: map_over.dim]))
     program = [*GP_STEPS, f"start = [{start}]~"]
-    rational, whole = [], []
+    rational, complete = [], []
     is_explicit = True
-    for k, one in enumerate(map_over.factors):
-        rows = [_integral(row) for row in one.equation.polynomials()]
+    for k, item in enumerate(map_over.factors):
+        rows = [_integral(row) for row in item.equation.polynomials()]
         matrix = ";".join(",".join(map(_written, row[:-1])) for row in rows)
         side = ",".join(_written(-row[-1]) for row in rows)
         program += [f"matrix{k}(x, z) = [{matrix}]", f"side{k}(x, z) = [{side}]~"]
-        whole.append(f"r = step(matrix{k}(r[1], r[2]), side{k}(r[1], r[2]), r[2])")
+        complete.append(f"r = step(matrix{k}(r[1], r[2]), side{k}(r[1], r[2]), r[2])")
         if all(i == j or entry.is_zero() for i, row in enumerate(rows) for j, entry in enumerate(row[:-1])):
             formulas = ",".join(f"({_written(-row[-1])})/({_written(row[i])})" for i, row in enumerate(rows))
             rational.append(f"x = subst_one((x, z) -> [{formulas}]~, x)")
@@ -74,19 +74,19 @@ def pari(map_over: Any, steps: int, way: str = "") -> tuple[float, Pairs, str]:
         "subst_one(f, x) = f(x, 1)",
         f"rational(N) = {{my(x = start); for(k = 1, N, {'; '.join(rational)}); x}}",
         "orbit(step, N) = {my(d = denominator(start), r = [start*d, d]);"
-        f" for(k = 1, N, {'; '.join(whole)}); r[1]/r[2]}}",
+        f" for(k = 1, N, {'; '.join(complete)}); r[1]/r[2]}}",
     ]
     ways = {"formulas on rationals" if is_explicit else "matsolve on rationals": f"rational({steps})"}
     ways |= {f"{name} on integers": f"orbit(by_{name[3:]}, {steps})" for name in ("matsolve", "matadjoint")}
     if map_over.dim % 2 == 0 and map_over.dim > 2:
         ways["elimination on integers"] = f"orbit(by_elimination, {steps})"
-    found = {}
+    result = {}
     for name, orbit in ways.items() if not way else ():
         try:
-            found[name] = gp_orbit(program, orbit, 0.0)
+            result[name] = gp_orbit(program, orbit, 0.0)
         except (RuntimeError, subprocess.CalledProcessError):  # pivots that are 0
             continue
-    way = way or min(found, key=lambda name: found[name][0])
+    way = way or min(result, key=lambda name: result[name][0])
     return *gp_orbit(program, ways[way], 1.0), way
 
 
@@ -110,9 +110,9 @@ def measure(quick: bool = False) -> list[Row]:
             say(f"  {name}: left out, its orbit ends or has short numbers")
             continue
         note = "" if orbit.relations is None else f"dimension {map_over.dim}, {orbit.relations}"
-        best, found = timed(partial(ours, map_over, steps), 1.0)
+        best, result = timed(partial(ours, map_over, steps), 1.0)
         seconds, expected = timed(partial(plain, map_over, steps), 1.0)
-        require_equal(PLAIN, expected, found)
+        require_equal(PLAIN, expected, result)
         work = f"{name}, N = {steps}, {bits:,} bits"
         rows += [row(GROUP, OURS, work, best, 1.0, note), row(GROUP, PLAIN, work, seconds, seconds / best)]
         say(f"  {work}: {seconds / best:.3g}")
@@ -121,7 +121,7 @@ def measure(quick: bool = False) -> list[Row]:
         except Absent as absent:
             say(f"  {absent}")
             continue
-        require_equal(PARI, expected, found)
+        require_equal(PARI, expected, result)
         rows.append(row(GROUP, PARI, work, seconds, seconds / best, way))
         say(f"    PARI: {seconds / best:.3g}, {way}")
         normal_form = system_normal_form(file.system) if file.is_quadratic else None
@@ -143,9 +143,9 @@ def _reached(map_over: Any, steps: int, bits: int) -> tuple[Orbit, int, int]:
 def _longer(name: str, map_over: Any, normal: SystemNormalForm | None, way: str) -> list[Row]:
     """A longer orbit, of a member of the family in normal form, against the quickest way of PARI."""
     _, steps, bits = _reached(map_over, LONG_STEPS, LONG_BITS)
-    best, found = timed(partial(ours, map_over, steps, normal), 1.0)
+    best, result = timed(partial(ours, map_over, steps, normal), 1.0)
     seconds, expected, _ = pari(map_over, steps, way)
-    require_equal(PARI, expected, found)
+    require_equal(PARI, expected, result)
     work = f"{name}, N = {steps}, {bits:,} bits"
     say(f"  {work}: PARI {seconds / best:.3g}")
     contestant = OURS if normal is None else NORMAL

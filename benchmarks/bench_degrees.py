@@ -38,8 +38,8 @@ PARI = "PARI/GP: matsolve over GF(p)(t), two lines"
 
 def ours(system: QuadraticSystem, n: int, patterns: Patterns | None = None) -> list[int]:
     """The degrees from d_0 = 1 to d_n."""
-    found = degree_growth(system, EPS, max_terms=n, effort=8, max_degree=10**6, patterns=patterns)
-    return list(found.degrees)
+    growth = degree_growth(system, EPS, max_terms=n, effort=8, max_degree=10**6, patterns=patterns)
+    return list(growth.degrees)
 
 
 LINES = (1, 2)
@@ -130,16 +130,16 @@ def measure(quick: bool = False) -> list[Row]:
         seconds, degrees = timed(partial(ours, system, n), most=3)
         what = f"{name}, n = {n}, d_n = {degrees[-1]}"
         rows.append(row(GROUP, OURS, what, seconds, 1.0))
-        alone, found = timed(partial(ours, system, n, patterns(system, fmpq(EPS))), most=3)
-        require_equal(ALONE, found, degrees)
+        alone, result = timed(partial(ours, system, n, patterns(system, fmpq(EPS))), most=3)
+        require_equal(ALONE, result, degrees)
         rows.append(row(GROUP, ALONE, what, alone, alone / seconds))
         for label, run in PEERS:
             try:
-                slow, found = run(system, n)
+                slow, result = run(system, n)
             except Absent as reason:
                 say(f"  {label}: left out, {reason}")
                 continue
-            require_equal(label, found, degrees)
+            require_equal(label, result, degrees)
             rows.append(row(GROUP, label, what, slow, slow / seconds))
             say(f"  {what}: {label} {slow / seconds:.3g}")
     return rows

@@ -397,12 +397,12 @@ def over_fields(quick: bool = False) -> list[Row]:
     for chi in UNSPLIT:
         field = with_chi(chi)
         base = with_chi(SPLIT[field.m])
-        split, whole = normal_reduced(base, steps)
+        split, complete = normal_reduced(base, steps)
         seconds, last = normal_reduced(field, steps)
         slow, expected = generic(field, steps)
         require_equal(chi, last, expected)
         split = min(split, normal_reduced(base, steps)[0])
-        digits, others = (max(len(entry.str()) for pair in found for entry in pair) for found in (last, whole))
+        digits, others = (max(len(entry.str()) for pair in item for entry in pair) for item in (last, complete))
         what = f"m = {base.m}, N = {steps}, chi = {chi}, "
         what += f"last iterate of up to {digits:,} digits in numerator and denominator"
         rows.append(

@@ -131,13 +131,13 @@ def _one_orbit(table: Table, library: Any, system: Any, form: Any, blocks: Any) 
 
     def by_us(kernel: str, form: Any, count: int) -> Callable[[], float]:
         def run() -> float:
-            one = FloatEnsemble(system, EPS, [start], form=form, kernel=kernel, threads=1)
-            one.advance(1)
-            return _timed(lambda: one.advance(count))
+            item = FloatEnsemble(system, EPS, [start], form=form, kernel=kernel, threads=1)
+            item.advance(1)
+            return _timed(lambda: item.advance(count))
 
-        one = FloatEnsemble(system, EPS, [start], form=form, kernel=kernel, threads=1)
-        one.advance(10)
-        _agree(one.x[0], expected, kernel)
+        item = FloatEnsemble(system, EPS, [start], form=form, kernel=kernel, threads=1)
+        item.advance(10)
+        _agree(item.x[0], expected, kernel)
         return run
 
     if library is None:
@@ -280,8 +280,8 @@ def _flow(table: Table, system: Any, form: Any) -> None:
             return Q @ x @ x
 
         def dop853() -> None:
-            found = solve_ivp(field, (0, grid[-1]), x0, "DOP853", t_eval=grid, rtol=1e-10, atol=1e-10)
-            if not found.success:
+            result = solve_ivp(field, (0, grid[-1]), x0, "DOP853", t_eval=grid, rtol=1e-10, atol=1e-10)
+            if not result.success:
                 raise SystemExit("DOP853 did not reach the end")
 
         table.add("scipy DOP853 at 1e-10", FLOW, points, lambda: _timed(dop853), "the flow, on the grid")

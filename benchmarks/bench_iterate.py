@@ -164,12 +164,12 @@ def on_elliptic_curves(n: int) -> list[Row]:
 def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
     """Iterates of three lengths; stepping up to `short`, where the results have to be equal."""
     slow, stepped = step_modulo(work, short)
-    seconds, found = iterate_modulo(work, short)
-    require_equal("nmod_mat.solve", stepped, found)
-    one = slow / short
+    seconds, result = iterate_modulo(work, short)
+    require_equal("nmod_mat.solve", stepped, result)
+    entry = slow / short
     what = f"m = {work.m}, n = {short:,}"
     rows = [
-        row(MODULO, JUMP, what, seconds, 1.0, f"as long as {seconds / one:.0f} single steps of nmod_mat.solve"),
+        row(MODULO, JUMP, what, seconds, 1.0, f"as long as {seconds / entry:.0f} single steps of nmod_mat.solve"),
         row(MODULO, "FLINT: stepping by nmod_mat.solve", what, slow, slow / seconds),
     ]
     for exponent in (6, 18, 30):
@@ -177,7 +177,7 @@ def modulo_a_prime(work: Work, short: int = 10**4) -> list[Row]:
         seconds, _ = iterate_modulo(work, n)
         what = f"m = {work.m}, n = 10^{exponent}"
         rows.append(
-            row(MODULO, JUMP, what, seconds, 1.0, f"as long as {seconds / one:.0f} single steps of nmod_mat.solve")
+            row(MODULO, JUMP, what, seconds, 1.0, f"as long as {seconds / entry:.0f} single steps of nmod_mat.solve")
         )
         try:
             curve = elliptic_curve_modulo(work, n)

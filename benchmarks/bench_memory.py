@@ -80,9 +80,9 @@ def measure(quick: bool = False) -> list[Row]:
             for size in sizes:
                 megabytes, seconds, note = run(Path(folder), size)
                 first = first or megabytes
-                told = f"{megabytes:.0f} MB, {note}"
-                rows.append(row(GROUP, f"{size:,} {unit}", name, seconds, megabytes / first, told))
-                say(f"  {name}, {size:,} {unit}: {told}")
+                messages = f"{megabytes:.0f} MB, {note}"
+                rows.append(row(GROUP, f"{size:,} {unit}", name, seconds, megabytes / first, messages))
+                say(f"  {name}, {size:,} {unit}: {messages}")
     return rows
 
 

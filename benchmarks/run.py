@@ -45,8 +45,8 @@ def machine() -> dict[str, Any]:
     """What the figures were taken with."""
     cpu = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
-    if info.exists() and (found := re.search(r"model name\s*:\s*(.+)", info.read_text(encoding="utf-8"))):
-        cpu = found.group(1)
+    if info.exists() and (result := re.search(r"model name\s*:\s*(.+)", info.read_text(encoding="utf-8"))):
+        cpu = result.group(1)
     versions = {"FLINT": flint.__FLINT_VERSION__}
     for package in PACKAGES:
         try:
@@ -150,10 +150,10 @@ def _multiplications(rows: list[Row]) -> float:
 
 def _slowest_process(rows: list[Row], dimension: int) -> float:
     here = [entry for entry in rows if entry["group"] == bench_analysis.PROCESSES]
-    found = [entry["seconds"] for entry in here if entry["contestant"].endswith(f"dimension {dimension}")]
-    if not found:
+    results = [entry["seconds"] for entry in here if entry["contestant"].endswith(f"dimension {dimension}")]
+    if not results:
         raise KeyError("processes")
-    return max(found)
+    return max(results)
 
 
 def _most_memory(rows: list[Row]) -> float:
@@ -250,16 +250,16 @@ CLAIMS: list[tuple[str, Callable[[list[Row]], float], str, float]] = [
 
 def claims(rows: list[Row]) -> list[tuple[str, str, str, bool]]:
     """Every claim with its bound, the figure found and whether it holds; those without a figure are missing."""
-    found = []
+    results = []
     for text, figure, how, bound in CLAIMS:
         try:
             value = figure(rows)
         except KeyError:
             continue
-        found.append(
+        results.append(
             (text, f"{how} {bound}", format_ratio(value), value >= bound if how == "at least" else value < bound)
         )
-    return found
+    return results
 
 
 # The page ------------------------------------------------------------------------------------------------------------
@@ -381,10 +381,10 @@ def page(record: dict[str, Any]) -> str:
     lines += ["## Measured with", ""]
     for part in PARTS:
         if part in record["parts"]:
-            told = record["parts"][part]["machine"]
-            versions = ", ".join(f"{name} {version}" for name, version in told["versions"].items())
+            messages = record["parts"][part]["machine"]
+            versions = ", ".join(f"{name} {version}" for name, version in messages["versions"].items())
             versions = versions.replace("PARI/GP gp", "PARI/GP").replace("PARI/GP cypari with PARI", "PARI/GP (cypari)")
-            lines.append(f"* {part}: {told['cpu']}; Python {told['python']}, {versions}; {told['date']}")
+            lines.append(f"* {part}: {messages['cpu']}; Python {messages['python']}, {versions}; {messages['date']}")
     return "\n".join(lines) + "\n"
 
 
@@ -404,10 +404,10 @@ def main() -> None:
         record = json.loads(RESULTS.read_text(encoding="utf-8"))
     rows: list[Row] = []
     for part in parts:
-        found = measured(part, options.quick)
-        rows += found
-        if found:
-            record["parts"][part] = {"machine": machine(), "rows": found}
+        result = measured(part, options.quick)
+        rows += result
+        if result:
+            record["parts"][part] = {"machine": machine(), "rows": result}
     print(table(rows))
     for text, bound, value, holds in claims(rows):
         print(f"{'holds ' if holds else 'MISSED'} {text}: {value}, claimed {bound}")

@@ -105,17 +105,17 @@ def counted_row(name: str, work: str, size: str, seconds: float, units: int) -> 
 def parts_of(name: str) -> Iterator[Row]:
     """A line for each part of `analyze` that takes some time."""
     before: dict[str, Any] = {"pending": None, "time": time.process_time(), "units": 0}
-    found: list[tuple[str, float, int]] = []
+    results: list[tuple[str, float, int]] = []
 
     def on_result(analysis: Analysis) -> None:
         now = time.process_time()
         if before["pending"] is not None:
             (part,) = set(before["pending"]) - set(analysis.pending)
-            found.append((part, now - before["time"], analysis.units - before["units"]))
+            results.append((part, now - before["time"], analysis.units - before["units"]))
         before.update(pending=list(analysis.pending), time=now, units=analysis.units)
 
     dim = analyze(load(name), on_result=on_result).dim
-    for part, seconds, units in found:
+    for part, seconds, units in results:
         if seconds >= LEAST:
             yield counted_row(part, PARTS.format(dim), name, seconds, units)
 

@@ -24,8 +24,8 @@ print(f"  and yet {gyrostat.integrals[0].verdict}: {gyrostat.integrals[0].text} 
 
 spring = km.parse_system('variables = ["q", "p"]\n[system]\nrhs = ["p", "-q + q^2"]')
 for eps in ("1", "1/2"):
-    found = km.find_integrals(spring, eps=eps)
-    print(f"q'' = -q + q^2 at eps = {eps}: independent integrals: {found.codimension}. {found.note}".rstrip())
+    search = km.find_integrals(spring, eps=eps)
+    print(f"q'' = -q + q^2 at eps = {eps}: independent integrals: {search.codimension}. {search.note}".rstrip())
 
 report = km.analyze(km.load("nahm_tetrahedral"))
 print(f"nahm_tetrahedral: {report.conclusion.kind}")

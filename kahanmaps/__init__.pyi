@@ -116,6 +116,7 @@ from .maps.implicit import ImplicitMap as ImplicitMap
 from .maps.implicit import MapFamily as MapFamily
 from .maps.kahan import KahanFamily as KahanFamily
 from .maps.kahan import KahanMap as KahanMap
+from .maps.normal_form.geometry import geometry as geometry
 from .maps.normal_form.iterate import NthIterate as NthIterate
 from .maps.normal_form.periods import orbit_period as orbit_period
 from .maps.normal_form.periods import period as period

@@ -1,7 +1,7 @@
 """Base classes of values that can be printed and displayed: `__str__`, `_repr_html_` and `_repr_latex_`.
 
 The files of kahanmaps.display register the text, HTML and LaTeX of each class, so that the classes themselves contain
-none of it. They are imported by name on first use: this is the only file that imports from a higher layer.
+none of these modules. They are imported by name on first use: this is the only file that imports from a higher layer.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
     try:
         pandas = import_module("pandas")
     except ImportError as error:
-        raise InputError(f"a table needs pandas ({error}): pip install pandas, or take rows()") from error
+        raise InputError(f"a table needs pandas ({error}): pip install pandas, or use rows()") from error
     return pandas.DataFrame(rows)
 
 

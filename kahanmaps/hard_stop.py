@@ -20,9 +20,9 @@ class TimeLimit(KeyboardInterrupt):
 
 @contextmanager
 def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
-    """Raise TimeLimit within the block after so many seconds; None means no limit.
+    """Raise TimeLimit within the block after this number of seconds; None means no limit.
 
-    Completed work is kept, and the running computation is lost. The block gets a function that tells whether the limit
+    Completed work is kept, and the running computation is lost. The block gets a function that says whether the limit
     has expired. Works in the main thread only, and not on Windows. Raises InputError elsewhere, and unless the time is
     positive.
 

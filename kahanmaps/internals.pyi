@@ -153,6 +153,7 @@ from .maps.floats.npy_file import NpyFile as NpyFile
 from .maps.kahan import KahanFamily as KahanFamily
 from .maps.normal_form.division import PeriodicLevels as PeriodicLevels
 from .maps.normal_form.division import text_in_gamma as text_in_gamma
+from .maps.normal_form.geometry import geometry_of as geometry_of
 from .maps.normal_form.periods import period_of as period_of
 from .maps.normal_form.planar_block import PlanarBlock as PlanarBlock
 from .maps.orbits.arithmetic import Arithmetic as Arithmetic

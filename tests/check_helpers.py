@@ -219,7 +219,7 @@ def verify_commute_witness(witness: Witness | None, f: QuadraticSystem, g: Quadr
 
 
 def commute_at(f: QuadraticSystem, g: QuadraticSystem, eps: Fraction, x: Sequence[Fraction]) -> bool | None:
-    """Whether the two maps commute at one point, None where one of them has no value."""
+    """Whether the two maps commute at one point, None if one of them is not defined there."""
     after_f, after_g = kahan_step(f, eps, x), kahan_step(g, eps, x)
     if after_f is None or after_g is None:
         return None
@@ -379,8 +379,8 @@ def written(identity):
 
 def differences(identity):
     """Numerator and denominator, in lowest terms, of the difference of the sides in each entry that differs."""
-    found = (left - right for left, right in written(identity))
-    return [lowest(difference) for difference in found if not difference.numerator.is_zero()]
+    results = (left - right for left, right in written(identity))
+    return [lowest(difference) for difference in results if not difference.numerator.is_zero()]
 
 
 def check(identity, *, differs=False):
@@ -390,9 +390,9 @@ def check(identity, *, differs=False):
     and coefficients by Gelfond's inequality, by which those of a factor are at most 2^degree times as large.
     """
     equation, poles = identity.bound
-    found = differences(identity)
-    assert bool(found) or not differs
-    for numerator, denominator in found:
+    result = differences(identity)
+    assert bool(result) or not differs
+    for numerator, denominator in result:
         assert true_size(numerator)[0] <= equation.degree
         assert true_size(numerator)[1] <= equation.bits + equation.degree
         assert sum(true_size(factor)[0] for factor, _ in denominator.factor_squarefree()[1]) <= poles

@@ -27,9 +27,9 @@ def _below(words: str, command: click.Command) -> Iterator[tuple[str, click.Comm
     if isinstance(command, click.Group):
         context = click.Context(command)
         for name in command.list_commands(context):
-            found = command.get_command(context, name)
-            assert found is not None
-            yield from _below(f"{words} {name}".strip(), found)
+            result = command.get_command(context, name)
+            assert result is not None
+            yield from _below(f"{words} {name}".strip(), result)
 
 
 def names_of(option: click.Option) -> list[str]:
@@ -51,8 +51,8 @@ def examples_in(text: str) -> list[str]:
 def all_examples() -> list[str]:
     """Every example in the help of every command, and in the first steps."""
     texts = [command.help or "" for _, command in all_commands()]
-    found = [example for text in [*texts, WELCOME] for example in examples_in(text)]
-    return list(dict.fromkeys(example for example in found if "--help" not in example))
+    results = [example for text in [*texts, WELCOME] for example in examples_in(text)]
+    return list(dict.fromkeys(example for example in results if "--help" not in example))
 
 
 def words_of(example: str) -> list[str]:

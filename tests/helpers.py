@@ -86,19 +86,19 @@ def systems(
     draw: Any, dims: Sequence[int] = (1, 2, 3), entries: st.SearchStrategy[Any] | None = None, homogeneous: bool = False
 ) -> QuadraticSystem:
     """Quadratic systems with every coefficient drawn from `entries` (small rationals unless given)."""
-    one = rationals(6) if entries is None else entries
+    entry = rationals(6) if entries is None else entries
     n = draw(st.sampled_from(dims))
     forms = []
     for _ in range(n):
         form = fmpq_mat(n, n)
         for j in range(n):
             for k in range(j, n):
-                form[j, k] = form[k, j] = fmpq(draw(one))
+                form[j, k] = form[k, j] = fmpq(draw(entry))
         forms.append(form)
     linear, constants = fmpq_mat(n, n), [fmpq(0)] * n
     if not homogeneous:
-        linear = fmpq_mat(n, n, [fmpq(draw(one)) for _ in range(n * n)])
-        constants = [fmpq(draw(one)) for _ in range(n)]
+        linear = fmpq_mat(n, n, [fmpq(draw(entry)) for _ in range(n * n)])
+        constants = [fmpq(draw(entry)) for _ in range(n)]
     return from_forms(tuple(f"x{i + 1}" for i in range(n)), forms, linear, constants)
 
 
@@ -118,8 +118,8 @@ def systems_with_points(
 @st.composite
 def matrices(draw: Any, rows: int, columns: int, entries: st.SearchStrategy[Any] | None = None) -> fmpq_mat:
     """Rational matrices of one size."""
-    one = rationals(9) if entries is None else entries
-    return fmpq_mat(rows, columns, [fmpq(draw(one)) for _ in range(rows * columns)])
+    entry = rationals(9) if entries is None else entries
+    return fmpq_mat(rows, columns, [fmpq(draw(entry)) for _ in range(rows * columns)])
 
 
 def random_point(dim: int, seed: int, height: int = 9) -> tuple[fmpq, ...]:
@@ -129,7 +129,7 @@ def random_point(dim: int, seed: int, height: int = 9) -> tuple[fmpq, ...]:
 
 
 def step_or_none(phi: KahanMap, x: Sequence[Any]) -> tuple[Any, ...] | None:
-    """The image of x, or None where the map has no value."""
+    """The image of x, or None where the map is not defined."""
     try:
         return phi.step(x)
     except SingularStep:
@@ -182,23 +182,23 @@ def together(names: str, cases: Iterable[Any]) -> Callable[[Callable[..., None]]
 
     As pytest.mark.parametrize, which makes a test of each case, and takes longer than such a case.
     """
-    wanted, rows = names.split(", "), list(cases)
+    expected, rows = names.split(", "), list(cases)
 
     def of_all(test: Callable[..., None]) -> Callable[..., None]:
         @wraps(test)
         def run(**fixtures: Any) -> None:
             wrong = []
             for row in rows:
-                values = row if len(wanted) > 1 else (row,)
+                values = row if len(expected) > 1 else (row,)
                 try:
-                    test(**fixtures, **dict(zip(wanted, values, strict=True)))
+                    test(**fixtures, **dict(zip(expected, values, strict=True)))
                 except (Exception, pytest.fail.Exception) as error:
                     wrong.append(f"{row!r:.300}\n    {type(error).__name__}: {error}")
             assert rows
             assert not wrong, f"{len(wrong)} of {len(rows)} cases\n" + "\n".join(wrong)
 
         own = signature(test)
-        left = [parameter for name, parameter in own.parameters.items() if name not in wanted]
+        left = [parameter for name, parameter in own.parameters.items() if name not in expected]
         run.__signature__ = own.replace(parameters=left)  # type: ignore[attr-defined]  # what pytest reads
         return run
 
@@ -207,14 +207,14 @@ def together(names: str, cases: Iterable[Any]) -> Callable[[Callable[..., None]]
 
 def table(path: Path) -> dict[str, list[str]]:
     """The lines of a text file below each of its headings `== NAME`, without remarks (`  # ...`) and empty lines."""
-    found: dict[str, list[str]] = {}
+    result: dict[str, list[str]] = {}
     for line in path.read_text(encoding="utf-8").splitlines():
         line = "" if line.startswith("# ") else line.partition("  # ")[0]
         if line.startswith("== "):
-            lines = found.setdefault(line.removeprefix("== "), [])
+            lines = result.setdefault(line.removeprefix("== "), [])
         elif line:
             lines.append(line)
-    return found
+    return result
 
 
 def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_mat:

@@ -67,21 +67,21 @@ class Question:
 
 def converted(language: str, file: km.SystemFile, **more: Any) -> tuple[str, list[Question]]:
     """A file with everything in it, and what to ask it."""
-    parts, asked = questions(file)
-    return convert(file, language, parts, **more), asked
+    parts, requested = questions(file)
+    return convert(file, language, parts, **more), requested
 
 
 def questions(file: km.SystemFile) -> tuple[list[str], list[Question]]:
     """The parts of a converted form that holds everything, and what to ask it."""
     draw = random.Random(5)
-    asked: list[Question] = []
+    requested: list[Question] = []
     x, eps = None, fmpq(1, draw.randint(5, 9))
     kahan = km.KahanMap(file.system, eps)
     while x is None or kahan.determinant(x) == 0 or kahan.inverse.determinant(x) == 0:
         x = tuple(fmpq(draw.randint(-9, 9), draw.randint(1, 4)) for _ in file.variables)
 
     def ask(function: str, values: Any) -> None:
-        asked.append(Question(function, x, eps, [fmpq(value) for value in values]))
+        requested.append(Question(function, x, eps, [fmpq(value) for value in values]))
 
     ask("kahan_map", kahan.step(x))
     ask("kahan_inverse", kahan.inverse_step(x))
@@ -107,7 +107,7 @@ def questions(file: km.SystemFile) -> tuple[list[str], list[Question]]:
     if file.system.dim <= 3:
         ask("kahan_map_formula", kahan.step(x))
         parts.append("map-formulas")
-    return parts, asked
+    return parts, requested
 
 
 _DRIVER = """

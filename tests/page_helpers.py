@@ -42,19 +42,19 @@ class Page(HTMLParser):
             self._open.append(tag)
 
     def handle_startendtag(self, tag, attrs):
-        found = dict(attrs)
+        results = dict(attrs)
         self.tags.append(tag)
-        self.ids += [found["id"]] if "id" in found else []
+        self.ids += [results["id"]] if "id" in results else []
         if tag == "html":
-            self.lang = found.get("lang")
+            self.lang = results.get("lang")
         if tag == "a":
-            self.links.append(found.get("href", ""))
+            self.links.append(results.get("href", ""))
         else:
-            self.fetched += [found[name] for name in ("href", "xlink:href") if name in found]
-        self.fetched += [found[name] for name in _FETCHING if name in found]
-        self.fetched += [name for name in found if name.startswith("on")]
+            self.fetched += [results[name] for name in ("href", "xlink:href") if name in results]
+        self.fetched += [results[name] for name in _FETCHING if name in results]
+        self.fetched += [name for name in results if name.startswith("on")]
         if tag == "math":
-            self.alttexts.append(found.get("alttext"))
+            self.alttexts.append(results.get("alttext"))
         if tag in ("h1", "h2", "h3", "h4"):
             self.headings.append((int(tag[1]), ""))
 
@@ -81,7 +81,7 @@ def require_sound(html: str) -> Page:
     assert page.lang == "en"
     assert "script" not in page.tags
     # Inside the page, or data in it: nothing is asked of a network.
-    assert [one for one in page.fetched if not one.startswith(("#", "data:"))] == []
+    assert [entry for entry in page.fetched if not entry.startswith(("#", "data:"))] == []
     assert [link for link in page.links if link.removeprefix("#") not in page.ids] == []
     assert len(page.ids) == len(set(page.ids)), "an id twice"
     assert [level for level, _ in page.headings].count(1) == 1

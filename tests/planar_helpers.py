@@ -193,9 +193,9 @@ def invertible(n: int, seed: int) -> fmpq_mat:
 def structure_and_system(name: str) -> tuple[Any, QuadraticSystem]:
     """The structure of a member of the table below and its system."""
     system, hamiltonian = MEMBERS[name]
-    found = system_normal_form(system, hamiltonian)
-    assert isinstance(found, SystemNormalForm)
-    return found, system
+    normal_form = system_normal_form(system, hamiltonian)
+    assert isinstance(normal_form, SystemNormalForm)
+    return normal_form, system
 
 
 def _plain(cubics: Sequence[Sequence[int]]) -> tuple[QuadraticSystem, CubicHamiltonian]:
@@ -265,8 +265,8 @@ START = tuple(fmpq(p, q) for p, q in ((1, 2), (-1, 3), (2, 5), (1, 1), (3, 4), (
 
 def over(name: str, eps: str = "3/11") -> Map:
     """The map of a system of the catalogue."""
-    found: Map = load(name).map.at(eps)
-    return found
+    result: Map = load(name).map.at(eps)
+    return result
 
 
 def begin(map_over: Map) -> IntegerPoint:

@@ -95,10 +95,10 @@ def values_on_orbits(
 
     An orbit ends at a pole of the map; where it starts at a pole of the formula, another takes its place.
     """
-    found: list[set[Fraction]] = []
+    results: list[set[Fraction]] = []
     for step in eps:
         kahan = KahanMap(file.system, step)
-        wanted = len(found) + starts
+        expected = len(results) + starts
         for x in islice(random_starts(file.system.dim, 5), 10 * starts):
             values = set()
             try:
@@ -107,9 +107,9 @@ def values_on_orbits(
                     x = kahan.step(x)
             except (SingularStep, ZeroDivisionError):
                 pass
-            if values and len(found) < wanted:
-                found.append(values)
-    return found
+            if values and len(results) < expected:
+                results.append(values)
+    return results
 
 
 def gradient(function: RationalFunction, map_: ModularMap, point: Sequence[int]) -> list[int]:
@@ -125,10 +125,10 @@ def gradient(function: RationalFunction, map_: ModularMap, point: Sequence[int])
     ]
 
 
-def ranks(found: Sequence[RationalFunction], known: Sequence[RationalFunction], map_: ModularMap) -> tuple[int, ...]:
+def ranks(result: Sequence[RationalFunction], known: Sequence[RationalFunction], map_: ModularMap) -> tuple[int, ...]:
     """The numbers of independent functions among those found, those known, and all of them."""
     point = map_.random_point()
-    rows = [[gradient(one, map_, point) for one in functions] for functions in (found, known)]
+    rows = [[gradient(entry, map_, point) for entry in functions] for functions in (result, known)]
     return rank(rows[0], map_.prime), rank(rows[1], map_.prime), rank([*rows[0], *rows[1]], map_.prime)
 
 
@@ -145,20 +145,22 @@ def polynomial_degrees(system: QuadraticSystem, count: int, seed: int, eps: Any 
     p, n = field.prime, system.dim
     eps = field.random(rng) if eps is None else field.convert(fmpq(*map(int, eps.split("/"))))
     local = system.over(field)
-    zero, one = nmod_poly([0], p), field.one
+    zero, item = nmod_poly([0], p), field.one
     X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(p)], p) for _ in range(n))]
-    found = []
+    results = []
     for _ in range(count):
         matrix = [
             [
-                X[0] * ((i == j) * one - eps * local.B[i, j])
+                X[0] * ((i == j) * item - eps * local.B[i, j])
                 - sum((X[k + 1] * (eps * local.tensor[i * n + j, k]) for k in range(n)), zero)
                 for j in range(n)
             ]
             for i in range(n)
         ]
         right = [
-            sum((X[j + 1] * ((i == j) * one + eps * local.B[i, j]) for j in range(n)), X[0] * (2 * eps * local.c[i, 0]))
+            sum(
+                (X[j + 1] * ((i == j) * item + eps * local.B[i, j]) for j in range(n)), X[0] * (2 * eps * local.c[i, 0])
+            )
             for i in range(n)
         ]
         image = [determinant(matrix)]
@@ -168,8 +170,8 @@ def polynomial_degrees(system: QuadraticSystem, count: int, seed: int, eps: Any 
         for entry in image[1:]:
             common = common.gcd(entry)
         X = [entry // common for entry in image]
-        found.append(max(entry.degree() for entry in X))
-    return found
+        results.append(max(entry.degree() for entry in X))
+    return results
 
 
 def by_formulas(variables: str, image: str) -> ImplicitMap:
@@ -224,35 +226,35 @@ def minimal_polynomial(text: str) -> fmpz_poly:
     return fmpz_poly([terms.get(k, 0) for k in range(max(terms) + 1)])
 
 
-def same_measures(found: Analysis, known: Value) -> bool:
+def same_measures(analysis: Analysis, known: Value) -> bool:
     """Whether every density found is the known one times an integral, modulo two primes at several points."""
-    for map_ in Laboratory(found.file).maps:
-        for one in found.densities.densities:
+    for map_ in Laboratory(analysis.file).maps:
+        for density in analysis.densities.densities:
             for x, image in map_.pairs(3):
                 a, b = known(map_, x), known(map_, image)
-                c, d = (at_residues(one.function, map_, point) for point in (x, image))
+                c, d = (at_residues(density.function, map_, point) for point in (x, image))
                 if a == 0 or c == 0 or (a * d - b * c) % map_.prime:
                     return False
     return True
 
 
-def differences(found: Analysis, answer: Answer, least_degrees: int = 5) -> set[str]:
+def differences(analysis: Analysis, answer: Answer, least_degrees: int = 5) -> set[str]:
     """In what an analysis contradicts the answer or falls short of it; so many degrees at least have to be compared."""
     wrong = set()
-    degrees = found.degrees.degrees[1:]
+    degrees = analysis.degrees.degrees[1:]
     common = min(len(degrees), len(answer.degrees))
     if answer.degrees and (
         common < min(least_degrees, len(answer.degrees)) or degrees[:common] != answer.degrees[:common]
     ):
         wrong.add("degrees")
-    conclusion = found.conclusion
+    conclusion = analysis.conclusion
     if answer.growth is not None and conclusion.growth != answer.growth:
         wrong.add("growth")
     if answer.verdict is not None and conclusion.kind not in (
         (answer.verdict, "linear") if answer.verdict == "linearisable" else (answer.verdict,)
     ):
         wrong.add("verdict")
-    rate = found.degrees.dynamical_degree  # None without a recurrence, and then there is nothing to compare
+    rate = analysis.degrees.dynamical_degree  # None without a recurrence, and then there is nothing to compare
     if (
         answer.dynamical_degree is not None
         and rate is not None
@@ -261,14 +263,14 @@ def differences(found: Analysis, answer: Answer, least_degrees: int = 5) -> set[
         wrong.add("dynamical degree")
     if answer.integrals is not None and conclusion.integrals != answer.integrals:
         wrong.add("count")
-    functions = [one.function for one in found.integrals.integrals]
-    number, _, together = ranks(functions, answer.formulas, Laboratory(found.file).maps[0])
+    functions = [integral.function for integral in analysis.integrals.integrals]
+    number, _, together = ranks(functions, answer.formulas, Laboratory(analysis.file).maps[0])
     if number != len(functions) or (answer.integrals is not None and together > answer.integrals):
         wrong.add("formulas")
-    if not all(one.verdict.holds for one in (*found.integrals.integrals, *found.densities.densities)):
+    if not all(entry.verdict.holds for entry in (*analysis.integrals.integrals, *analysis.densities.densities)):
         wrong.add("proofs")
-    if answer.density is not None and not (found.densities.densities and same_measures(found, answer.density)):
+    if answer.density is not None and not (analysis.densities.densities and same_measures(analysis, answer.density)):
         wrong.add("density")
-    if answer.without_density and found.densities.densities:
+    if answer.without_density and analysis.densities.densities:
         wrong.add("density")
     return wrong

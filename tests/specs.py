@@ -60,10 +60,10 @@ def member(m: int = 2, seed: int = 1, **recipe: Any) -> SystemFile:
     return system_from({"family": {"draw": "eigenvalues", "m": m, "seed": seed, **recipe}}, {}.__getitem__)
 
 
-def perform(name: str, system: SystemFile | None, **asked: Any) -> dict[str, Any]:
+def perform(name: str, system: SystemFile | None, **requested: Any) -> dict[str, Any]:
     """What a task gives, with the defaults of its kind for what is not asked; it has to be plain data."""
     kind = task_kind(name)
-    given = {key: value if key == "other" else kind.options[key].read(value) for key, value in asked.items()}
+    given = {key: value if key == "other" else kind.options[key].read(value) for key, value in requested.items()}
     result = kind.perform(system, {**kind.defaults, **given})
     assert json.loads(canonical(result)) == result
     return result

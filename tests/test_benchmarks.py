@@ -17,7 +17,7 @@ def _scripts(monkeypatch):
     """The scripts import each other by name, as they do when they are run."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     yield
-    for name in [one for one in sys.modules if one in ("work", "run") or one.startswith("bench_")]:
+    for name in [entry for entry in sys.modules if entry in ("work", "run") or entry.startswith("bench_")]:
         sys.modules.pop(name, None)
 
 

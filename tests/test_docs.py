@@ -41,29 +41,29 @@ def markdown_files() -> list[Path]:
 def pages() -> dict[str, str]:
     """The pages as Sphinx is given them, by name."""
     left_out = set(reference.api_pages_without_names(DOCS))
-    found = {}
+    result = {}
     for path in markdown_files():
         name = path.relative_to(ROOT).as_posix().removeprefix("docs/")
         if path.is_relative_to(DOCS) and name not in left_out:
             name = name.removesuffix(".md")
-            found[name] = expanded(name, path.read_text(encoding="utf-8"))
-    return found
+            result[name] = expanded(name, path.read_text(encoding="utf-8"))
+    return result
 
 
 def anchors(text: str) -> set[str]:
     """The anchors that a Git host gives the headings of a Markdown text, as MyST does."""
     without_blocks = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
-    found: set[str] = set()
+    results: set[str] = set()
     for heading in re.findall(r"^#+ (.+)$", without_blocks, re.MULTILINE):
         anchor = re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
-        found.add(anchor)
-    return found
+        results.add(anchor)
+    return results
 
 
 def broken_links(path: Path) -> list[str]:
     """The local links of a Markdown file that lead to no file, or to no heading of it."""
     text = path.read_text(encoding="utf-8")
-    found = []
+    results = []
     prose = "".join(piece for is_text, piece in outside_code(text) if is_text)
     for target in re.findall(r"\]\(([^)\s]+)\)", prose):
         if "://" in target:
@@ -71,8 +71,8 @@ def broken_links(path: Path) -> list[str]:
         file, _, anchor = target.partition("#")
         there = (path.parent / file).resolve() if file else path
         if not there.exists() or (anchor and anchor not in anchors(there.read_text(encoding="utf-8"))):
-            found.append(target)
-    return found
+            results.append(target)
+    return results
 
 
 @pytest.fixture(scope="module")

@@ -18,11 +18,11 @@ from kahanmaps.errors import (
 
 @pytest.mark.parametrize("text", ["x" * 200_000, "x " * 100_000, "x\n" * 200_000, "0" * 1001])
 def test_a_long_message_is_cut_and_its_length_is_reported(text):
-    found = bounded(f"found {text}, expected less")
-    assert len(found) < 1200
-    assert max(map(len, found.split("\n"))) <= 1000
-    assert found.startswith("found ")
-    assert "characters)" in found or "more lines" in found
+    result = bounded(f"found {text}, expected less")
+    assert len(result) < 1200
+    assert max(map(len, result.split("\n"))) <= 1000
+    assert result.startswith("found ")
+    assert "characters)" in result or "more lines" in result
 
 
 def test_every_error_is_bounded_and_what_can_be_read_is_left_alone():

@@ -64,21 +64,21 @@ def violations(path: str, source: str) -> list[str]:
     tree = parsed(source)
     module = path.removeprefix("cli/").removesuffix(".py").split("/")
     package = module[:-1]
-    found = []
+    results = []
     for line, target in _imports(tree.body, package):
-        found += [f"{path}:{line}: {what}" for what in _off_floor(module, target.split("."))]
+        results += [f"{path}:{line}: {what}" for what in _off_floor(module, target.split("."))]
         if target.split(".")[0] in CLOCKS and path.startswith("kahanmaps/") and not path.startswith(WITH_A_CLOCK):
-            found.append(f"{path}:{line}: reads a clock: answers would depend on the machine, count work instead")
+            results.append(f"{path}:{line}: reads a clock: answers would depend on the machine, count work instead")
     for line, target in _imports(tree.body, package, only_while_loading=True):
         top = target.split(".")[0]
         is_kernel = target.startswith(tuple(kernels.removesuffix(".py").replace("/", ".") for kernels in KERNELS))
         if is_kernel and path not in KERNELS:
-            found.append(f"{path}:{line}: imports {target} while it is loaded: import it inside the function")
+            results.append(f"{path}:{line}: imports {target} while it is loaded: import it inside the function")
         if top in NEVER_WHILE_LOADING and not (top in ("numba", "llvmlite") and path in KERNELS):
-            found.append(f"{path}:{line}: imports {top} while it is loaded: import it inside the function")
+            results.append(f"{path}:{line}: imports {top} while it is loaded: import it inside the function")
         if top == "numpy" and not path.startswith(NUMPY_WHILE_LOADING):
-            found.append(f"{path}:{line}: imports numpy while it is loaded: only {NUMPY_WHILE_LOADING} may")
-    return list(dict.fromkeys(found))
+            results.append(f"{path}:{line}: imports numpy while it is loaded: only {NUMPY_WHILE_LOADING} may")
+    return list(dict.fromkeys(results))
 
 
 def _off_floor(importer: list[str], target: list[str]) -> list[str]:
@@ -124,7 +124,7 @@ def _statements(body: list[ast.stmt], only_while_loading: bool = False) -> Itera
         if only_while_loading and isinstance(node, ast.If) and _is_type_checking(node.test):
             waiting += node.orelse
         else:
-            waiting += (one for part in _PARTS for one in getattr(node, part, ()))
+            waiting += (entry for part in _PARTS for entry in getattr(node, part, ()))
 
 
 def _is_type_checking(test: ast.expr) -> bool:
@@ -132,10 +132,10 @@ def _is_type_checking(test: ast.expr) -> bool:
 
 
 def test_every_file_imports_its_own_floor_and_those_below():
-    found = []
+    results = []
     for path in python_files():
-        found += violations(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
-    assert not found, "\n" + "\n".join(found)
+        results += violations(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
+    assert not results, "\n" + "\n".join(results)
 
 
 def circle(files: dict[str, str]) -> list[str]:
@@ -205,10 +205,10 @@ WRONG = [
 
 @pytest.mark.parametrize(("path", "source", "sentence"), WRONG)
 def test_a_file_that_breaks_the_rule_is_reported_with_its_line(path, source, sentence):
-    (found,) = violations(path, source)
-    assert sentence in found
+    (result,) = violations(path, source)
+    assert sentence in result
     line = next(number for number, text in enumerate(source.splitlines(), 1) if "import " in text)
-    assert found.startswith(f"{path}:{line}: ")
+    assert result.startswith(f"{path}:{line}: ")
 
 
 RIGHT = [

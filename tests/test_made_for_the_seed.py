@@ -36,18 +36,18 @@ def top(N: int) -> QuadraticSystem:
 def test_degrees_are_not_those_of_a_system_made_for_its_primes():
     N = 1
     for _ in range(ROUNDS):
-        found = degree_growth(top(N), max_terms=7)
-        assert found.degrees[:6] == (1, 3, 9, 23, 57, 139)
-        N = prod(found.primes)
+        growth = degree_growth(top(N), max_terms=7)
+        assert growth.degrees[:6] == (1, 3, 9, 23, 57, 139)
+        N = prod(growth.primes)
 
 
 def test_integrals_are_not_those_of_a_system_made_for_its_primes():
     N = 0
     counts = []
     for _ in range(ROUNDS + 1):
-        found = find_integrals(top(N), max_degree=2)
-        counts.append(len(found.integrals))
-        N = prod(found.primes)
+        search = find_integrals(top(N), max_degree=2)
+        counts.append(len(search.integrals))
+        N = prod(search.primes)
     assert counts == [2] + [1] * ROUNDS
 
 
@@ -64,16 +64,16 @@ def test_no_invariant_line_hides_parallel_to_the_line_that_was_drawn_for_another
     for _ in range(ROUNDS + 1):
         line, first = f"({a}*x + ({b})*y - 7)", "(y^2 + x + 1)"
         system = QuadraticSystem.from_text(["x", "y"], [first, f"({line}*(x + 1) - ({a})*{first})/({b})"])
-        found = affine_functions.affine_darboux(system)
-        assert [one.function.degrees() for one in found.functions] == [(1, 1)]
-        assert found.complete
+        polynomials = affine_functions.affine_darboux(system)
+        assert [entry.function.degrees() for entry in polynomials.functions] == [(1, 1)]
+        assert polynomials.complete
         a, b = directions[-1][1], -directions[-1][0]
 
 
 def primes_of(report) -> int:
     """The product of all primes at which the claims of a report were tried."""
-    evidence = [one for finding in report.findings for one in (finding.evidence, *finding.also)]
-    return prod(int(p) for one in evidence for p in one.data.get("primes", ()))
+    evidence = [entry for finding in report.findings for entry in (finding.evidence, *finding.also)]
+    return prod(int(p) for entry in evidence for p in entry.data.get("primes", ()))
 
 
 @pytest.mark.parametrize("seed", [0, 5])
@@ -121,7 +121,7 @@ def test_identities_that_differ_in_anything_have_points_of_their_own(kind):
 
 
 @pytest.mark.parametrize(
-    ("one", "other"),
+    ("first", "second"),
     [
         (("xy",), ("x", "y")),
         ((("x",), "y"), ("x", ("y",))),
@@ -132,8 +132,8 @@ def test_identities_that_differ_in_anything_have_points_of_their_own(kind):
         (([1, 2], 3), ([1], 2, 3)),
     ],
 )
-def test_subjects_that_differ_have_seeds_that_differ(one, other):
-    assert derive_seed(0, *one) != derive_seed(0, *other)
+def test_subjects_that_differ_have_seeds_that_differ(first, second):
+    assert derive_seed(0, *first) != derive_seed(0, *second)
 
 
 def test_a_subject_of_a_kind_whose_text_might_leave_something_out_is_refused():

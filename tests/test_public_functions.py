@@ -34,7 +34,7 @@ def test_all_that_stands_for_a_map_gives_the_same(path):
     for given in (file, file.system, file.map, "weierstrass", path, str(path), WEIERSTRASS, km.System(WEIERSTRASS)):
         assert km.degrees(given, max_terms=3).degrees == known
         if given is not file.map:
-            assert [one.text for one in km.find_density(given).densities] == ["12*x*eps^2 - 1"]
+            assert [density.text for density in km.find_density(given).densities] == ["12*x*eps^2 - 1"]
             assert km.fixed_points(given) == km.fixed_points(file.system)
 
 
@@ -175,8 +175,8 @@ def test_claims_are_text_or_expressions_by_name_or_without():
     for claim in (energy, str(energy), [energy], {"H": energy}):
         assert km.check_integrals(fish, claim).verdict is km.Certainty.REFUTED
         assert km.check_integrals(fish, claim, eps="1/5").verdict is km.Certainty.REFUTED
-    [found] = km.find_integrals(fish).integrals
-    for claim in (found.text, sympy.sympify(found.text), [found.text]):
+    [result] = km.find_integrals(fish).integrals
+    for claim in (result.text, sympy.sympify(result.text), [result.text]):
         assert km.check_integrals(fish, extra=claim).verdict is km.Certainty.PROVED
     assert [km.check_measure(PREY, phi).verdict.value for phi in (x * y, "x*y + 1")] == ["proved", "refuted"]
     canonical = sympy.Matrix([[0, x * y], [-x * y, 0]])
@@ -200,6 +200,7 @@ def test_orbits_go_over_every_field_that_has_numbers_to_print():
 EXPRESSIONS = """
 km.period("x' = 2*x*y; y' = -x^2 - y^2", [1, 2], "1/10").status
 km.period("paper_m2", [1, 2, 0, 1], time_step="1/5", prime=10007).period
+km.geometry("paper_m2", [1, 2, 3, 5], time_step="1/5").planes[0].rotations
 km.ensemble("henon_heiles", np.full((5, 4), 0.1), "1/20", 50, kernel="numpy").x
 km.ensemble("euler_top", [[1, 2, 3]], time_step="1/5", steps=3, kernel="numpy").x
 km.ensemble(system="euler_top", starts=[[1, 2, 3]], eps="1/10", steps=3, kernel="numpy").x

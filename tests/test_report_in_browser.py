@@ -53,9 +53,9 @@ def html():
 
 
 def test_nothing_is_fetched_and_nothing_complained_of(tmp_path, html):
-    dom, asked, console = dumped(tmp_path, html)
+    dom, requested, console = dumped(tmp_path, html)
     assert "How to make this page again" in dom
-    assert (asked, console) == ([], [])
+    assert (requested, console) == ([], [])
 
 
 # Once the page has loaded: what its cells say, and what they say after each of two sliders was moved.
@@ -79,8 +79,8 @@ def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
     _, _, (error,) = dumped(tmp_path, page.replace("</body>", MOVING))
     assert "violates the following Content Security Policy" in error, "the page runs its own script alone"
     without_policy = re.sub("<meta http-equiv=.*?/>", "", page)
-    dom, asked, console = dumped(tmp_path, without_policy.replace("</body>", MOVING))
-    assert (asked, console) == ([], [])
+    dom, requested, console = dumped(tmp_path, without_policy.replace("</body>", MOVING))
+    assert (requested, console) == ([], [])
     first, at_large_eps, elsewhere = json.loads(unescape(re.search("<title>(.*?)</title>", dom)[1]))
     assert first["status"].startswith("800 steps, 0 points outside")
     assert float(first["change0"]) < 1e-12

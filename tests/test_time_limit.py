@@ -72,19 +72,19 @@ def test_other_times_are_refused(seconds):
 def test_what_an_analysis_had_completed_stays_as_it_is():
     last = []
 
-    def on_result(found):
-        last[:] = [found]
-        if len(found.pending) < 12:
+    def on_result(result):
+        last[:] = [result]
+        if len(result.pending) < 12:
             busy()
 
     with pytest.raises(TimeLimit) as stop, time_limit(0.5):
         analyze(load("harmonic"), on_result=on_result)
-    (found,) = last
+    (result,) = last
     complete = analyze(load("harmonic"))
-    assert found.pending
-    done = [step for step in complete.analyses if step.name not in found.pending]
-    assert [step.to_json(found) for step in done] == [step.to_json(complete) for step in done]
-    pending = list(found.pending)
-    found.interrupt(str(stop.value))
-    assert found.skipped == [f"{part}: the time limit of 0.5 s is over" for part in pending]
-    assert (found.interrupted, found.pending) == (True, [])
+    assert result.pending
+    done = [step for step in complete.analyses if step.name not in result.pending]
+    assert [step.to_json(result) for step in done] == [step.to_json(complete) for step in done]
+    pending = list(result.pending)
+    result.interrupt(str(stop.value))
+    assert result.skipped == [f"{part}: the time limit of 0.5 s is over" for part in pending]
+    assert (result.interrupted, result.pending) == (True, [])

@@ -72,6 +72,6 @@ def test_a_pipe_gets_everything_at_the_end_and_stays_a_pipe(tmp_path):
     os.mkfifo(tmp_path / "p")
     reader = os.open(tmp_path / "p", os.O_RDONLY | os.O_NONBLOCK)
     write_atomically(tmp_path / "p", b"new")
-    found = os.read(reader, 100)
+    result = os.read(reader, 100)
     os.close(reader)
-    assert (found, (tmp_path / "p").is_fifo(), list(tmp_path.iterdir())) == (b"new", True, [tmp_path / "p"])
+    assert (result, (tmp_path / "p").is_fifo(), list(tmp_path.iterdir())) == (b"new", True, [tmp_path / "p"])

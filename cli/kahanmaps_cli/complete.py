@@ -1,6 +1,7 @@
 """Shell completion of systems and files.
 
-It must be fast, so it imports nothing that computes; errors are silent, since a traceback would spoil the command line.
+It must be fast, so it imports nothing that computes; errors are silent, since a traceback would disturb the command
+line.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ _MAX_STEP_DIGITS, _MAX_DIGITS = 40, 100  # of a step number, of any other intege
 
 
 class ParameterKind(OptionType):
-    """A type whose texts are converted by `read(text, *settings)`; an InputError of it becomes the message.
+    """A type whose texts are converted by `read(text, *settings)`; its InputError becomes the message.
 
     Non-string values are defaults and are returned unchanged.
     """
@@ -89,7 +89,7 @@ def Seconds() -> ParameterKind:
 
 
 def Steps() -> ParameterKind:
-    """Step numbers separated by commas."""
+    """Return the type of step numbers separated by commas."""
 
     def read(text: str) -> list[int]:
         steps = set()

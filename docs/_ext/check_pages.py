@@ -35,21 +35,21 @@ def mistakes(folder: Path) -> list[str]:
     """All links of the pages in a folder that lead nowhere, and what would come from the network."""
     folder = folder.resolve()
     pages = {path: Page(path.read_text(encoding="utf-8")) for path in sorted(folder.rglob("*.html"))}
-    found = [] if pages else [f"{folder} has no pages"]
+    result = [] if pages else [f"{folder} has no pages"]
     for path, page in pages.items():
         for tag, address in page.addresses:
             parts = urlsplit(address)
             said = f"{path.relative_to(folder)}: {address}"
             if parts.scheme or parts.netloc:
                 if tag not in VISITED and parts.scheme != "data":
-                    found.append(f"{said} has to be fetched")
+                    result.append(f"{said} has to be fetched")
                 continue
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
             if not target.is_file():
-                found.append(f"{said} is not there")
+                result.append(f"{said} is not there")
             elif parts.fragment and target in pages and unquote(parts.fragment) not in pages[target].anchors:
-                found.append(f"{said} is no place on that page")
-    return found
+                result.append(f"{said} is no place on that page")
+    return result
 
 
 if __name__ == "__main__":

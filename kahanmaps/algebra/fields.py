@@ -162,7 +162,8 @@ class Field(ABC):
 
 
 def operand(field: Field, value: Any) -> Any:
-    """Convert an operand of an operator to an element of `field`, or return None (for text, matrices and the like).
+    """Convert an operand of an operator to an element of `field`, or return None (for text, matrices and other
+    objects).
 
     Raises `InexactNumber` and `BadPrime` as `convert` does.
     """
@@ -359,7 +360,7 @@ class PrimeField(Field):
             text = format_number(number)
             text = text if len(text) <= 40 else f"{text[:20]}...{text[-20:]}"
             raise BadPrime(
-                f"the prime {self.prime} divides the denominator of {text}: take another prime", self.prime
+                f"the prime {self.prime} divides the denominator of {text}: use another prime", self.prime
             ) from None
 
     def random(self, rng: random.Random, height: int = 10) -> Any:
@@ -465,7 +466,7 @@ QQ = RationalField()
 def GF(prime: int) -> PrimeField:
     """The field of `prime` elements.
 
-    Raises InputError where the number is not a prime: FLINT would end the whole process on a composite modulus.
+    Raises InputError if the number is not a prime: FLINT would abort the process for a composite modulus.
 
     >>> GF(7).convert("1/3")
     5

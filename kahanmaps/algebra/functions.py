@@ -106,7 +106,7 @@ class FunctionField(Field):
         return left * right
 
     def pay(self, products: int) -> None:
-        """Charge so many products of terms to the budget. Raises BudgetExceeded if it is too small."""
+        """Charge this number of products of terms to the budget. Raises BudgetExceeded if it is too small."""
         self.budget -= products
         if self.budget < 0:
             raise BudgetExceeded(_TOO_MANY)

@@ -36,7 +36,7 @@ from kahanmaps.errors import BadPrime, InputError
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
 
 
-_UNLUCKY_PRIMES = 3  # after so many failures the black box counts as not rational
+_UNLUCKY_PRIMES = 3  # after this number of failures the black box counts as not rational
 _CONFIRMATIONS = (
     5  # values modulo a new prime each; a box like the Legendre symbol passes each one with probability 1/2
 )
@@ -173,7 +173,7 @@ class Quotient:
 class Reconstruction:
     """The result of `reconstruct`: the functions, or None and the reason.
 
-    `samples` is the number of calls of the black box, including calls without a value; `primes` are the primes used.
+    `samples` is the number of calls of the black box, including calls that give no value; `primes` are the primes used.
     """
 
     functions: tuple[RationalFunction, ...] | None
@@ -337,6 +337,8 @@ def _along_line(
         where.append(t)
         return tuple((a + (t - start) * d) % p for a, d in zip(anchor, direction, strict=True))
 
+    # Newton's form: a further point adds one term to each polynomial, so that points can be taken one by one until all
+    # fractions are determined. Their degrees are not known in advance.
     entries = range(len(values.values[0]))
     vanishing = nmod_poly([-start, 1], p)
     through = [nmod_poly([v], p) for v in values.values[0]]

@@ -27,6 +27,7 @@ def kernel_minors(
     >>> kernel_minors([[1, 2, None], [4, 5, None]])
     [None, None, -3]
     """
+    # Expansion along rows and no elimination: it needs no division and no decision whether an entry is zero.
     width = len(rows) + 1
     minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
     for row, layer in zip(rows[1:], _layers(width), strict=True):

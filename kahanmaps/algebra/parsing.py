@@ -77,8 +77,8 @@ def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
     seen = set()
     for name in names:
         if not is_name(name.rstrip("~") if iterates and isinstance(name, str) else name):
-            found = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
-            raise InputError(f"found {found}, expected a name: ASCII letters, digits and _, not starting with a digit")
+            given = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
+            raise InputError(f"found {given}, expected a name: ASCII letters, digits and _, not starting with a digit")
         if name in seen:
             raise InputError(f"found the name {quoted(name)} twice, expected distinct names")
         seen.add(name)
@@ -93,8 +93,8 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
     if start == end:
         raise ExpressionError(f"found nothing, {_EXPECTED}", text, start)
     if end - start > digits + 20:
-        found = f"found a number of {end - start} characters"
-        raise ExpressionError(f"{found}, expected at most {digits} digits", text, start)
+        given = f"found a number of {end - start} characters"
+        raise ExpressionError(f"{given}, expected at most {digits} digits", text, start)
     match = _NUMBER.fullmatch(text, start, end)
     if match is None or not (match[2] or match[4] or match[5]):
         prefix = _START_OF_NUMBER.match(text, start, end)
@@ -102,7 +102,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
         raise ExpressionError(f"found {quoted(text[start:end])}, {_EXPECTED}", text, column)
     sign, numerator, denominator, integer_part, fraction, power = match.groups()
     if max(len(numerator or ""), len(denominator or ""), len(integer_part or "") + len(fraction or "")) > digits:
-        raise ExpressionError(f"found a number of more than {digits} digits, expected at most so many", text, start)
+        raise ExpressionError(f"found a number of more than {digits} digits, expected at most {digits}", text, start)
     if denominator is not None:
         divisor = fmpz(denominator)
         if divisor == 0:
@@ -115,8 +115,8 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
             # Check the length first: Python's int() raises for more than 4300 digits.
             size = power.lstrip("+-").lstrip("0")
             if len(size) > 9 or int(size or "0") > limits.power_of_ten:
-                found = f"found the power of ten {quoted(power)}"
-                raise ExpressionError(f"{found}, expected at most {limits.power_of_ten} in size", text, match.start(6))
+                given = f"found the power of ten {quoted(power)}"
+                raise ExpressionError(f"{given}, expected at most {limits.power_of_ten} in size", text, match.start(6))
             shift += int(power)
         if shift:
             ten = fmpz(10) ** abs(shift)
@@ -172,8 +172,8 @@ def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLi
             return ()
         raise ExpressionError("found nothing, expected a point: numbers separated by commas, e.g. 1/2,-1/3,0", text)
     if dimension is not None and len(entries) != dimension:
-        found = "1 number" if len(entries) == 1 else f"{len(entries)} numbers"
-        raise ExpressionError(f"found {found}, expected {dimension}, separated by commas", text)
+        given = "1 number" if len(entries) == 1 else f"{len(entries)} numbers"
+        raise ExpressionError(f"found {given}, expected {dimension}, separated by commas", text)
     point = []
     for entry, (start, end) in enumerate(entries, 1):
         try:
@@ -348,10 +348,10 @@ def _tokens(text: str) -> Iterator[Token]:
         match = _TOKEN.match(text, column)
         if match is None:
             hint = _WRITE.get(text[column], "use numbers, names and + - * / ^ ( )")
-            found = repr(text[column])
+            given = repr(text[column])
             if not (text[column].isascii() and text[column].isprintable()):
-                found = f"U+{ord(text[column]):04X} {unicodedata.name(text[column], '')}".rstrip()
-            raise ExpressionError(f"found the character {found}, {hint}", text, column)
+                given = f"U+{ord(text[column]):04X} {unicodedata.name(text[column], '')}".rstrip()
+            raise ExpressionError(f"found the character {given}, {hint}", text, column)
         yield Token(match[0], match.lastgroup or match[0], column)
         column = match.end()
     yield Token("", _END, len(text))
@@ -462,8 +462,8 @@ def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
         call = f"found {quoted(operand + '(')}, which looks like a function call"
         return ExpressionError(f"{call}: only + - * / ^ are available, and products are written with *", text, start)
     example = f"{operand}*{token}" if len(operand) + len(token) < 40 else "x*y"
-    found = f"found {quoted(token)} right after {quoted(operand)}"
-    return ExpressionError(f"{found}, expected an operator between them: write {example}", text, column)
+    given = f"found {quoted(token)} right after {quoted(operand)}"
+    return ExpressionError(f"{given}, expected an operator between them: write {example}", text, column)
 
 
 class _Arithmetic:
@@ -572,8 +572,8 @@ class _Arithmetic:
             raise self.error_at("found an exponent with variables in it, expected an integer", column)
         if exponent.q != 1 or abs(exponent.p) > self.limits.exponent:
             bits = exponent.height_bits()
-            found = f"found the exponent {exponent if bits < 100 else f'of about {bits * 1000 // 3322} digits'}"
-            raise self.error_at(f"{found}, expected an integer of size at most {self.limits.exponent}", column)
+            given = f"found the exponent {exponent if bits < 100 else f'of about {bits * 1000 // 3322} digits'}"
+            raise self.error_at(f"{given}, expected an integer of size at most {self.limits.exponent}", column)
         n = int(exponent.p)
         if n < 0:
             base, n = self.reciprocal(base, column), -n
@@ -627,8 +627,8 @@ class _Arithmetic:
         self.check_bits(max(bits, _bits(left.scale) + _bits(right.scale)), column)
         bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
-            found = f"found a product of polynomials with {left.terms} and {right.terms} terms"
-            raise self.error_at(f"{found}, which is too large to expand", column)
+            given = f"found a product of polynomials with {left.terms} and {right.terms} terms"
+            raise self.error_at(f"{given}, which is too large to expand", column)
         self.spend(pairs, bits_of_pair, column)
         return self.counted(left.value * right.value, left.scale * right.scale, bits, column)
 
@@ -661,8 +661,8 @@ class _Arithmetic:
         if isinstance(value, fmpq):
             return self.constant(value).numerator
         if len(value) > self.limits.terms:
-            found = f"found a polynomial of {len(value)} terms"
-            raise self.error_at(f"{found}, expected at most {self.limits.terms}", column)
+            given = f"found a polynomial of {len(value)} terms"
+            raise self.error_at(f"{given}, expected at most {self.limits.terms}", column)
         return _Polynomial(value, scale, bits, len(value), int(value.total_degree()))
 
     def polynomial(self, value: _Polynomial) -> fmpq_mpoly:
@@ -671,15 +671,15 @@ class _Arithmetic:
 
     def check_bits(self, bits: int, column: int) -> None:
         if bits > self.max_bits:
-            found = f"found a number of about {bits * 1000 // 3322} digits"
-            raise self.error_at(f"{found}, expected at most {self.limits.digits}", column)
+            given = f"found a number of about {bits * 1000 // 3322} digits"
+            raise self.error_at(f"{given}, expected at most {self.limits.digits}", column)
 
     def check_degree(self, degree: int, what: str, column: int) -> None:
         if degree > self.limits.degree:
             raise self.error_at(f"found {what} of degree {degree}, expected at most {self.limits.degree}", column)
 
     def spend(self, terms: int, bits: int, column: int) -> None:
-        """Count the machine words of so many terms with coefficients of so many bits."""
+        """Count the machine words of `terms` terms with coefficients of this number of bits."""
         self.words_left -= terms * (bits // 64 + 1)
         if self.words_left < 0:
             raise self.error_at("found an expression that takes too much work to expand: simplify or split it", column)

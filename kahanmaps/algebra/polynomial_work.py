@@ -15,13 +15,13 @@ from kahanmaps.algebra.work import count
 
 
 def product_units(length: int, other: int) -> float:
-    """Return the units of a product of two polynomials, or of two series with so many terms."""
+    """Return the units of a product of two polynomials, or of two series with this number of terms."""
     short, long = (length, other) if length < other else (other, length)
     return 0.4 + long * (0.05 + min(short / 3000, 0.05 * short.bit_length()))
 
 
 def series_units(length: int) -> float:
-    """Return the units of the inverse of a series with so many terms, or of a quotient of two."""
+    """Return the units of the inverse of a series with this number of terms, or of a quotient of two."""
     return 0.5 + 2 * product_units(length, length)
 
 
@@ -31,7 +31,7 @@ def gcd_units(length: int, common: int = 0) -> float:
 
 
 def minpoly_units(length: int) -> float:
-    """Return the units of the shortest linear recurrence of so many terms."""
+    """Return the units of a search for the shortest linear recurrence of this number of terms."""
     return 3 + length * (1.2 + min(length / 100, 0.2 * sqrt(length)))
 
 

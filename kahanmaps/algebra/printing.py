@@ -177,7 +177,7 @@ def sides(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq) -> list[tup
 
 
 def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
-    """Return the first terms that fit into about so many characters, perhaps none; all of them if they fit.
+    """Return the first terms that fit into about this number of characters, perhaps none; all of them if they fit.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> first_terms(parse_polynomial("(x + y)^20", ["x", "y"]), 30)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from flint import fmpq, fmpz, fmpz_mat
 
 _MAX_TOGETHER = 7  # residues in one lattice: heights up to m^(7/8), where Wang's bound is m^(1/2)
-_SPARE_BITS = 4  # a common denominator must be so many bits shorter than for random residues
+_SPARE_BITS = 4  # bits by which a common denominator must be shorter than for random residues
 
 
 def random_prime(rng: random.Random, bits: int = 61) -> int:

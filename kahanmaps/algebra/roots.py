@@ -99,7 +99,7 @@ class Root:
         return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
     def real_approximation(self, bits: int = 256) -> fmpq:
-        """Return a rational approximation of the real root to so many bits."""
+        """Return a rational approximation of the real root to this number of bits."""
         middle = self._real(bits).mid()
         mantissa, exponent = middle.man_exp()
         return fmpq(mantissa) * fmpq(2) ** int(exponent)
@@ -112,7 +112,7 @@ class Root:
         residues = [int(field.convert(c)) for c in self.polynomial.coeffs()]
         roots = sorted(int(root) for root, _ in nmod_poly(residues, p).roots())
         if not roots:
-            raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: take another prime", p)
+            raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: use another prime", p)
         return roots
 
     @property
@@ -129,7 +129,7 @@ class Root:
             roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs have a weaker type
             real_roots: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
             if not real_roots:
-                raise InputError(f"a {self} is not real: take exact or mod:P arithmetic")
+                raise InputError(f"a {self} is not real: use exact or mod:P arithmetic")
             middle = arb(0 if near is None else near)
             first, *others = sorted(real_roots, key=lambda root: float(abs(root - middle)))
             if others and (near is None or not abs(first - middle) < abs(others[0] - middle)):  # a comparison of balls

@@ -322,6 +322,7 @@ class _Solver:
 
 def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
     """Return the factors of the equation whose factorization is best to branch on; None if no equation factors."""
+    # Factors of high degree lead to long branches: the least of the largest degrees decides, not the number of factors.
     products = []
     for p in equations:
         used = sum(e > 0 for e in p.degrees())

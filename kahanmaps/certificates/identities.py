@@ -204,7 +204,7 @@ def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmp
 
 
 def _at_numerators(entry: fmpq_mpoly, data: MapData, point: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-    """D times an entry of L at x~ = N/D; entries are of degree at most 1 in x~."""
+    """Return D times an entry of L at x~ = N/D; entries are of degree at most 1 in x~."""
     n, letters = data.dim, ring(data.names).gens()
     total = letters[0] * 0
     for exponents, coefficient in entry.terms():
@@ -217,7 +217,7 @@ def _at_numerators(entry: fmpq_mpoly, data: MapData, point: Sequence[fmpq_mpoly]
 
 
 def _coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Numerator and denominator in lowest terms, with integral coefficients, in `names`."""
+    """Return numerator and denominator in lowest terms, with integral coefficients, in `names`."""
     context = ring(names)
     P, Q = function.numerator, function.denominator
     if function.names != names:

@@ -54,7 +54,7 @@ class _Script:
         return polynomial_text(polynomial, letters)
 
     def expand(self, *further: str) -> str:
-        """The tactic that replaces all definitions by what they stand for, and proves an identity of polynomials."""
+        """Return the tactic that unfolds all definitions and proves an identity of polynomials."""
         return f"cbv delta [{' '.join((*further, *self.defined))}] beta; ring."
 
     def map(self) -> list[str]:
@@ -189,7 +189,7 @@ def rocq_certificate(
 
     Args:
         data: the map.
-        claims: what is proved, each in a section of its own.
+        claims: the statements to be proved, each in a section of its own.
         header: lines of the comment on top.
     """
     # Nothing in a comment may end it, or begin another one or a string.

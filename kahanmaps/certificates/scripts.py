@@ -108,7 +108,7 @@ def script_certificate(
     Args:
         to: GP, for `gp -q FILE`, or PYTHON, for SymPy.
         data: the map.
-        claims: what is checked.
+        claims: the statements to be checked.
         header: lines of the comment on top.
     """
     n = data.dim
@@ -137,7 +137,7 @@ def script_certificate(
         return total(" + ".join(pieces) or "0")
 
     def at_numerators(entry: fmpq_mpoly) -> str:
-        """D times an entry of L at x~ = N/D; it is of degree at most 1 in x~."""
+        """Return D times an entry of L at x~ = N/D; the entry is of degree at most 1 in x~."""
         names = [letters[name] for name in data.variables] + [f"N{k}" for k in range(n)]
         names += [letters[name] for name in data.names[n:]]
         pieces = []

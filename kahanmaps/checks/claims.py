@@ -34,7 +34,7 @@ class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
 
     @property
     def holds(self) -> bool | None:
-        """True, False, or None if it is not known."""
+        """Whether the claim holds; None if this is not known."""
         return {Certainty.REFUTED: False, Certainty.UNDECIDED: None, Certainty.NOTE: None}.get(self, True)
 
 
@@ -86,8 +86,8 @@ class Finding(HtmlDisplay, WithoutTruthValue):
     formula: str = ""
     source: str = ""
     control: bool = False
-    place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
-    applies: bool = True  # False: the claim is stated for generic input and this input is special; it does not count
+    place: Mapping[str, Any] = field(default_factory=dict)  # the place of the claim, as plain data
+    applies: bool = True  # False: the claim is for generic input and this input is special; its verdict does not count
 
     @property
     def holds(self) -> bool | None:
@@ -108,7 +108,7 @@ class Finding(HtmlDisplay, WithoutTruthValue):
             "witness": self.witness.to_json() if self.witness else None,
         }
         if self.also:
-            plain["also"] = [evidence.to_json() for evidence in self.also]
+            plain["further_evidence"] = [evidence.to_json() for evidence in self.also]
         if self.formula:
             plain["formula"] = self.formula
         if self.source:

@@ -8,7 +8,7 @@ degree/(p - 1), and p - 1 >= 2^62). Points where a denominator vanishes are draw
 below 1/2, the sum of both probabilities is doubled. Trials are independent, so the bounds multiply.
 Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
 
-A trial that fails refutes the identity; then a small rational point is sought at which both sides differ.
+A trial that fails refutes the identity; then a small rational point at which both sides differ is searched for.
 """
 
 from __future__ import annotations
@@ -59,11 +59,11 @@ class Identity:
     left_label: str = "left side"
     right_label: str = "right side"
     entries: tuple[str, ...] = ()  # names of the entries, if a witness should show only one that differs
-    scope: str = ""  # for what it is stated, as text, if eps alone does not say it
+    scope: str = ""  # the values for which it is stated, as text, if these are not only those of eps
     has_eps: bool = True  # whether the sides depend on eps
     # Whether it is an identity in eps x, up to powers of eps: it then holds for every eps if it holds for eps = 1.
     scales_with_eps: bool = False
-    no_value: str = "a denominator seems to vanish identically"  # the likely reason if it is defined nowhere
+    undefined_reason: str = "a denominator seems to vanish identically"  # the likely reason if it is defined nowhere
     root: Root | None = None  # the algebraic number in the coefficients, if any
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
@@ -180,7 +180,7 @@ class Decidable(Protocol):
     def where(self) -> str: ...
 
     @property
-    def no_value(self) -> str: ...
+    def undefined_reason(self) -> str: ...
 
     @property
     def bound(self) -> tuple[CoefficientSize, int]: ...
@@ -218,7 +218,7 @@ def decide(statement: Decidable, seed: int, error_bits: int = DEFAULT_ERROR_BITS
         undefined += 1
         if undefined > statement.max_failures:
             text = f"the {statement.name} is not defined at any of {undefined} random points over GF(p)"
-            return _undecided(f"{text}: {statement.no_value}", poles_met=undefined)
+            return _undecided(f"{text}: {statement.undefined_reason}", poles_met=undefined)
     else:
         return _undecided("no prime was found at which chi splits into distinct factors", points=0)
     if not is_bounded:

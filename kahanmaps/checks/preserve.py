@@ -58,10 +58,10 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
     if not isinstance(map_, KahanFamily):
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
     subject = (map_.subject, density.subject)
-    no_value = "the map seems to have no inverse, to be defined nowhere, or a denominator to vanish identically"
+    undefined_reason = "the map seems to have no inverse, to be defined nowhere, or a denominator to vanish identically"
     properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": subject}
     properties["scales_with_eps"] = map_.scales_with_eps and density.scales_with_eps
-    return Identity(map_.dim, sides, eps, *labels, no_value=no_value, **properties)
+    return Identity(map_.dim, sides, eps, *labels, undefined_reason=undefined_reason, **properties)
 
 
 def _image(kahan: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -169,7 +169,7 @@ def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | 
     labels = (labels[0].replace("P", tensor.name), labels[1].replace("P", tensor.name))
     subject, dim = (map_.subject, tensor.subject), n + len(map_.symbols)
     has_eps = map_.has_eps or tensor.has_eps
-    return Identity(dim, sides, eps, *labels, entries, has_eps=has_eps, no_value=_NO_TENSOR, subject=subject)
+    return Identity(dim, sides, eps, *labels, entries, has_eps=has_eps, undefined_reason=_NO_TENSOR, subject=subject)
 
 
 def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
@@ -185,7 +185,9 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
     )
     labels, dim = ("the cyclic sum", "what it should be"), n + len(tensor.symbols)
     subject = tensor.subject
-    return Identity(dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, no_value=_NO_TENSOR, subject=subject)
+    return Identity(
+        dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, undefined_reason=_NO_TENSOR, subject=subject
+    )
 
 
 def check_poisson(

@@ -74,7 +74,7 @@ class Settings:
 
     def cut_short(self, run: OrbitRun) -> bool:
         """Return whether an orbit that the user requested ended early."""
-        return self.orbit_is_requested and not run.end.is_whole
+        return self.orbit_is_requested and not run.end.is_complete
 
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
         """Return the data needed to reproduce the check, including the systems."""
@@ -183,7 +183,7 @@ def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
         text = f"could not be tried at any point of an orbit{at}"
     if poles:
         text += f", undefined at {poles}"
-    if not run.end.is_whole:
+    if not run.end.is_complete:
         text += f" ({run.end.message})"
     return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), None
 

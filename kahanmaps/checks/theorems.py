@@ -24,7 +24,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHOD = "hypotheses"
 PROVED = Certainty.PROVED
-# All rational associated systems: 128 for as many factors, and 8128 pairs of them.
+# Number of factors of chi up to which all rational associated systems are compared: 128 systems, 8128 pairs.
 MAX_FACTORS = 8
 
 
@@ -51,7 +51,7 @@ def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> 
 
 
 def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
-    """All rational associated systems; of more than 8 factors those with at most one minus sign, f_0 first."""
+    """Return rational associated systems, f_0 first; with more than 8 factors those with at most one minus sign."""
     count = len(member.factors)
     if count <= MAX_FACTORS:
         return list(member.associated())
@@ -211,7 +211,7 @@ def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:
 
 
 def _coefficients(system: QuadraticSystem) -> fmpq_mat:
-    """One row a component, one column a monomial of degree at most 2."""
+    """Return the coefficients: a row for each component, a column for each monomial of degree at most 2."""
     n = system.dim
     rows = []
     for i in range(n):

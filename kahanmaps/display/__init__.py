@@ -1,1 +1,1 @@
-"""How values look: LaTeX, HTML, lines of text. A file knows the values of the folder it is named for, or of several."""
+"""Display: LaTeX, HTML, lines of text. A file knows the values of the folder it is named for, or of several."""

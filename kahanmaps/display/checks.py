@@ -63,7 +63,7 @@ def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[t
         rows.append(("also", f"… and {len(finding.also) - limits.entries} more"))
     if finding.witness is not None:
         rows.append(("witness", _witness(finding.witness, limits)))
-    last = {**{word: finding.place.get(word) for word in ("misprint", "broken")}, "source": finding.source}
+    last = {**{word: finding.place.get(word) for word in ("misprint", "violation")}, "source": finding.source}
     return rows + [(word, _text(str(what), limits.text)) for word, what in last.items() if what]
 
 
@@ -113,7 +113,7 @@ def report_html(report: Report) -> str:
     chosen = list(report.findings)
     if len(chosen) > _MAX_CLAIMS:
         sections = sections_of(report.findings).items()
-        rows = [(_text(title or "claims"), _text(counts(found))) for title, found in sections]
+        rows = [(_text(title or "claims"), _text(counts(findings))) for title, findings in sections]
         pieces.append(markup.table(["section", "claims"], rows))
         chosen = [f for f in chosen if str(f.verdict) != "proved" and not f.control and f.applies]
     if chosen:

@@ -19,13 +19,13 @@ def store_html(store: Store) -> str:
         return markup.titled("database of results", f"<p>{markup.escape(error)}</p>")
     rows = [
         (
-            markup.escape(markup.shortened(one.name)),
-            str(one.tasks),
-            str(one.missing),
-            "<br/>".join(f"{count} {markup.escape(word)}" for word, count in sorted(one.outcomes.items())),
-            "<br/>".join(f"{count} {markup.verdict(word)}" for word, count in sorted(one.verdicts.items())),
+            markup.escape(markup.shortened(entry.name)),
+            str(entry.tasks),
+            str(entry.missing),
+            "<br/>".join(f"{count} {markup.escape(word)}" for word, count in sorted(entry.outcomes.items())),
+            "<br/>".join(f"{count} {markup.verdict(word)}" for word, count in sorted(entry.verdicts.items())),
         )
-        for one in status[:_ROWS]
+        for entry in status[:_ROWS]
     ]
     inside = markup.table(["experiment", "tasks", "missing", "outcomes", "verdicts"], rows)
     if len(status) > _ROWS:

@@ -105,136 +105,138 @@ def _text(text: str, width: int = _TEXT) -> str:
     return markup.escape(markup.shortened(text, width))
 
 
-# -- a whole analysis
+# -- complete analyses
 
 
-def analysis_title(found: Analysis) -> str:
+def analysis_title(analysis: Analysis) -> str:
     """The title of a report: the system, its dimension and parameters, and eps."""
-    step = eps_suffix(found.eps, found.file.map)
-    values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
-    formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
-    return f"{found.file.name}, dimension {found.dim}{values}{step}{formulas}"
+    step = eps_suffix(analysis.eps, analysis.file.map)
+    values = "".join(f", {name} = {value}" for name, value in analysis.file.parameters.items())
+    formulas = f"; formulas for every {', '.join(analysis.symbols)}" if analysis.symbols else ""
+    return f"{analysis.file.name}, dimension {analysis.dim}{values}{step}{formulas}"
 
 
-def analysis_head(found: Analysis) -> str:
+def analysis_head(analysis: Analysis) -> str:
     """The head of the report: the title, the equations, and the meaning of the words."""
-    return f"analyze: {analysis_title(found)}\n{found.file.map}\n{WORDS}"
+    return f"analyze: {analysis_title(analysis)}\n{analysis.file.map}\n{WORDS}"
 
 
 @text_form.register
-def analysis_text(found: Analysis) -> str:
-    """The whole report."""
-    lines = [analysis_head(found)]
-    for title, statements in found.sections:
+def analysis_text(analysis: Analysis) -> str:
+    """Return the complete report."""
+    lines = [analysis_head(analysis)]
+    for title, statements in analysis.sections:
         lines += ["", title, *(f"{line.status}\t{line.text}" for line in statements)]
-    return "\n".join([*lines, "", "verdict", f"{found.conclusion.kind}\t{found.conclusion.sentence}", found.work])
+    return "\n".join(
+        [*lines, "", "verdict", f"{analysis.conclusion.kind}\t{analysis.conclusion.sentence}", analysis.work]
+    )
 
 
 @html_form.register
-def analysis_html(found: Analysis) -> str:
+def analysis_html(analysis: Analysis) -> str:
     """The verdict first, then the statements."""
-    final = found.conclusion
-    statements = [(title, line) for title, lines in found.sections for line in lines]
+    final = analysis.conclusion
+    statements = [(title, line) for title, lines in analysis.sections for line in lines]
     rows = [(_text(title), markup.verdict(line.status), _text(line.text)) for title, line in statements[:_ROWS]]
     more = f"<p>… and {len(statements) - _ROWS} more statements</p>" if len(statements) > _ROWS else ""
     inside = [
-        f"<p>{map_html(found.file.map)}</p>",
+        f"<p>{map_html(analysis.file.map)}</p>",
         f"<p><strong>{_text(final.kind)}</strong>: {_text(final.sentence, 800)}</p>",
         markup.table(["", "known how", ""], rows) + more,
     ]
-    beside = ", ".join(filter(None, (f"dimension {found.dim}", eps_sentence(found.eps, found.file.map))))
-    return markup.titled(markup.shortened(found.file.name), "\n".join(inside), beside)
+    beside = ", ".join(filter(None, (f"dimension {analysis.dim}", eps_sentence(analysis.eps, analysis.file.map))))
+    return markup.titled(markup.shortened(analysis.file.name), "\n".join(inside), beside)
 
 
-# -- what is preserved
-
-
-@lines_of.register
-def _integrals(found: IntegralSearch) -> Iterator[Line]:
-    """Every formula with its verdict and evidence, then the reason why there are no more."""
-    return _formulas([(one.name, one, "") for one in found.integrals], (found.note, found.reason))
+# -- preserved structures
 
 
 @lines_of.register
-def _densities(found: DensitySearch) -> Iterator[Line]:
+def _integrals(search: IntegralSearch) -> Iterator[Line]:
+    """List each formula with its verdict and evidence, then the reason why there are no more."""
+    return _formulas([(integral.name, integral, "") for integral in search.integrals], (search.note, search.reason))
+
+
+@lines_of.register
+def _densities(search: DensitySearch) -> Iterator[Line]:
     """The formula with its verdict and evidence, then further densities, or the reason why there is none."""
-    return _formulas([("phi", one, "") for one in found.shown], (found.further, found.note, found.reason))
+    return _formulas([("phi", density, "") for density in search.shown], (search.further, search.note, search.reason))
 
 
 @lines_of.register
-def _tensors(found: PoissonSearch) -> Iterator[Line]:
-    """Every tensor with its verdict and properties, then the reason why there are no more."""
-    named = [(one.name, one, f"{one.statement}; ") for one in found.tensors]
-    return _formulas(named, (found.note, found.reason))
+def _tensors(search: PoissonSearch) -> Iterator[Line]:
+    """List each tensor with its verdict and properties, then the reason why there are no more."""
+    named = [(tensor.name, tensor, f"{tensor.statement}; ") for tensor in search.tensors]
+    return _formulas(named, (search.note, search.reason))
 
 
 def _formulas(named: Sequence[tuple[str, Any, str]], notes: Sequence[str]) -> Iterator[Line]:
-    for name, one, what in named:
-        is_tensor = hasattr(one, "tensor")
-        yield name, one.verdict, _brackets(one) if is_tensor else _formula(one.text, one.function, name)
-        yield "", f"{what}{one.evidence.summary}"
+    for name, result, what in named:
+        is_tensor = hasattr(result, "tensor")
+        yield name, result.verdict, _brackets(result) if is_tensor else _formula(result.text, result.function, name)
+        yield "", f"{what}{result.evidence.summary}"
     yield from (("note", text) for text in notes if text)
 
 
-def _brackets(one: Any) -> HtmlCell:
-    brackets = islice(one.tensor.brackets.items(), _ROWS)
+def _brackets(tensor: Any) -> HtmlCell:
+    brackets = islice(tensor.tensor.brackets.items(), _ROWS)
     return HtmlCell(
-        one.text, lambda: "<br/>".join(formula(entry, f"{{{a},{b}}}", CHARACTERS) for (a, b), entry in brackets)
+        tensor.text, lambda: "<br/>".join(formula(entry, f"{{{a},{b}}}", CHARACTERS) for (a, b), entry in brackets)
     )
 
 
 @lines_of.register
-def _darboux(found: DarbouxSearch) -> Iterator[Line]:
+def _darboux(search: DarbouxSearch) -> Iterator[Line]:
     """The law, the polynomials by cofactor, or that there are none."""
-    meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(found.cofactors) else ""
+    meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(search.cofactors) else ""
     law = f"P(x~) = C P(x){meaning}; spaces spanned by products left out"
-    yield ("P' = K P, irreducible; integrals left out" if found.flow else law,)
-    for space in found.spaces:
-        yield (f"{'K' if found.flow else 'C'} = {space.cofactor}",)
+    yield ("P' = K P, irreducible; integrals left out" if search.flow else law,)
+    for space in search.spaces:
+        yield (f"{'K' if search.flow else 'C'} = {space.cofactor}",)
         yield from (("", space.verdict, _polynomial(P)) for P in space.polynomials)
-    if found.reason:
-        yield "note", found.reason
-    elif not found.spaces:
-        yield (f"none of degree up to {found.degree}",)
+    if search.reason:
+        yield "note", search.reason
+    elif not search.spaces:
+        yield (f"none of degree up to {search.degree}",)
 
 
 @lines_of.register
-def _structures(found: ConstantStructures) -> Iterator[Line]:
+def _structures(structures: ConstantStructures) -> Iterator[Line]:
     """The Hamiltonian form, or why there is none."""
-    if found.hamiltonian is None:
-        yield (f"not Hamiltonian with a constant J: {found.reason}",)
+    if structures.hamiltonian is None:
+        yield (f"not Hamiltonian with a constant J: {structures.reason}",)
         return
-    yield "H", _polynomial(found.hamiltonian.H)
-    yield "J", found.hamiltonian.J.tolist()
-    yield from (("Casimir", _polynomial(casimir)) for casimir in found.casimirs)
+    yield "H", _polynomial(structures.hamiltonian.H)
+    yield "J", structures.hamiltonian.J.tolist()
+    yield from (("Casimir", _polynomial(casimir)) for casimir in structures.casimirs)
 
 
 # -- growth and singularities
 
 
 @lines_of.register
-def _growth(found: DegreeGrowth | Scan) -> Iterator[Line]:
+def _growth(growth: DegreeGrowth | Scan) -> Iterator[Line]:
     """The lines of its `text`."""
-    return (line.split("\t") for line in found.text.split("\n"))
+    return (line.split("\t") for line in growth.text.split("\n"))
 
 
 @lines_of.register
-def _heights(found: HeightSurvey) -> Iterator[Line]:
+def _heights(survey: HeightSurvey) -> Iterator[Line]:
     """A line for each orbit, and the conclusion from all of them."""
-    for orbit in found.orbits:
+    for orbit in survey.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
-        yield "orbit", *([f"eps {orbit.eps}"] if found.has_eps else []), f"start {point}", orbit.growth.text
-    yield "heights", found.text
+        yield "orbit", *([f"eps {orbit.eps}"] if survey.has_eps else []), f"start {point}", orbit.growth.text
+    yield "heights", survey.text
 
 
 @lines_of.register
 def _census(census: Census) -> Iterator[Line]:
     """The counts, and the longest cycles."""
-    if not census.looked_at:
+    if not census.examined:
         yield "points", census.points
         yield "stopped", "time limit, before the images of all points were known"
         return
-    yield "points", str(census.points) if census.complete else f"{census.points}, sampled {census.looked_at}"
+    yield "points", str(census.points) if census.complete else f"{census.points}, sampled {census.examined}"
     yield "indeterminate", census.indeterminate
     yield "pre-indeterminate", census.pre_indeterminate
     if census.complete:
@@ -258,20 +260,22 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
     if run.word is not None:
         yield (f"# {run.word.text}",)
     yield "denominator", run.denominator
-    for found in run.hypersurfaces:
-        kind = f"degree {found.degree}" + (", factor of the denominator" if found.is_pole else "")
-        kind += " in all" if found.polynomial == "?" else ""
-        kind += "" if found.stage is None else f", of map {found.stage + 1}"
-        outcome = found.status + (f": {found.note}" if found.note else "")
-        if found.status in ("confined", "not confined"):
-            end = f"confined after {found.confined_at} steps"
-            if found.status == "not confined":
-                end = f"not confined within {found.followed} steps"
-            outcome = f"contracted by step {found.contracted_at}, {end}"
-        yield found.polynomial, kind, outcome
-        if found.steps:
-            ranks = " ".join(str(step.rank) for step in found.steps)
-            poles = " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
+    for hypersurface in run.hypersurfaces:
+        kind = f"degree {hypersurface.degree}" + (
+            ", factor of the denominator" if hypersurface.divides_denominator else ""
+        )
+        kind += " in all" if hypersurface.polynomial == "?" else ""
+        kind += "" if hypersurface.stage is None else f", of map {hypersurface.stage + 1}"
+        outcome = hypersurface.status + (f": {hypersurface.note}" if hypersurface.note else "")
+        if hypersurface.status in ("confined", "not confined"):
+            end = f"confined after {hypersurface.confined_at} steps"
+            if hypersurface.status == "not confined":
+                end = f"not confined within {hypersurface.followed} steps"
+            outcome = f"contracted by step {hypersurface.contracted_at}, {end}"
+        yield hypersurface.polynomial, kind, outcome
+        if hypersurface.steps:
+            ranks = " ".join(str(step.rank) for step in hypersurface.steps)
+            poles = " ".join("?" if step.pole is None else str(step.pole) for step in hypersurface.steps)
             yield f"  ranks {ranks}", f"pole orders {poles}"
 
 
@@ -279,59 +283,60 @@ def _singularities(run: SingularityRun) -> Iterator[Line]:
 
 
 @lines_of.register
-def _symmetries(found: Symmetries) -> Iterator[Line]:
+def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
     """One-parameter groups, a scaling, the finite group by its generators, and the completed searches."""
-    for x in found.infinitesimal:
+    for x in symmetries.infinitesimal:
         kind = "linear" if x.is_linear else "affine"
         yield "one-parameter group", f"{kind}, the flow of ({', '.join(x.rhs)})"
-    if found.scaling is not None:
-        rhs = ", ".join(found.scaling.rhs)
+    if symmetries.scaling is not None:
+        rhs = ", ".join(symmetries.scaling.rhs)
         yield "scaling", f"the flow of ({rhs}) by t takes the map at eps to that at e^-t eps"
-    if found.order is not None:
-        yield "group", found.group_text or "only the identity"
-    elements = [("generator", t) for t in found.generators]
-    elements += [("further", t) for t in found.others if found.group_of != MATRICES]
+    if symmetries.order is not None:
+        yield "group", symmetries.group_text or "only the identity"
+    elements = [("generator", t) for t in symmetries.generators]
+    elements += [("further", t) for t in symmetries.others if symmetries.group_of != MATRICES]
     for name, t in elements:
         yield name, f"{t.kind} {t.text}", *["trivial"] * t.is_trivial
-    yield from (("searched", sentence) for sentence in found.searched)
-    yield (f"# {'complete: every search was completed' if found.complete else f'undecided: {found.undecided[0]}'}",)
+    yield from (("searched", sentence) for sentence in symmetries.searched)
+    end = "complete: every search was completed"
+    yield (f"# {end if symmetries.complete else f'undecided: {symmetries.undecided[0]}'}",)
 
 
 @lines_of.register
-def _commuting(found: CommutingSystems) -> Iterator[Line]:
+def _commuting(systems: CommutingSystems) -> Iterator[Line]:
     """The g that commute, except 0, f and -f, each written as options of a command."""
-    if found.dimension is not None:
-        yield "bracket", f"the g with [f, g] = 0 have dimension {found.dimension}"
-    if found.every_g_commutes:
+    if systems.dimension is not None:
+        yield "bracket", f"the g with [f, g] = 0 have dimension {systems.dimension}"
+    if systems.every_g_commutes:
         yield "proved", "f = 0 and its map is x -> x: every g commutes"
     listed: list[QuadraticSystem] = []
-    for g in found.nontrivial:
+    for g in systems.nontrivial:
         if g.system.scaled(-1) not in listed:
             listed.append(g.system)
-            yield g.finding.verdict, "g and -g", _as_options(g, found.root)
+            yield g.finding.verdict, "g and -g", _as_options(g, systems.root)
             yield "", g.finding.evidence.summary
-    for family in found.families:
+    for family in systems.families:
         letters = [f"t{k + 1}" for k in range(len(family.directions))]
         base = "" if family.base.trivial == "0" else "base + "
         total = " + ".join(f"{t}*g{k + 1}" for k, t in enumerate(letters))
         yield family.finding.verdict, "family", f"g = {base}{total} for all {', '.join(letters)}"
         named = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
-        yield from (("", name, _as_options(g, found.root)) for name, g in named)
+        yield from (("", name, _as_options(g, systems.root)) for name, g in named)
         yield "", family.finding.evidence.summary
-    if found.irrational:
-        yield "note", f"more solutions, not rational: {'; '.join(found.irrational)}"
-    if found.note:
-        yield "note", found.note
-    if found.discarded:
-        yield "note", f"{found.discarded} solutions of the equations up to eps^{found.order} do not commute"
-    if found.every_g_commutes:
+    if systems.irrational:
+        yield "note", f"more solutions, not rational: {'; '.join(systems.irrational)}"
+    if systems.note:
+        yield "note", systems.note
+    if systems.discarded:
+        yield "note", f"{systems.discarded} solutions of the equations up to eps^{systems.order} do not commute"
+    if systems.every_g_commutes:
         yield ("# complete: every g commutes",)
-    elif found.complete:
-        has_others = bool(listed or found.families or found.irrational)
+    elif systems.complete:
+        has_others = bool(listed or systems.families or systems.irrational)
         which = "these, 0, f and -f" if has_others else "0, f and -f"
-        yield (f"# complete: among the {found.kind_text} only {which} commute with f",)
+        yield (f"# complete: among the {systems.kind_text} only {which} commute with f",)
     else:
-        yield (f"# undecided: there may be more; {found.undecided[0]}",)
+        yield (f"# undecided: there may be more; {systems.undecided[0]}",)
 
 
 def _as_options(g: CommutingField, root: str) -> HtmlCell:
@@ -349,29 +354,29 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 # -- titles
 
 
-def _about(what: str, found: Any, *subtitle: str) -> tuple[str, str]:
+def _about(what: str, result: Any, *subtitle: str) -> tuple[str, str]:
     """A title with the name of the system, and a subtitle that ends with eps."""
-    words = (*subtitle, eps_sentence(found.eps, found.file.map))
-    return f"{what} of {markup.shortened(found.file.name)}", "; ".join(filter(None, words))
+    words = (*subtitle, eps_sentence(result.eps, result.file.map))
+    return f"{what} of {markup.shortened(result.file.name)}", "; ".join(filter(None, words))
 
 
 # Titles and subtitles of the results that are displayed by their lines.
 _TITLES: dict[type, Callable[[Any], tuple[str, str]]] = {
-    IntegralSearch: lambda found: _about("integrals", found, f"{found.formula_count} found; {found.count_text}"),
-    DensitySearch: lambda found: _about("densities", found, "dx/phi is invariant"),
-    PoissonSearch: lambda found: _about("Poisson tensors", found),
-    DarbouxSearch: lambda found: _about("Darboux polynomials", found, f"by cofactor, up to degree {found.degree}"),
-    ConstantStructures: lambda found: (
-        "Hamiltonian with a constant J" if found.hamiltonian else "not Hamiltonian with a constant J",
-        "proved" if found.proved or found.hamiltonian else "undecided",
+    IntegralSearch: lambda result: _about("integrals", result, f"{result.formula_count} found; {result.count_text}"),
+    DensitySearch: lambda result: _about("densities", result, "dx/phi is invariant"),
+    PoissonSearch: lambda result: _about("Poisson tensors", result),
+    DarbouxSearch: lambda result: _about("Darboux polynomials", result, f"by cofactor, up to degree {result.degree}"),
+    ConstantStructures: lambda result: (
+        "Hamiltonian with a constant J" if result.hamiltonian else "not Hamiltonian with a constant J",
+        "proved" if result.proved or result.hamiltonian else "undecided",
     ),
-    DegreeGrowth: lambda found: ("degrees of the iterates", f"measured, {eps_sentence(found.eps)}"),
-    Scan: lambda found: _about("scan", found, f"over {', '.join(found.over)}"),
-    HeightSurvey: lambda found: ("heights of exact orbits", "the time step is 2 eps" if found.has_eps else ""),
-    Census: lambda found: (f"cycles on P^{found.dim} over GF({found.prime})", eps_sentence(found.eps)),
-    SingularityRun: lambda found: (f"singularities: {found.text}", eps_sentence(found.eps)),
-    Symmetries: lambda found: ("affine symmetries of the map", "proved, for every eps"),
-    CommutingSystems: lambda found: ("systems x' = g(x) whose Kahan maps commute", f"{found.shape} g, every eps"),
+    DegreeGrowth: lambda result: ("degrees of the iterates", f"measured, {eps_sentence(result.eps)}"),
+    Scan: lambda result: _about("scan", result, f"over {', '.join(result.over)}"),
+    HeightSurvey: lambda result: ("heights of exact orbits", "the time step is 2 eps" if result.has_eps else ""),
+    Census: lambda result: (f"cycles on P^{result.dim} over GF({result.prime})", eps_sentence(result.eps)),
+    SingularityRun: lambda result: (f"singularities: {result.text}", eps_sentence(result.eps)),
+    Symmetries: lambda result: ("affine symmetries of the map", "proved, for every eps"),
+    CommutingSystems: lambda result: ("systems x' = g(x) whose Kahan maps commute", f"{result.shape} g, every eps"),
 }
 for _kind in _TITLES:
     text_form.register(_kind, result_text)

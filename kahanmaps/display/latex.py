@@ -99,7 +99,8 @@ def latex_rational_function(function: RationalFunction) -> str:
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
-    r"""Return a polynomial as LaTeX, or its beginning and number of terms beyond about so many characters.
+    r"""Return a polynomial as LaTeX, or its beginning and number of terms if it has more than about this number of
+    characters.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))
@@ -155,7 +156,7 @@ LATEX = Notation(
 )
 
 
-# A formula of at most so many characters of plain text is one piece, which fits on a phone.
+# A formula with at most this number of characters of plain text is not broken: it fits on a phone.
 _ONE_PIECE = 32
 _FLAT = replace(LATEX, enclosed="({})".format, fraction="({}) / ({})".format)
 

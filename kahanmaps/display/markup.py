@@ -1,7 +1,7 @@
 """HTML elements shared by notebooks and reports, as well-formed XML with reproducible bytes.
 
 They set neither background nor font, so that they fit into light and dark pages. Words such as *proved* have a symbol
-besides their color, so that the color is not needed to tell them apart.
+besides their color, so that they can be distinguished without colors.
 """
 
 from __future__ import annotations

@@ -30,6 +30,7 @@ from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import ImplicitMap, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap
+from kahanmaps.maps.normal_form.geometry import LevelGeometry
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -64,7 +65,7 @@ def map_html(map_: MapFamily) -> str:
 
 
 def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS, most: int = _EQUATIONS) -> str:
-    """Return at most `most` equations as HTML, each cut after about so many characters."""
+    """Return at most `most` equations as HTML, each cut after about this number of characters."""
     shown = equations(system.variables[:most], system.rhs[:most], characters)
     return shown if system.dim <= most else f"{shown}<br/>\n… ({system.dim} equations)"
 
@@ -230,23 +231,40 @@ def _cells(point: OrbitPoint, count: int) -> list[str]:
 
 
 @html_form.register
-def period_html(found: OrbitPeriod) -> str:
+def period_html(period: OrbitPeriod) -> str:
     """Return the period of an orbit and those in its planes."""
-    sentence, *planes = found.text.split("\n")
+    sentence, *planes = period.text.split("\n")
     inside = markup.listed(markup.escape(markup.shortened(line, 200)) for line in planes[:20])
     return markup.titled(markup.shortened(sentence, 200), inside)
 
 
 @text_form.register
-def period_text(found: OrbitPeriod) -> str:
+def period_text(period: OrbitPeriod) -> str:
     """Return the period, those in the planes, and whether the orbit meets a pole."""
-    lines = [f"period\t{_period_word(found)}"]
-    for plane in found.planes:
+    lines = [f"period\t{_period_word(period)}"]
+    for plane in period.planes:
         cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]
         lines.append("\t".join(cells).rstrip())
     poles = {True: "the orbit meets one", False: "the orbit meets none", None: "not known whether the orbit meets one"}
-    return "\n".join([*lines, f"poles\t{poles[found.meets_pole]}", f"# {found.status}: {found.text.splitlines()[0]}"])
+    return "\n".join(
+        [*lines, f"poles\t{poles[period.meets_pole]}", f"# {period.status}: {period.text.splitlines()[0]}"]
+    )
 
 
-def _period_word(found: OrbitPeriod | PlanePeriod) -> str:
-    return "none" if found.status == "aperiodic" else found.status if found.period is None else str(found.period)
+def _period_word(period: OrbitPeriod | PlanePeriod) -> str:
+    return "none" if period.status == "aperiodic" else period.status if period.period is None else str(period.period)
+
+
+@text_form.register
+def geometry_text(geometry: LevelGeometry) -> str:
+    """Return the curves, translations and rotation numbers in the planes of an orbit."""
+    return geometry.text
+
+
+@html_form.register
+def geometry_html(geometry: LevelGeometry) -> str:
+    """Return the same as a list."""
+    lines = (
+        markup.escape(markup.shortened(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
+    )
+    return markup.titled("geometry of the level set", markup.listed(lines))

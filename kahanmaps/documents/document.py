@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 _LONGEST_NAME = 1000
 _MAX_FACTORS = 64  # of a composition, those of its parts counted too
-_STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where a rational one shows mistakes as well
+_STAND_IN = fmpq(1000003, 7)  # replaces an algebraic number where a rational one reveals the same mistakes
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
@@ -90,7 +90,7 @@ class DocumentReader(PartReader):
         stem = Path(self.where).stem if self.where.endswith((".toml", ".ode")) else self.where
         name = self.document.get("name", "".join(c if c.isprintable() else "_" for c in stem))
         if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
-            # It stands in the first line of many outputs, where nothing may break the line or color the terminal.
+            # The name is in the first line of many outputs: it may contain no line ends and no escape sequences.
             self._mistake(
                 "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
             )
@@ -233,7 +233,7 @@ class DocumentReader(PartReader):
                 written = "\nan algebraic number is written: root of t^2 - 2"
                 hint = written if isinstance(given, str) and "sqrt" in given else ""
                 self._mistake(path, f"{error}{hint}")
-                self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
+                self.parameters[name] = fmpq(1)  # or each use of the parameter would be reported as a further mistake
                 self.unsure = True
         if self.root is not None:
             self.symbols = (self.root[0],)
@@ -253,7 +253,7 @@ class DocumentReader(PartReader):
                     from kahanmaps.family.cubics import default_variables
 
                     self.variables = default_variables(len(A))
-            elif kind != "composition":  # which has those of its first map
+            elif kind != "composition":  # which has the variables of its first map
                 self._mistake("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
             return
         if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
@@ -451,7 +451,7 @@ class DocumentReader(PartReader):
         plain = {name: value for name, value in entry.items() if name not in named}
         document = dict(reader.document)
         if key != "map":
-            document.setdefault("parameters", {})  # so that, as a table, it knows no others
+            document.setdefault("parameters", {})  # an inline table has only its own parameters
         elif "parameters" not in entry[key]:
             del document["parameters"]
         return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **plain})
@@ -465,7 +465,7 @@ class DocumentReader(PartReader):
             self._mistake(f"{path}.parameters", f"found {show(parameters)}, expected a table of numbers")
             return numbers, values
         table = entry.get("map")
-        if isinstance(table, dict) and "parameters" not in table:  # it knows those around it
+        if isinstance(table, dict) and "parameters" not in table:  # and those of the tables that contain it
             context = ring(self.symbols)
             for name, symbol in zip(self.symbols, context.gens(), strict=True):
                 values[name] = RationalFunction(symbol, context.constant(1))
@@ -496,7 +496,7 @@ class DocumentReader(PartReader):
         if key == "map":
             if not isinstance(value, dict):
                 raise InputError(f"found {show(value)}, expected a table like a system file")
-            # A table without parameters of its own knows those of the file that it stands in.
+            # A table without own parameters has those of the file that contains it.
             outer = {name: format_number(number) for name, number in self.parameters.items()}
             document = {"parameters": {**outer, **dict.fromkeys(self.symbols, 1)}, **value}
         elif not isinstance(value, str):

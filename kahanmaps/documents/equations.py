@@ -50,7 +50,7 @@ _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 class _Derivative(NamedTuple):
     name: str
     order: int
-    end: int  # the place of the token after it
+    end: int  # index of the token after it
 
 
 def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
@@ -223,7 +223,7 @@ def _argument(tokens: Sequence[str], position: int) -> int:
 def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities: Mapping[str, str]) -> str:
     """Return a right-hand side as text, with x(t) replaced by x, and x' by the velocity if there is one."""
     tokens_kept = [token for token in tokens if not token.isspace()]
-    gaps, blank = list[str](), ""  # what stands before each word: "x y" must not become "xy"
+    gaps, blank = list[str](), ""  # the blanks before each word: "x y" must not become "xy"
     for token in tokens:
         if token.isspace():
             blank = " "
@@ -243,7 +243,7 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
             if derivative.order != 1 or derivative.name not in velocities:
                 raise InputError(
                     f"found a derivative of {derivative.name} on the right side of the equation for {name}, expected a "
-                    "formula in the variables: write out what it is equal to"
+                    "formula in the variables: replace it by the right-hand side of its equation"
                 )
             formula.append(gaps[k] + velocities[derivative.name])
             k = derivative.end

@@ -27,7 +27,7 @@ def formula_text(value: Any) -> str:
         return str(value)
     for part in _irrational(value):
         if part.is_Float:
-            rational(float(part))  # refused, in the words for floats
+            rational(float(part))  # raises the error for floats
         raise InputError(
             f"found {part} in {value}, expected rational numbers and names: "
             f"an algebraic number is the value of a parameter, System(..., a={part})"

@@ -21,7 +21,7 @@ from kahanmaps.errors import InputError, quoted
 
 _CALL = re.compile(r"(\w+)(?:\((.*)\))?")
 _INTEGER = re.compile(r"-?[0-9]{1,6}")
-LARGEST = 40  # n: documents grow like n^2, and nobody looks at more
+LARGEST = 40  # largest n: documents grow like n^2
 _SHOWN_DEGREES = 4
 
 
@@ -84,7 +84,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         text = " ".join(terms)
         rows.append(text.removeprefix("+ ") if text.startswith("+ ") else f"-{text.removeprefix('- ')}")
     cross, is_full = n - 2 * k - 2, n == 2 * k + 1
-    # What is known of the flow and the map, each with its status.
+    # Known statements about the flow and the map, each with its status.
     facts = [
         "Classical: the flow is integrable, by k + 1 integrals for n = 2k + 1 and in general by those of LV(2k + 1, k) "
         "and cross-ratios.",

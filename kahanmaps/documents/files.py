@@ -49,7 +49,7 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 class SystemFile(HtmlDisplay):
     """A system or map with the parameters and claims of its file.
 
-    `map` is the map that is meant, of a differential equation its Kahan map; `hamiltonian` and `member` are there when
+    `map` is the map, for a differential equation its Kahan map; `hamiltonian` and `member` are there when
     the file (or the Python object it was made from) says so. `integrals` and `density` are claims: rational functions
     in the variables and `eps`. `document` is the file as plain data, parameters not yet inserted.
     """
@@ -63,7 +63,7 @@ class SystemFile(HtmlDisplay):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any] = field(repr=False)
-    notes: tuple[str, ...] = ()  # what was made of equations beyond their words, for people
+    notes: tuple[str, ...] = ()  # how equations were interpreted, as sentences for the user
     integrals_in_iterates: Mapping[str, RationalFunction] = field(default_factory=dict)  # claims that contain x~
 
     @property
@@ -132,7 +132,7 @@ class SystemFile(HtmlDisplay):
     def real_approximation(self) -> SystemFile:
         """The file for floats: an algebraic parameter is replaced by a rational number close to it.
 
-        Raises InputError where that is not real.
+        Raises InputError if the number is not real.
         """
         if not isinstance(self.map, AlgebraicMap):
             return self

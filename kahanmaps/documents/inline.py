@@ -50,13 +50,13 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
             of SymPy, or a list of its equations Eq(x(t).diff(t), ...).
         variables: for a list of right-hand sides, their names in this order.
-        parameters: the values of other names, exact numbers; algebraic numbers of SymPy are, too.
+        parameters: the values of other names, exact numbers, among them algebraic numbers of SymPy.
 
     Returns:
         A `SystemFile`, as if read from a file.
 
     Raises:
-        InputError: for what cannot be read.
+        InputError: if the equations cannot be read.
 
     >>> System("x' = 2*x*y - a; y' = -x^2 - y^2 - x", a="1/2").system.rhs
     (2*x*y - 1/2, -x^2 - y^2 - x)

@@ -44,16 +44,16 @@ def parse_with_iterates(
     """Parse a function of the variables, their iterates and the other names.
 
     Args:
-        text: a formula, perhaps with letters, which are defined behind it.
+        text: a formula; letters that occur in it may be defined after it, separated by commas.
         variables: names of the coordinates.
-        others: names without iterates, as those of symbols and eps.
-        constants: names that stand for numbers.
+        others: names that have no iterates, such as symbols and eps.
+        constants: names of numbers, with their values.
 
     Returns:
         A function of the names that `with_iterates` gives.
 
     Raises:
-        InputError: for a text that cannot be read, and where replacing letters takes too much work.
+        InputError: if the text cannot be read, or replacing the letters exceeds the work limit.
 
     >>> minor = parse_with_iterates("F*G~ - G*F~, F = x, G = y", ["x", "y"], ["eps"], {})
     >>> minor == parse_with_iterates("x*y~ - y*x~", ["x", "y"], ["eps"], {})
@@ -62,7 +62,7 @@ def parse_with_iterates(
     if not isinstance(text, str) or "~" not in text:
         return parse_rational_function(text, (*variables, *others), constants)
     pieces, depth = [""], 0
-    for character in text:  # cut at commas that are in no brackets
+    for character in text:  # split at commas outside brackets
         depth += (character == "(") - (character == ")")
         if character == "," and depth <= 0:
             pieces.append("")
@@ -85,7 +85,9 @@ def parse_with_iterates(
         return parse_rational_function(formula, names, constants)
     if len(definitions) < len(definition_texts) or {*definitions} & {*variables, *others, *constants}:
         names_given = ", ".join(definitions)
-        raise InputError(f"found the letters {names_given}, expected each once, and no names of something else")
+        raise InputError(
+            f"found the letters {names_given}, expected each of them once, and no names that are already in use"
+        )
     context, n = ring(names), len(variables)
     functions = [parse_polynomial(definition, names, constants) for definition in definitions.values()]
     letters = with_iterates(tuple(definitions), outer)
@@ -94,11 +96,11 @@ def parse_with_iterates(
     sizes = [len(P) for P in functions] * (outer + 1)
     monomials = [monomial for part in parts for monomial in part.monoms()]
     if sum(prod(size ** int(e) for size, e in zip(sizes, m, strict=False)) for m in monomials) > _MAX_PRODUCTS:
-        raise InputError("found a formula whose letters, replaced, have too many terms")
+        raise InputError("found a formula with too many terms after its letters are replaced")
     gens, coordinates = context.gens(), (count + 1) * n
 
     def later(P: fmpq_mpoly, steps: int) -> fmpq_mpoly:
-        # What would move beyond the last iterate does not occur in P.
+        # Variables of the last iterate, which have no successor, do not occur in P.
         moved = [gens[min(k + steps * n, coordinates - 1)] for k in range(coordinates)]
         return P.compose(*moved, *gens[coordinates:], ctx=context)
 

@@ -6,7 +6,7 @@
     verdict = "integrable"                integrable, linearisable or not integrable
     codimension = 2                       of the smallest variety known to contain a generic orbit
 
-    [[catalog.relations]]                 so many independent combinations vanish along a generic orbit
+    [[catalog.relations]]                 number of independent combinations that vanish along a generic orbit
     monomials = ["x1^2", "x2^2", "x3^2", "1"]
     dimension = 2
 
@@ -54,8 +54,8 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
     `section` is `SystemFile.catalog`. Empty where the section has none. Raises InputError for functions that cannot be
     read. Source: petrera-pfadler-suris-2009.
 
-    >>> [found] = relations({"relations": [{"monomials": "degree <= 1", "dimension": 1}]}, ["x", "y"])
-    >>> found.functions, found.dimension
+    >>> [result] = relations({"relations": [{"monomials": "degree <= 1", "dimension": 1}]}, ["x", "y"])
+    >>> result.functions, result.dimension
     ((1, x, y), 1)
     """
     return tuple(

@@ -68,7 +68,7 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
     >>> with_symbols(load("euler_top"), ["a1"]).rhs
     (x2*x3*a1, -2*x1*x3, x1*x2)
     """
-    _ = file.system  # of another map there is none
+    _ = file.system  # raises InputError if the map has no vector field
     map_ = map_with_symbols(file, symbols)
     assert isinstance(map_, KahanFamily)
     return map_.system

@@ -23,8 +23,8 @@ def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
     are too large to be written out. Raises InputError where the file holds no quadratic system.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = tensor_file(load("euler_top"), fmpq_poly([-2, 0, 1]))
-    >>> found.dim, list(found.integrals)
+    >>> result = tensor_file(load("euler_top"), fmpq_poly([-2, 0, 1]))
+    >>> result.dim, list(result.integrals)
     (6, ['F1_0', 'F1_1', 'F2_0', 'F2_1'])
     """
     file = as_file(system)

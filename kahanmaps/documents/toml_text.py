@@ -29,7 +29,7 @@ class TomlKind(NamedTuple):
     def read(self, path: str | Path) -> bytes:
         """Read the bytes of a file, at most one more than allowed. Raises InputError if it cannot be read."""
         try:
-            # Nobody may ever write to a pipe, and a device need not end. But /dev/fd/63 is the shell's <(...).
+            # Reading a pipe or a device may never end. But /dev/fd/63 is the shell's <(...).
             mode = os.stat(path).st_mode
             is_of_shell = stat.S_ISFIFO(mode) and str(path).startswith(("/dev/fd/", "/dev/stdin"))
             if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or is_of_shell):
@@ -119,6 +119,6 @@ def _toml_value(value: Any) -> str:
 
 
 def _toml_string(text: str) -> str:
-    # A JSON string is a TOML basic string, but for DEL, which TOML wants escaped; a terminal obeys some others too.
+    # A JSON string is a TOML basic string, except that DEL must be escaped. Other characters are escaped for terminals.
     characters = (c if c.isprintable() else f"\\U{ord(c):08x}" for c in json.dumps(text, ensure_ascii=False))
     return "".join(characters)

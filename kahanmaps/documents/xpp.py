@@ -86,7 +86,7 @@ class _Lines:
         self.left_out: dict[str, None] = {}
         self.notes: list[str] = []
         self.definitions: dict[str, str] = {}
-        self.has_capitals = False  # in what is read
+        self.has_capitals = False  # in the names of the file
 
     def read(self, line: str) -> None:
         """Read a line. Raises InputError if it cannot be read."""
@@ -116,7 +116,7 @@ class _Lines:
             split = tokens.index("=") + 1
             if is_equation:
                 self.equations.append(("".join(tokens[:split]), tokens[split:]))
-            else:  # of what was defined before
+            else:  # a value of an earlier definition
                 self.definitions[tokens_kept[0]] = f"({self.expanded(tokens[split:])})"
 
     def _values(self, tokens: list[str], values: dict[str, str]) -> None:
@@ -129,13 +129,11 @@ class _Lines:
             value, k = "0", k + 1
             if tokens[k : k + 1] == ["="]:
                 end = k + 1 + (tokens[k + 1 : k + 2] == ["-"] or tokens[k + 1 : k + 2] == ["+"])
-                if tokens[end + 1 : end + 2] == ["/"]:  # where XPP stops reading, without a word
+                if tokens[end + 1 : end + 2] == ["/"]:  # XPP stops reading here, without a message
                     end += 2
-                    self.notes.append(
-                        f"{name} = {''.join(tokens[k + 1 : end + 1])} is read as it stands, unlike in XPP"
-                    )
+                    self.notes.append(f"{name} = {''.join(tokens[k + 1 : end + 1])} is read literally, unlike in XPP")
                 value, k = "".join(tokens[k + 1 : end + 1]), end + 1
-            elif values is self.parameters:  # XPP reads 0, which is rarely what is meant
+            elif values is self.parameters:  # XPP takes 0, which is rarely intended
                 raise InputError(f"found the parameter {quoted(name)} without a value, expected one: par {name}=0")
             values[name] = value
             k += tokens[k : k + 1] == [","]
@@ -144,5 +142,7 @@ class _Lines:
         """Substitute the definitions in a formula. Raises InputError if it becomes too long."""
         parts = [self.definitions.get(token, token) for token in tokens]
         if sum(map(len, parts)) > LIMITS.characters:
-            raise InputError(f"found a formula of more than {LIMITS.characters} characters with its definitions put in")
+            raise InputError(
+                f"found a formula of more than {LIMITS.characters} characters after its definitions are inserted"
+            )
         return "".join(parts).strip()

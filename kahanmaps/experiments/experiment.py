@@ -150,7 +150,7 @@ class SpecDocument:
         printable = ["".join(c if c.isprintable() or c == "\n" else "_" for c in text) for text in (key, sentence)]
         self.mistakes.append((printable[0].replace("\n", "_")[:120], printable[1]))
 
-    def sound(self, *path: str | int) -> Any:
+    def valid_value(self, *path: str | int) -> Any:
         """Return the value at a path, None where it is missing or has a wrong shape."""
         if any(bad == path[: len(bad)] for bad in self._misshapen):
             return None
@@ -239,11 +239,11 @@ class ExperimentReader:
     def read(self) -> Experiment | None:
         """Return the experiment, or None after reporting its mistakes."""
         reported_before = len(self.spec.mistakes)
-        on_error = self.sound("on_error") or self.spec.sound("on_error") or "refuse"
+        on_error = self.valid_value("on_error") or self.spec.valid_value("on_error") or "refuse"
         if on_error not in ("refuse", "skip"):
             self.mistake("on_error", f'found {show(on_error)}, expected "refuse" or "skip"')
         self._skips = self.spec.skip_bad or on_error == "skip"
-        if (name := self.sound("task")) is not None:
+        if (name := self.valid_value("task")) is not None:
             with self._at("task"):
                 self.kind = task_kind(name)
         system_specs = self._read_systems()
@@ -283,14 +283,14 @@ class ExperimentReader:
         """Report a mistake; `key` is relative to this table."""
         self.spec.mistake(f"experiments.{self.name}.{key}", sentence)
 
-    def sound(self, *path: str | int) -> Any:
+    def valid_value(self, *path: str | int) -> Any:
         """Return the value at a path in this table, None where it is missing or has a wrong shape."""
-        return self.spec.sound("experiments", self.name, *path)
+        return self.spec.valid_value("experiments", self.name, *path)
 
     def entries(self, part: str) -> list[tuple[str, str, Any]]:
         """Return the entries of the table of options or axes: canonical names, keys, values."""
         entries: list[tuple[str, str, Any]] = []
-        for key, raw in (self.sound(part) or {}).items():
+        for key, raw in (self.valid_value(part) or {}).items():
             if key == "parameters" and isinstance(raw, dict):
                 entries += [(f"{PARAMETERS}{name}", f"{part}.{key}.{name}", value) for name, value in raw.items()]
             else:
@@ -319,7 +319,7 @@ class ExperimentReader:
         return valid
 
     def _find_option(self, kind: TaskKind, name: str, written: str) -> Option:
-        """Return the option or parameter of this name. Raises InputError where there is none."""
+        """Return the option or parameter of this name. Raises InputError if there is no such option."""
         if name.startswith(PARAMETERS) and self.has_parameters:
             key = name.removeprefix(PARAMETERS)
             for file in self.files:
@@ -329,7 +329,7 @@ class ExperimentReader:
                     raise InputError(f"{file.name} has no such parameter, its parameters are: {known}{hint}")
             return exact(name, "a parameter of the system")
         options = dict(kind.options)
-        if self.is_family or (self.has_parameters and not self.files):  # perhaps a member was meant
+        if self.is_family or (self.has_parameters and not self.files):  # a member of the family may have been intended
             options |= FAMILY | {"seed": VOCABULARY["seed"]}
         if name in options:
             return options[name]
@@ -360,10 +360,10 @@ class ExperimentReader:
     def _written_zips(self) -> list[list[str] | None]:
         """Return the canonical names of the axes of each zip, None for one of a wrong shape, which was reported."""
         zips: list[list[str] | None] = []
-        for number, written in enumerate(self.sound("zip") or []):
-            sound = self.sound("zip", number) is not None
-            sound = sound and all(self.sound("zip", number, k) is not None for k in range(len(written)))
-            zips.append(["eps" if name == TIME_STEP else name for name in written] if sound else None)
+        for number, written in enumerate(self.valid_value("zip") or []):
+            is_valid = self.valid_value("zip", number) is not None
+            is_valid = is_valid and all(self.valid_value("zip", number, k) is not None for k in range(len(written)))
+            zips.append(["eps" if name == TIME_STEP else name for name in written] if is_valid else None)
         return zips
 
     def _read_zips(self, axes: Mapping[str, AxisValues]) -> list[tuple[str, ...]]:
@@ -376,7 +376,7 @@ class ExperimentReader:
                 continue
             unknown = [name for name in names if name not in axes]
             for name in unknown:
-                if name not in given:  # else another mistake was reported
+                if name not in given:  # otherwise another mistake was reported
                     self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
             twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
             if len(names) < 2:
@@ -403,12 +403,13 @@ class ExperimentReader:
         return zips
 
     def _read_limits(self, kind: TaskKind, fixed: dict[str, AxisValues]) -> TaskLimits:
-        own = self.sound("limits") or {}
+        own = self.valid_value("limits") or {}
         time, memory, digits = (
-            self.sound("limits", name) or self.spec.sound("limits", name) for name in ("time", "memory", "digits")
+            self.valid_value("limits", name) or self.spec.valid_value("limits", name)
+            for name in ("time", "memory", "digits")
         )
         key = self.given().get("max_digits")
-        if "digits" in own and self.sound("limits", "digits") is None:
+        if "digits" in own and self.valid_value("limits", "digits") is None:
             pass  # reported with the shape
         elif "max_digits" not in kind.options:
             if "digits" in own:
@@ -424,7 +425,7 @@ class ExperimentReader:
         )
 
     def _require_options(self, kind: TaskKind) -> None:
-        if any(self.sound(part) is None and part in self.raw for part in ("options", "axes")):
+        if any(self.valid_value(part) is None and part in self.raw for part in ("options", "axes")):
             return  # a missing option may be in the table of a wrong shape
         given = self.given()
         needs_eps = not self.files or any(file.map.has_eps for file in self.files)
@@ -452,7 +453,7 @@ class ExperimentReader:
 
     def _read_systems(self) -> list[dict[str, Any]]:
         """Return the specs of the valid systems, none where the task needs none, and report the others."""
-        raw = self.sound("system")
+        raw = self.valid_value("system")
         if raw is None:
             if self.kind is not None and self.kind.needs is not None and self.raw.get("system") is None:
                 self.mistake(

@@ -241,9 +241,9 @@ def confinement(
         "confinement": first.verdict if agree else UNDECIDED,
         "status": "budget" if any(run.stopped for run in runs) else "complete" if agree else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
-        "followed": first.followed,  # for so many steps, where something is not confined
+        "followed": first.followed,  # number of steps, if something is not confined
         **fields(first, "map_degree", "critical_degree"),
-        "contracted": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),
+        "exceptional_count": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),
         "longest_pattern": max((h.confined_at for h in first.hypersurfaces if h.confined_at is not None), default=None),
         "hypersurfaces": _hypersurfaces(first),
     }
@@ -285,7 +285,7 @@ def cycles(
         "runs": [
             {
                 "eps": format_number(census.eps),
-                **fields(census, "looked_at", "indeterminate", "pre_indeterminate", "preperiodic", "open", "periodic"),
+                **fields(census, "examined", "indeterminate", "pre_indeterminate", "preperiodic", "open", "periodic"),
                 **fields(census, "cycles", "longest"),
                 **({"lengths": [list(pair) for pair in census.lengths.items()]} if report else {}),
             }
@@ -354,7 +354,7 @@ def _growth(growth: DegreeGrowth) -> Result:
     recurrence, rate = growth.recurrence, growth.dynamical_degree
     return {
         "growth": str(growth.growth),
-        "looks_exponential": growth.looks_exponential,  # an estimate, where there is no recurrence
+        "looks_exponential": growth.looks_exponential,  # an estimate if there is no recurrence
         "unconfirmed": growth.unconfirmed,  # why a recurrence that fits is not given
         "singularities": None if growth.patterns is None else growth.patterns.text,
         "dynamical_degree": None if rate is None else rate.digits,
@@ -368,7 +368,7 @@ def _growth(growth: DegreeGrowth) -> Result:
 def _hypersurfaces(run: SingularityRun) -> list[Result]:
     return [
         {
-            **fields(h, "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at"),
+            **fields(h, "degree", "divides_denominator", "multiplicity", "status", "contracted_at", "confined_at"),
             "ranks": [step.rank for step in h.steps],
             "poles": [step.pole for step in h.steps],
         }

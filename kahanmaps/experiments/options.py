@@ -36,7 +36,7 @@ class Option:
     """An option of tasks with its name and help.
 
     `read` converts the value in a spec to plain data or raises InputError, `make` converts plain data to an argument of
-    the library; None means "not given". `numbers` tells whether ranges "a..b step c" are allowed.
+    the library; None means "not given". `numbers` says whether ranges "a..b step c" are allowed.
     """
 
     name: str
@@ -239,12 +239,12 @@ VOCABULARY = {
             range(1, 11),
         ),
         integer("order", "order in eps^2 of the series of the integrals", 1, 20),
-        integer("ball_bits", "also compute over complex balls of so many bits", 32, 100_000),
+        integer("ball_bits", "also compute over complex balls of this number of bits", 32, 100_000),
         flag("controls", "also check every claim on input that violates one hypothesis"),
         flag("report", "store the full report, as printed by --json"),
         integer("m", "half the dimension", 1, 16),
         integer(EFFORT, "work limit of the search: each increment by 1 doubles it", LEAST_EFFORT, MOST_EFFORT),
-        integer("terms", "compute so many degrees (default: until a recurrence is certain)", 1, 10_000),
+        integer("terms", "compute this number of degrees (default: until a recurrence is certain)", 1, 10_000),
         integer("max_degree", "largest degree to try", most=10**6),
         Option(
             "symbolic",
@@ -258,7 +258,7 @@ VOCABULARY = {
             "primes", "primes modulo which members are tried, at least three", "primes from 5 on", range(5, 1 << 13)
         ),
         choice("shape", "linear: g = B f with a constant B; quadratic: any g", ("linear", "quadratic")),
-        integer("samples", "follow so many random points instead of all points", 1, 100_000),
+        integer("samples", "follow this number of random points instead of all points", 1, 100_000),
         integer("transient", "initial steps to discard (default: a tenth)", most=10**9),
     )
 }

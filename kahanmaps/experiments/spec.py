@@ -92,13 +92,13 @@ def parse_spec(
     """
     document = SpecDocument(_TOML.document(text, where), folder or Path(), skip_bad)
     experiments = []
-    for name, table in (document.sound("experiments") or {}).items():
+    for name, table in (document.valid_value("experiments") or {}).items():
         if not re.fullmatch(EXPERIMENT_NAME, name):
             expected = "expected a name of at most 80 letters, digits and the characters _ . + -"
             document.mistake(f"experiments.{name}", expected)
         if isinstance(table, dict) and (experiment := ExperimentReader(document, name).read()) is not None:
             experiments.append(experiment)
-    spec = Spec(document.sound("name") or "", tuple(experiments), document.documents)
+    spec = Spec(document.valid_value("name") or "", tuple(experiments), document.documents)
     if spec.size > max_tasks:
         largest = sorted(experiments, key=lambda experiment: -experiment.size)
         sizes = ", ".join(f"{experiment.name} has {experiment.product}" for experiment in largest[:_MAX_LISTED])

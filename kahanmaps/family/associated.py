@@ -187,7 +187,7 @@ class FamilyMember(HtmlDisplay):
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])
         >>> H = parse_polynomial("2*x1^3 + 3*x1*x2^2 + x3^3 + 6*x3*x4^2", ["x1", "x2", "x3", "x4"])
-        >>> [(str(one.root), one.K_text) for one in FamilyMember(A, H).conjugate_associates()]
+        >>> [(str(associate.root), associate.K_text) for associate in FamilyMember(A, H).conjugate_associates()]
         [('root of t^2 - 2', '(-3*t)*x1^2*x2 + (-1/2*t)*x2^3 + (-3*t)*x3^2*x4 + (-2*t)*x4^3')]
         """
         for k, root in self.roots.items():

@@ -103,7 +103,7 @@ class NormalForm(HtmlDisplay):
 
     @property
     def dim(self) -> int:
-        """2m."""
+        """The dimension 2m."""
         return int(self.A.nrows())
 
     @property
@@ -281,7 +281,7 @@ def normal_form(member: FamilyMember) -> NormalForm:
 
 
 def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
-    """For each unit vector a sum of it with few small multiples of others that generates a free K-module.
+    """Yield for each unit vector a sum with few small multiples of other unit vectors that generates a free K-module.
 
     A multiple c of another unit vector makes the module as large as the two allow for all but at most m values of c:
     on the part of every factor of chi, where K is a field, at most one c is bad.
@@ -303,7 +303,7 @@ def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
 
 
 def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
-    """S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
+    """Return S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
 
     The integers (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1, those with s = 0 one of rank m.
     With weights beyond the bounds of LLL for short vectors of either, the first m vectors of a reduced basis have
@@ -364,7 +364,7 @@ def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) ->
     for coefficient, monomial in zip(coefficients, monomials, strict=True):
         if coefficient.is_zero():
             continue
-        # What has one term, or only negative ones, is written with its sign outside.
+        # A coefficient with one term, or with negative terms only, is written with its sign outside the brackets.
         terms = [c for c in coefficient.coeffs() if c != 0]
         negative = all(c < 0 for c in terms)
         element = format_univariate(-coefficient if negative else coefficient)

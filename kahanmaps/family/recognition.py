@@ -31,7 +31,7 @@ from kahanmaps.family.skew_hamiltonian import Factor, bits_of, evaluate_at_matri
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
 
-MAX_DIMENSION = 32  # as for the members that are drawn; the unknowns are n(n-1)/2
+MAX_DIMENSION = 32  # as for random members; there are n(n-1)/2 unknowns
 _DRAWS = 24  # small combinations that are tried beside the basis
 _TRIAL_DIVISION = 1000
 _T = fmpq_poly([0, 1])
@@ -118,7 +118,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     n = J.nrows()
     inverse = J.inv()
     conditions: list[fmpz_mat] = [(third * J).numer_denom()[0] for third in third_derivatives(H)]
-    # A few combinations of the conditions nearly always say as much as all of them.
+    # A few random combinations of the conditions are almost always equivalent to all of them.
     rng = random.Random(n)
     few = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
     for chosen in (few, conditions):
@@ -141,10 +141,10 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> H = parse_polynomial("x1^3 + x3^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
-    >>> found = find_family_structure(CubicHamiltonian(H, standard_structure(4)))
-    >>> found.text
+    >>> structure = find_family_structure(CubicHamiltonian(H, standard_structure(4)))
+    >>> structure.text
     'H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)'
-    >>> [g.label for g in found.member.associated()]
+    >>> [g.label for g in structure.member.associated()]
     ['++', '+-']
     >>> H = parse_polynomial("x1^3 + x1*x2*x3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
     >>> find_family_structure(CubicHamiltonian(H, standard_structure(4))) is None
@@ -185,7 +185,7 @@ def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
     for i, component in enumerate(field):
         for exponent, coefficient in component.terms():
             raised = tuple(power + (i == j) for j, power in enumerate(exponent))
-            # Euler's formula, for each degree by itself.
+            # Euler's formula, for each degree separately.
             H = H + context.from_dict({raised: coefficient / sum(raised)})
     return CubicHamiltonian(H, J) if gradient(H) == field else None
 
@@ -265,7 +265,7 @@ def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
 
 
 def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
-    """The idempotent E of the space taken apart, as far as its elements E X E do it; each piece with the best X."""
+    """Split the idempotent E of the space by elements E X E, as far as possible; return each part with its best X."""
     if trace(E) == 2:  # self-adjoint in a symplectic plane: scalar
         yield _Part(E, E * 0, _T)
         return
@@ -319,7 +319,7 @@ def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
 
 
 def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
-    """The factors of chi of X = E X E on the image of E; zero on the image of I - E does not count."""
+    """Return the factors of chi of X = E X E, restricted to the image of E."""
     dim, factors = int(trace(E).p), []
     for factor in factors_of_chi(X):
         multiplicity = factor.multiplicity - (X.nrows() - dim) // 2 * (factor.root == 0)
@@ -402,7 +402,7 @@ def _reason_against(hamiltonian: CubicHamiltonian) -> str:
 
 def _require_size(dim: int) -> None:
     if dim > MAX_DIMENSION:
-        raise InputError(f"A is looked for in dimensions up to {MAX_DIMENSION}, found {dim}")
+        raise InputError(f"A is searched for in dimensions up to {MAX_DIMENSION}, and the system has dimension {dim}")
 
 
 def _pulled_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly:

@@ -186,7 +186,7 @@ def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
     S = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
 
     def add(to: int, source: int, times: int) -> None:
-        """Row operation S[to] += times S[source], on the left."""
+        """Apply the row operation S[to] += times S[source] from the left."""
         nonlocal S
         elementary = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
         elementary[to, source] = elementary[to, source] + times

@@ -26,7 +26,7 @@ _MAX_DIMENSION = 32
 class SystemNormalForm:
     """A normal form with x = T S z; `T` is None where the form is in the system's own coordinates.
 
-    `declared` says whether the system came as a member of the family, `text` what it is found to be.
+    `declared` says whether the system came as a member of the family, `text` the membership that was found.
     """
 
     form: NormalForm

@@ -1,9 +1,9 @@
 """Systems over an algebra K = Q[t]/(chi) as systems over Q, and the search for such a structure.
 
 A quadratic system in n variables over K is one in n m variables over Q, m = deg chi: x = x_0 + x_1 t + ... for every
-variable. Its Kahan map is that over K, and inherits what that has, roots of chi repeated or not: docs/mathematics.md,
-"The tensor theorem". The systems over Q that come about in this way are those with a matrix C that commutes with f'(x)
-for all x and makes Q^(n m) a free module over Q[C].
+variable. Its Kahan map is the Kahan map over K and inherits its properties, even if chi has repeated roots:
+docs/mathematics.md, "The tensor theorem". A system over Q arises in this way if and only if there is a matrix C that
+commutes with f'(x) for all x and makes Q^(n m) a free module over Q[C].
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from kahanmaps.family.skew_hamiltonian import companion_matrix, evaluate_at_matr
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system
 
 GENERATOR = "t"
-_MAX_DIMENSION = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
+_MAX_DIMENSION = 12  # dimension up to which commuting matrices are computed: its square is their number of entries
 _DRAWS = 40
 
 
@@ -66,8 +66,8 @@ def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[Rat
     they are too large.
 
     >>> x, eps = ring(["x", "eps"]).gens()
-    >>> for one in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
-    ...     print(one.numerator)
+    >>> for integral in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
+    ...     print(integral.numerator)
     x_0^2 + 2*x_1^2
     2*x_0*x_1
     """
@@ -199,7 +199,7 @@ def components(
 ) -> list[fmpq_mpoly]:
     """Return the coefficients of 1, t, ..., t^(m-1) of a polynomial in x = x_0 + x_1 t + ....
 
-    Of the polynomial's own variables the first ones are split, into `variables`, and t and those in `names` are kept.
+    The first variables of the polynomial are split into `variables`; t and the variables in `names` are unchanged.
     Without `names` the ring is that of the variables.
     """
     names = names or variables

@@ -166,7 +166,7 @@ class HeightGrowth:
         if self.end.status == "periodic" or self.end.period is not None:
             return Growth.PERIODIC, self.end.message
         kind, reason = _decide(self.heights)
-        if kind is Growth.UNDECIDED and not self.end.is_whole:
+        if kind is Growth.UNDECIDED and not self.end.is_complete:
             reason = f"{reason}; {self.end.message}"
         return kind, reason
 
@@ -265,7 +265,7 @@ def height_growth(
 
 
 def decimal_text(value: Fraction, digits: int = 6) -> str:
-    """Round a number to so many significant digits, ties to even; the text is the same on every machine.
+    """Round a number to this number of significant digits, ties to even; the text is the same on every machine.
 
     >>> decimal_text(Fraction(1, 3)), decimal_text(Fraction(-20, 3), 2), decimal_text(Fraction(5))
     ('0.333333', '-6.7', '5')

@@ -33,7 +33,7 @@ from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.processes import end_with_parent, processors
 
-# Units of work at effort 1 by dimension: as many for the independent steps, and as many for the others.
+# Units of work at effort 1 by dimension, for the independent steps and again for the other steps.
 # Most maps use a small part of them.
 _UNITS = {1: 16e6, 2: 16e6, 3: 30e6, 4: 60e6, 5: 110e6}
 _MAX_UNITS = 150e6
@@ -89,7 +89,7 @@ class Analysis(AnalysisResult, PrintableResult):
         return [(title, lines) for title, lines in (*sections, ("not done", skipped)) if lines]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each statement, for `pandas.DataFrame(analysis.rows())` and the like."""
+        """A row for each statement, for example for `pandas.DataFrame(analysis.rows())`."""
         statements = ((title, line) for title, lines in self.sections for line in lines)
         return [{"section": title, "status": line.status, "text": line.text} for title, line in statements]
 
@@ -244,7 +244,7 @@ class _Account:
 def _second_process(context: AnalysisContext, steps: Sequence[AnalysisStep], account: _Account) -> Iterator[Connection]:
     """Run steps in a forked process, if there are any, and yield the connection for their outcomes.
 
-    The fork inherits the map and all functions; results come back as pickles. The process ends with the block.
+    The fork inherits the map and all functions; results are returned as pickles. The process ends with the block.
     """
     parent, (receiver, sender) = os.getpid(), Pipe(duplex=False)
     if not steps:

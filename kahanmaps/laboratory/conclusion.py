@@ -265,7 +265,7 @@ def contradictions(result: AnalysisResult) -> list[str]:
 
 
 def doubt_of_heights(result: AnalysisResult) -> str:
-    """Return the reason not to trust the growth of heights, given that of the degrees; empty if the two agree."""
+    """Return why the growth of heights contradicts that of the degrees; empty if the two agree."""
     if result.heights is None or result.degrees is None:
         return ""
     kind, growth = result.heights.kind, result.degrees.growth

@@ -1,10 +1,11 @@
 """Cycles of a map on projective space over GF(p): how many there are of each length.
 
-All points of P^n(GF(p)) where they are few enough, else random ones. Every count is exact, for one prime and one eps.
+All points of P^n(GF(p)) are followed if they are few enough, otherwise random ones. Every count is exact, for one prime
+and one eps.
 
-The lengths are compared with no bound. That of Hasse and Weil, p + 1 + 2 sqrt p, is one for a cycle on an irreducible
+No bound for the lengths is applied. The bound of Hasse and Weil, p + 1 + 2 sqrt p, holds for a cycle on an irreducible
 curve of genus 1 that the map sends to itself. Levels of integrals may have several components, and the map may exchange
-levels, so integrable maps have longer cycles as well. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
+levels, so that integrable maps have longer cycles, too. Source: roberts-jogia-vivaldi-2003, roberts-vivaldi-2009.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.projective import homogeneous_map
 
-MAX_POINTS = 2_000_000  # of a whole space, up to dimension 6; half as many with each further dimension
+MAX_POINTS = 2_000_000  # of a space that is examined completely, up to dimension 6; halved with each further dimension
 MAX_PRIME = 1 << 31  # products of two residues stay below 2^62
 MAX_DIMENSION = 12  # the minors of a point are 2^(n + 1) arrays
 MAX_FACTORED = 6  # the dimension up to which the forms of the map are computed
@@ -44,7 +45,7 @@ class Census(PrintableResult):
     points that are periodic, by their period. A point is `indeterminate` where the map is not defined,
     `pre_indeterminate` if its orbit gets to such a point, `preperiodic` if its orbit gets to a cycle without being on
     it, and `open` if none of this was seen in `steps` steps (samples only). Where a time limit `stopped` the work
-    before the images of all points were known, `looked_at` is 0.
+    before the images of all points were known, `examined` is 0.
     """
 
     prime: int
@@ -53,7 +54,7 @@ class Census(PrintableResult):
     points: int
     complete: bool = False
     stopped: bool = False
-    looked_at: int = 0
+    examined: int = 0
     indeterminate: int = 0
     pre_indeterminate: int = 0
     preperiodic: int = 0
@@ -63,12 +64,12 @@ class Census(PrintableResult):
 
     @property
     def periodic(self) -> int:
-        """The number of points, among those looked at, that lie on cycles."""
+        """The number of examined points that lie on cycles."""
         return sum(length * n if self.complete else n for length, n in self.lengths.items())
 
     @property
     def cycles(self) -> int | None:
-        """The number of cycles; None unless all points were looked at."""
+        """The number of cycles; None unless all points were examined."""
         return sum(self.lengths.values()) if self.complete else None
 
     @property
@@ -81,7 +82,7 @@ class Census(PrintableResult):
         return all_fields(self)
 
     def rows(self) -> list[dict[str, int]]:
-        """A row for each length: the number of cycles, or of sampled points; for pandas.DataFrame and the like."""
+        """A row for each length: the number of cycles, or of sampled points; for example for pandas.DataFrame."""
         return [{"length": length, "count": count} for length, count in self.lengths.items()]
 
 
@@ -99,9 +100,9 @@ def cycle_census(
     """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
 
     A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
-    looked at up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
-    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends it with what is known.
-    Of a composition each map is applied in turn: a point is indeterminate where one of them is not defined. Above
+    examined up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
+    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends the census early. The maps
+    of a composition are applied one after the other: a point is indeterminate if one of them is not defined. Above
     dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
     Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
 
@@ -153,7 +154,7 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
     kinds = dict[str, Any](
         indeterminate=indeterminate, pre_indeterminate=ended - indeterminate, preperiodic=count - ended - len(cyclic)
     )
-    return replace(census, complete=True, looked_at=count, lengths=dict(sorted((+lengths).items())), **kinds)
+    return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **kinds)
 
 
 def _of_samples(
@@ -163,7 +164,7 @@ def _of_samples(
 
     drawn = np.random.default_rng(seed).integers(0, census.prime, (census.dim + 1, 2 * samples + 20))
     start = points = space.normalized(drawn[:, drawn.any(axis=0)][:, :samples])
-    looked_at, lengths, ended, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
+    examined, lengths, ended, done, stopped = start.shape[1], dict[int, int](), [0, 0], 0, False
     try:
         while done < steps and start.shape[1]:
             progress(f"p = {census.prime}: step {done} of at most {steps}")
@@ -178,7 +179,7 @@ def _of_samples(
             points, start = points[:, goes_on], start[:, goes_on]
     except TimeLimit:
         stopped = True
-    census = replace(census, stopped=stopped, looked_at=looked_at, steps=done, lengths=lengths)
+    census = replace(census, stopped=stopped, examined=examined, steps=done, lengths=lengths)
     return replace(census, indeterminate=ended[0], pre_indeterminate=ended[1], open=start.shape[1])
 
 
@@ -191,7 +192,7 @@ class _ProjectiveMap:
             raise InputError(f"found the prime {prime} for a map of dimension {map_.dim}, expected {expected}")
         self.prime = prime
         self.portion = 1 << max(8, 18 - map_.dim)  # points at a time: their minors should stay in the cache
-        # Of each map of a composition the forms of its image, or a matrix of forms whose minors they are, as terms.
+        # For each map of a composition the forms of its image, or a matrix with these minors, as lists of terms.
         self.maps: list[tuple[bool, list[list[list[tuple[tuple[int, ...], int]]]]]] = []
         for factor in map_.at(eps, GF(prime)).factors:
             matrix, by_minors = factor.equation.polynomials(), False
@@ -205,7 +206,7 @@ class _ProjectiveMap:
             self.maps.append((by_minors, terms))
 
     def images(self, X: Any) -> Any:
-        """The images of at most `portion` points; columns of zeros where there is none."""
+        """Return the images of at most `portion` points; a column of zeros for a point without image."""
         p = self.prime
         for by_minors, matrix in self.maps:
             powers: dict[tuple[int, ...], Any] = {}

@@ -1,7 +1,7 @@
-"""How far analyses go unless they are told: one table for `analyze` and for the commands that do one of them alone.
+"""Default limits of analyses: one table for `analyze` and for the commands that run a single analysis.
 
-They are bounded by units of counted work (algebra/work.py). `analyze` gives each of its parts a share of units by
-dimension, of which no share is larger than what stands here, so that no command finds less than `analyze` does.
+Analyses are bounded by units of counted work (algebra/work.py). `analyze` gives each of its parts a share of units by
+dimension, of which no share exceeds the values here, so that no command finds less than `analyze` does.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ UNITS = {
     "Poisson tensors": 60e6,
     "Darboux polynomials": 60e6,
     "singularities": 60e6,  # for each eps
-    "degrees": 40e6,  # singularities are followed within this, which `analyze` does apart
+    "degrees": 40e6,  # includes following singularities, for which `analyze` has a step of its own
     "dynamical degree": 10e6,
     "heights": 30e6,
     "symmetries": 30e6,

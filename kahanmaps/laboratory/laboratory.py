@@ -307,7 +307,7 @@ class Laboratory:
         variables, symbols, root = variables or self.map.variables, self.symbols, self.root
         eps_enters = eps_enters or self.eps_enters
         supports = [set(space.places) for space in model]
-        # Echelon forms end in a 1 at the largest monomial; the places of other entries than this and zeros are unknown.
+        # Echelon forms end in a 1 at the largest monomial. The unknowns are the other entries that are not 0.
         pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
         places = [
             [(i, k) for i, vector in enumerate(space.basis) for k, c in enumerate(vector) if c and k != ends[i]]
@@ -413,6 +413,7 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
         row = parts.setdefault(tuple(exponents), [])
         row += [K.zero] * (e + 1 - len(row))
         row[e] = row[e] + K.convert(fmpq_poly([0] * j + [coefficient]))
+    # Euclid's algorithm over the field: the content is a polynomial in eps, defined up to a number of the field.
     content: list[EtaleElement] = []
     for row in parts.values():
         content, remainder = row, content

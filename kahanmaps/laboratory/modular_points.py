@@ -26,7 +26,7 @@ Point = tuple[int, ...]
 Values = Sequence[Any]  # nmod, whose products take half the time of those of Python's integers, or integers
 Exponent = tuple[int, ...]
 _TRIES = 60
-_NO_VALUE = "the map is not defined at random points modulo a prime"
+_UNDEFINED = "the map is not defined at random points modulo a prime"
 
 
 class NoPoint(KahanmapsError):
@@ -54,7 +54,7 @@ class ModularMap:
         self.rng = random.Random(f"{seed} {prime} {eps} {tuple(values)}")
         field = GF(prime)
         if eps % prime == 0:
-            raise BadPrime(f"found eps = 0 modulo {prime}: take another prime", prime)
+            raise BadPrime(f"found eps = 0 modulo {prime}: use another prime", prime)
         self.map = as_map(system).at(field.convert(eps), field, [field.convert(value) for value in values])
         count(20 if isinstance(self.map, KahanMap) else 200)
 
@@ -89,7 +89,7 @@ class ModularMap:
             else:
                 missed += 1
                 if missed > _TRIES:
-                    raise NoPoint(_NO_VALUE)
+                    raise NoPoint(_UNDEFINED)
 
     def orbit(self, count: int) -> list[Point]:
         """Return the first `count` points of an orbit, or all of its points if the orbit has a smaller period.
@@ -106,7 +106,7 @@ class ModularMap:
             else:
                 return points
             longest = max(longest, len(points))
-        raise NoPoint(_NO_VALUE if longest == 1 else "orbits modulo a prime meet the singular set")
+        raise NoPoint(_UNDEFINED if longest == 1 else "orbits modulo a prime meet the singular set")
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
@@ -257,7 +257,7 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
 
 
 def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
-    """Return for each degree (variable, place in the support of the quotient by it) of the monomials in the support."""
+    """Return for each degree and monomial of the support a variable, and the index of the quotient in the support."""
     exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
     places = {number: place for place, number in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]

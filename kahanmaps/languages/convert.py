@@ -1,6 +1,6 @@
 """Conversion of a system, its Kahan map, integrals and density to a file for another program.
 
-Expressions are written by the code printers of SymPy (the extra `[sympy]`), for PARI by our own; what stands around
+Expressions are written by the code printers of SymPy (the extra `[sympy]`), for PARI by our own; the code around
 them is in languages.toml. Exact numbers stay exact in all languages but C, Fortran and NumPy, whose numbers are floats.
 """
 
@@ -31,7 +31,7 @@ PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "d
 _LINE = 100  # characters of a line of an expression, after which it is broken
 _TERMS_TOGETHER = 100  # a sum of more terms is bracketed in parts: parsers recurse
 _MAX_INTEGER = 2**31  # of the integers of C and Fortran
-# Names that mean nothing else in any of the languages: a small letter with digits (but not i, which may be the
+# Names without another meaning in any of the languages: a small letter with digits (but not i, which may be the
 # imaginary unit, and e), and words with an underscore (but those of GP's debugger). All other words may be functions.
 _FREE = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
 
@@ -359,6 +359,6 @@ def _polynomial_writer(language: Mapping[str, Any]) -> Callable[[fmpq_mpoly, Map
             text = str(code(sympy.Add(*terms), **settings))
         except ValueError as error:  # Python refuses to print more than 4300 digits
             raise InputError(f"found a number that is too long for SymPy: {error}") from error
-        return re.sub(r"&\n\s*", "", text)  # long lines of Fortran are broken where all are
+        return re.sub(r"&\n\s*", "", text)  # long lines of Fortran are broken later, with those of other languages
 
     return write

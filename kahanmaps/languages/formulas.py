@@ -40,11 +40,11 @@ class Formulas:
     """
 
     def __init__(self, file: SystemFile, symbols: Sequence[str] = ()) -> None:
-        """Raises InputError if these parameters cannot be symbols."""
+        """Collect the formulas; raises InputError if these parameters cannot be symbols."""
         self.file = file
         if isinstance(file.map, AlgebraicMap):
             if symbols:
-                raise InputError(f"found symbols beside a {file.map.root}, expected none: it is one")
+                raise InputError(f"found symbols together with a {file.map.root}, expected none: it is a symbol itself")
             self.map: MapFamily = file.map.given
         else:
             self.map = map_with_symbols(file, symbols)

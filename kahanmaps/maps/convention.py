@@ -17,7 +17,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import MapFamily
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
-NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
+NO_TIME_STEP = "eps enters the map as its file defines it; there is no time step"
 NO_EPS = "the map does not depend on eps"
 
 
@@ -52,7 +52,7 @@ def convention(*maps: MapFamily) -> str:
 
 
 def eps_share(map_: MapFamily) -> str:
-    """Return "eps is half the time step" or the like for a map; empty if it has no time step."""
+    """Return a sentence such as "eps is half the time step" for a map; empty if it has no time step."""
     if not map_.time_steps:
         return ""
     return f"eps is {'half' if map_.time_steps == 1 else f'{fmpq(1, 2 * map_.time_steps)} of'} the time step"

@@ -102,6 +102,7 @@ class Equation:
             return None
         denominator = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
         forms = [-row[-1] * (denominator / row[i]) for i, row in enumerate(rows)] + [denominator]
+        # The fractions need not be in lowest terms: their common denominator may share a factor with all numerators.
         common = reduce(lambda P, Q: P.gcd(Q), forms)
         forms = [form / common for form in forms]
         degree = forms[-1].total_degree()

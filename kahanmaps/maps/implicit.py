@@ -528,7 +528,7 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
     if element == 0:
         if isinstance(eps, int | str | Fraction | fmpz | fmpq) and rational(eps) != 0:
             raise BadPrime(
-                f"the prime {over.characteristic} divides the numerator of eps = {eps}: take another prime",
+                f"the prime {over.characteristic} divides the numerator of eps = {eps}: use another prime",
                 over.characteristic,
             )
         raise InputError("found eps = 0, expected another number: at eps = 0 a map with a time step is the identity")
@@ -536,7 +536,7 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
 
 
 def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
-    """Return what is wrong with a map given by the user, tested at random points modulo primes; empty if nothing is.
+    """Return the error in a map given by the user, tested at random points modulo primes; empty if there is none.
 
     The map must be defined and dominant, and an inverse map that is given must be the inverse. A wrong map passes one
     of the three points with probability below 2^-40. If `root` is given, the only symbol stands for it, and primes are

@@ -116,7 +116,7 @@ def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, 
     """Return a random point (x, x~) of the graph modulo a random prime, followed by values of the symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
     rng = random.Random(f"graph {derive_seed(seed, *(entry for row in rows for entry in row))}")
-    while True:
+    while True:  # ends: only finitely many primes are bad, and the matrix is singular on a hypersurface only
         field = PrimeField(random_prime(rng, bits)) if bits else random_prime_field(rng)
         arguments = [field.random(rng) for _ in names]
         try:
@@ -163,7 +163,7 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
         eliminated, slope = _coefficients(chosen, u)
         others = [_substituted(p, u, -eliminated, slope) for p in relations if p is not chosen]
         solution = _solved(others, [v for v in unknowns if v != u], on_graph)
-        (a, b), (c, d) = (_put_in(part, solution) for part in (-eliminated, slope))
+        (a, b), (c, d) = (_substitute_solution(part, solution) for part in (-eliminated, slope))
         return solution | {u: _lowest(a * d, b * c)}
     # No equation is linear in an unknown: resultants eliminate one.
     if len(unknowns) == 1:
@@ -183,7 +183,7 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
     solution = _solved(eliminated, others, on_graph)
     common = None
     for p in through:
-        numerator, _ = _put_in(p, solution)
+        numerator, _ = _substitute_solution(p, solution)
         common = numerator if common is None else common.gcd(numerator)
     return solution | _solved([common], [u], on_graph)
 
@@ -207,7 +207,7 @@ def _substituted(polynomial: Any, u: int, numerator: Any, denominator: Any) -> A
     return total
 
 
-def _put_in(polynomial: Any, solution: Solution) -> Quotient:
+def _substitute_solution(polynomial: Any, solution: Solution) -> Quotient:
     """Substitute the solution for the unknowns."""
     denominator = polynomial.context().constant(1)
     for u, (numerator, denominator_of_unknown) in solution.items():

@@ -127,6 +127,7 @@ class KahanMap(LatexDisplay, ElementaryMap):
         """The equation (I - eps f'(x)) x~ - (I + eps B) x - 2 eps c = 0."""
         field, eps, n = self.field, self.eps, self.dim
         exponents = tuple(tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1))
+        # Linear terms are averaged, B (x + x~)/2, so that eps B occurs in the matrix and on the right-hand side.
         with field.working():
             tensor = (self.local.tensor * -eps).entries()
             B, c = (self.local.B * eps).entries(), (self.local.c * (-2 * eps)).entries()

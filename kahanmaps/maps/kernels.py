@@ -36,5 +36,5 @@ def choose_kernel(requested: str | None, is_long: bool) -> str:
     if requested not in (None, *KERNELS):
         raise InputError(f"found the kernel {requested!r}, expected {' or '.join(KERNELS)}")
     if requested == "numba" and not has_numba():
-        raise InputError("the kernel numba needs numba: pip install 'kahanmaps[fast]', or take the kernel numpy")
+        raise InputError("the kernel numba needs numba: pip install 'kahanmaps[fast]', or use the kernel numpy")
     return requested or ("numba" if is_long and has_numba() else "numpy")

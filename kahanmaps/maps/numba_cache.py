@@ -18,7 +18,7 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
     save = compiled_function._cache.save_overload
 
     def save_if_possible(signature: Any, data: Any) -> None:
-        with suppress(OSError):  # the disk is full, the folder gone: the code is in memory all the same
+        with suppress(OSError):  # the disk is full or the folder was removed: the compiled code is in memory
             save(signature, data)
 
     compiled_function._cache.save_overload = save_if_possible

@@ -87,6 +87,7 @@ def _linear_in_one_point(
         factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
         factors += [None] * (degree - len(factors))
         share = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
+        # The mean over all arrangements is the symmetric form. Some of them are equal, and are counted as often.
         for arrangement in permutations(factors):
             product = share
             for point, j in zip(points, arrangement[:copies], strict=True):

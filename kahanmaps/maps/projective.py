@@ -1,7 +1,7 @@
 """A map on projective space: (X : Z), x = X/Z, goes to the kernel of the matrix L of its equation.
 
 The n x (n + 1) matrix L of forms of degree d in (X : Z) (equation.py) has n + 1 signed maximal minors, which are forms
-of degree n d; what they have in common may be divided out. The forms of several factors are put into each
+of degree n d; a common factor may be divided out. The forms of several factors are put into each
 other. Source: petrera-suris-2016, eq. (eq: Phi gen).
 """
 

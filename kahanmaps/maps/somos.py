@@ -100,7 +100,7 @@ class Terms:
     """
 
     def __init__(self, first: Sequence[Any], numbers: Any, multiples: Terms | None = None, gamma: Any = None) -> None:
-        """Start from t(1) to t(4); `multiples` is W unless this is W itself. W(1) = 1, W(2) has no other primes."""
+        """Start from t(1), ..., t(4); `multiples` is W, None if this is W. W(1) = 1; primes of W(2) are in the set."""
         self._W = self if multiples is None else multiples
         self._numbers, self._gamma = numbers, gamma
         self._terms: dict[int, Any] = {}

@@ -1,6 +1,6 @@
 """Negative controls: input that breaks exactly one hypothesis. On it the claims that need the hypothesis must fail.
 
-A control takes the paper's objects and returns broken ones; what it changes is random. A claim names the controls that
+A control takes the paper's objects and returns broken ones; the change is random. A claim names the controls that
 refute it. A claim that no control can refute would not be a check.
 """
 

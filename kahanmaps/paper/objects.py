@@ -75,7 +75,7 @@ class PaperObjects:
     gradient_of_linear_part: Any = None
     minus: Any = None
     base: SystemOver | None = None  # f_0, where it comes from a rational system
-    sign_vectors: tuple[tuple[int, ...], ...] | None = None  # the associated systems to look at; None: all
+    sign_vectors: tuple[tuple[int, ...], ...] | None = None  # the associated systems to be tested; None: all
     associate_matrices: tuple[Any, ...] | None = None  # their B, where they are given without the roots of chi
     free_indices: tuple[int, ...] | None = None  # those i that a claim for all i is tried at; None: all
     order: int = 3  # to which order in eps^2 series are expanded
@@ -98,7 +98,7 @@ class PaperObjects:
 
     @property
     def m(self) -> int:
-        """Half the dimension, m."""
+        """The number m, half the dimension."""
         return self.n // 2
 
     # ---- numbers, vectors and matrices --------------------------------------------------------------------------

@@ -69,7 +69,7 @@ class Claim:
     function: ClaimFunction
     breaks: tuple[str, ...]
     kind: ClaimKind = ClaimKind.EQUAL
-    at_most: str = ""  # of a rank that is attained: why it cannot be larger
+    at_most: str = ""  # for a rank that is attained: why it cannot be larger
     least_m: int = 1
     only_m: int | None = None
     in_general: bool = False  # stated for generic A and H: a special member for which it fails refutes nothing
@@ -79,9 +79,9 @@ class Claim:
     blockwise: bool = False
     pairwise: bool = False
     symplectic: bool = True  # keeps its form under symplectic changes of coordinates and extensions of the field
-    theorem: str = ""  # what proves it for all data, its hypotheses true by construction, where nothing is expanded
+    theorem: str = ""  # the theorem that proves it for all data without expansion; its hypotheses hold by construction
     formal: Callable[[], Pairs] | None = None  # identities of formal_proofs.py that prove it in every dimension
-    statement: str = ""  # of one that is asked of several variations: the statement, and the variation
+    statement: str = ""  # of a claim that is tested for several variations: the statement, and the variation
     variation: str = ""
     misprint: str = ""  # not empty: this is the form printed, it fails, and here is why
 
@@ -139,7 +139,7 @@ def claims() -> tuple[Claim, ...]:
 
 # ---- evaluating a claim ----------------------------------------------------------------------------------------
 
-# What evaluating a claim raises where it is not defined.
+# The exceptions that a claim raises at points where it is not defined.
 UNDEFINED = (SingularStep, SingularMatrix, ZeroDivisionError)
 
 

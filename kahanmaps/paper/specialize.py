@@ -1,7 +1,7 @@
 """The objects of the paper over several fields: for a given member, and for the member with indeterminate data.
 
 * `MemberObjects`: a member at a point, over QQ or GF(p); where the library has its own code for a letter (the chain,
-  the associated systems, the integrals, Pi), that code is what is tested.
+  the associated systems, the integrals, Pi), the claims test that code.
 * `normal_form_objects`: the normal form with indeterminate roots, coefficients, x and eps. Over the splitting field of
   chi every member with distinct roots is symplectically similar to a specialization of it (docs/mathematics.md).
 * `random_objects`: everything at random over GF(p), hidden by a random symplectic matrix.
@@ -35,13 +35,13 @@ from kahanmaps.systems.quadratic import SystemOver
 
 Draw = Callable[[str], Any]
 
-_SHEARS = 5  # symmetric ones, upper and lower in turn: with so many they reach every symplectic matrix
-# Above so many sign vectors a sample is taken: all single flips, and random ones.
+_SHEARS = 5  # symmetric, upper and lower in turn: products of this number give every symplectic matrix
+# If there are more sign vectors, a sample is taken: all single flips, and random ones.
 MAX_SIGN_VECTORS = 32
 
 
 class MemberObjects(PaperObjects):
-    """A given member at a point: at a point the letters for which the library has code of its own come from it.
+    """A given member at a point: values for which the library has its own code are computed by that code.
 
     Inside derivatives (dual numbers) and in variations they are computed as everywhere else.
     """
@@ -130,7 +130,8 @@ def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
 
 
 def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[PrimeField, tuple[Any, ...]] | None:
-    """A random prime field of 63 bits in which chi has m distinct roots, and the roots; None after so many tries.
+    """A random prime field of 63 bits in which chi has m distinct roots, and the roots; None if no prime tried has this
+    property.
 
     Drawn from all primes of that size until one fits, so it is uniform among those that fit.
     """
@@ -224,7 +225,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
             return K.column([K.one] * m + [K.zero] * m)
         return K.column([by_name[letter] for letter in letters[name]])
 
-    # Blocks may be permuted, and signs enter block by block: so many minus signs, on the first blocks, stand for all.
+    # Blocks may be permuted, and signs enter block by block: their number, on the first blocks, represents all.
     signs = tuple(tuple(-1 if j <= i else 1 for j in range(m)) for i in range(max(1, m - 1)))
     objects = PaperObjects(
         K=K,
@@ -280,7 +281,7 @@ def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, or
 
 
 def complex_roots(member: FamilyMember, bits: int) -> tuple[Any, ...]:
-    """Return balls of so many bits that enclose the complex roots of chi."""
+    """Return balls of this precision that enclose the complex roots of chi."""
     K = CC(bits)
     chi = chi_of(member.A)
     with K.working():

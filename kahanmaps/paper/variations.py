@@ -1,7 +1,7 @@
 """Variations of the hypotheses of the paper: other H, other J, other steps, other A.
 
-A variation takes the paper's objects and returns others, like a control; but it is not said beforehand that a statement
-fails. `varied=False` of the objects leaves everything as in the paper, which is the control of what fails.
+A variation takes the paper's objects and returns others, like a control; but it is not known in advance whether a
+statement fails. `varied=False` of the objects leaves everything as in the paper, which is the control of what fails.
 """
 
 from __future__ import annotations
@@ -89,5 +89,5 @@ VARIATIONS: dict[str, Variation] = {
 
 
 def varied(name: str, o: PaperObjects) -> PaperObjects:
-    """The objects varied, or as they are where `o.varied` is False."""
+    """Return the varied objects, or the objects unchanged if `o.varied` is False."""
     return VARIATIONS[name].function(o) if o.varied else o

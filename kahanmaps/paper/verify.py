@@ -71,7 +71,7 @@ PROOF_BUDGET = 50_000_000
 _MAX_INDETERMINATES = 64  # of a proof for one member
 _MAX_UNDEFINED = 40
 _POINTS = 4  # for statements that something differs, or has full rank
-_LARGE = 5  # from this m on, controls are looked at over GF(p) first
+_LARGE = 5  # from this m on, controls are evaluated over GF(p) first
 NOTE_ON_PROOFS = (
     "proofs in normal form: the claim is an identity of rational functions in indeterminate roots of chi, coefficients "
     "of H, x and eps, multiplied out for so many planar blocks; it holds for every member with distinct roots, being "
@@ -133,11 +133,11 @@ def verify(
     Raises:
         InputError: where the system is not of kind [family], and for another m.
 
-    Source: petrera-suris-2016, all of it; schwartz-1980 for the bounds.
+    Source: petrera-suris-2016; schwartz-1980 for the bounds.
 
     >>> report = verify(m=2, options=VerifyOptions(sections=(6,)))
     >>> str(report.verdict), report.findings[1].claim
-    ('proved', 'Theorem 9: The Kahan maps of associated vector fields commute, all pairs of the class')
+    ('proved', 'Theorem 9: The Kahan maps of any two associated vector fields commute')
     >>> report.findings[1].also[0].data["error_bound"]
     '2^-145'
     """
@@ -460,7 +460,7 @@ class Verifier:
             yield Evidence("complex balls", text, {"bits": bits, "pairs": pairs})
 
     def notes(self) -> list[str]:
-        """Return the notes on the whole table."""
+        """Return the notes on the complete table."""
         if self.member is None:
             return [NOTE_ON_RANDOM_MEMBERS]
         notes = [diagnosis(self.member.A)]
@@ -490,7 +490,7 @@ class Verifier:
                 verdict, what = Certainty.REFUTED, f"fails at an exact point over {outcome.objects.K.name}"
             evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
-            place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
+            place = {**finding.place, "violated_hypothesis": name, "violation": CONTROLS[name].breaks}
             controls.append(replace(finding, control=True, place=place))
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
         return [finding for finding in controls if finding.is_as_expected] or controls
@@ -499,7 +499,7 @@ class Verifier:
         """The claim on input broken by a control, at a point at which it fails; else the last outcome.
 
         One point refutes an equation, a rational one unless m is large; that something differs, exists or has a certain
-        rank is refuted where several points in a row do not show it. Over Q ranks and steps of broken maps, where
+        rank is refuted if several consecutive points do not show it. Over Q ranks and steps of broken maps, where
         nothing cancels, take minutes from m = 5 on.
         """
         at_one = claim.kind is ClaimKind.EQUAL
@@ -541,7 +541,7 @@ class ClaimAtPoints:
     """A claim at the points of a verifier, in the form that `decide` requires."""
 
     name = "claim"
-    no_value = "a denominator seems to vanish identically"
+    undefined_reason = "a denominator seems to vanish identically"
     max_failures = _MAX_UNDEFINED
 
     def __init__(self, verifier: Verifier, claim: Claim) -> None:
@@ -574,7 +574,7 @@ class ClaimAtPoints:
                 why = "chi splits" if self._roots else "all denominators are units, so it fails over Q"
                 text = f"fails at a point over {outcome.objects.K.name}, where {why}"
                 evidence = Evidence("point over GF(p)", text)
-                # A rational point is better to look at.
+                # A rational point is easier to read.
                 exact = (self._verifier.exact_point(self._roots, exact_number) for exact_number in range(12))
                 if failure := next((failure for failure in outcomes(self._claim, exact) if not failure.holds), None):
                     outcome = failure

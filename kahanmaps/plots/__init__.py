@@ -1,6 +1,6 @@
 """Pictures, from values that were computed before: results in, figures out.
 
-style             sizes in centimetres, fonts, colors that the color-blind and a gray printer tell apart
+style             sizes in centimetres, fonts, colors that are distinct for the color-blind and on gray printers
 figures           an empty figure in a style, its texts and legend; as a file (PDF, SVG, PNG) or as SVG inside a page
 growth            degrees of iterates, heights of exact orbits
 scan              the plane of two parameters, with what a scan found in it

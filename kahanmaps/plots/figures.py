@@ -126,7 +126,7 @@ def label_of(text: str) -> str:
 
 
 def _is_word(text: str) -> bool:
-    """Whether letters are a word, as in modified_H: not a symbol, such as x, al, or the name of a Greek letter."""
+    """Return whether letters form a word, as in modified_H: not a symbol such as x, al, or a Greek letter by name."""
     return len(text) > 2 and text.isalpha() and latex_name(text) == text
 
 

@@ -48,7 +48,7 @@ _ASPECT = 0.62  # of the axes
 def plot_degrees(
     growths: Mapping[str, DegreeGrowth], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Degrees d_n of the iterates against n, for one or more systems by their names.
+    """Plot the degrees d_n of the iterates against n, for one or more systems by their names.
 
     Marks are the measured degrees. A solid line is the recurrence that they satisfy; dots join degrees for which none
     could be checked, and what the legend says of their growth is estimated. `scale` is "linear", "log" (exponential
@@ -65,10 +65,12 @@ def plot_degrees(
     if not 1 <= len(growths) <= _MAX_SYSTEMS:
         raise InputError(f"found {len(growths)} systems, expected 1 to {_MAX_SYSTEMS} in one picture")
     style = style or Style()
-    is_log = any(one.looks_exponential or one.growth is Growth.EXPONENTIAL for one in growths.values())
+    is_log = any(each.looks_exponential or each.growth is Growth.EXPONENTIAL for each in growths.values())
     scale = _scale(scale, "log" if is_log else "linear")
-    rests = [_degree_label(growth) for growth in growths.values()]
-    labels = [plain(shortened_name(name, rest, style)) + rest for name, rest in zip(growths, rests, strict=True)]
+    suffixes = [_degree_label(growth) for growth in growths.values()]
+    labels = [
+        plain(shortened_name(name, suffix, style)) + suffix for name, suffix in zip(growths, suffixes, strict=True)
+    ]
     values = [d for growth in growths.values() for d in growth.degrees]
     positive = [d for d in values if d]
     with drawing(style):
@@ -89,11 +91,16 @@ def plot_degrees(
             # On a logarithmic scale no line leads to a degree 0, which lies in its band.
             is_gap = np.array([scale != "linear" and not growth.degrees[n] for n in steps])
             n, d = steps, np.where(is_gap, np.nan, heights)
-            found = growth.recurrence
-            if found is not None and found.closed_form and ";" not in found.closed_form and found.preperiod == 0:
+            recurrence = growth.recurrence
+            if (
+                recurrence is not None
+                and recurrence.closed_form
+                and ";" not in recurrence.closed_form
+                and recurrence.preperiod == 0
+            ):
                 # One polynomial: a smooth curve, else straight lines from point to point.
-                few = range(found.power + 1)
-                law = np.polynomial.Polynomial.fit(list(few), [found.predict(n) for n in few], found.power)
+                few = range(recurrence.power + 1)
+                law = np.polynomial.Polynomial.fit(list(few), [recurrence.predict(n) for n in few], recurrence.power)
                 n = np.linspace(steps[0], steps[-1], 200)
                 d = law(n)
             axes.plot(n, d, zorder=2, **line, **look)
@@ -110,7 +117,7 @@ def plot_degrees(
 
 
 def _degree_label(growth: DegreeGrowth) -> str:
-    """A line of the legend behind the name: what d_n is, the dynamical degree and what is estimated."""
+    """Return the text after the name in the legend: meaning of d_n, dynamical degree, and a mark for estimates."""
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
@@ -130,8 +137,8 @@ def _degree_label(growth: DegreeGrowth) -> str:
     elif growth.growth is not Growth.EXPONENTIAL:
         parts.append(f"{growth.growth}")
     if rate is not None:
-        whole = rate.minimal_polynomial.degree() == 1
-        number = rate.digits if whole else rf"{float(rate.digits):.5f}\ldots"
+        is_integer = rate.minimal_polynomial.degree() == 1
+        number = rate.digits if is_integer else rf"{float(rate.digits):.5f}\ldots"
         parts.append(rf"$\lambda = {number}$")
     return f"{name}: {', '.join(parts) or str(growth.growth)}"
 
@@ -139,7 +146,7 @@ def _degree_label(growth: DegreeGrowth) -> str:
 def plot_heights(
     survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
 ) -> Figure:
-    """Heights of exact orbits against the step, with the growth that was fitted, a color for each eps.
+    """Plot the heights of exact orbits against the step, with the fitted growth, in a color for each eps.
 
     Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2, c n (each with its lower
     terms) or a factor in each step; orbits whose growth is bounded, logarithmic or undecided have none. `scale` is
@@ -173,7 +180,9 @@ def plot_heights(
             mark: dict[str, Any] = {"marker": MARKS[k], "markerfacecolor": "none", "markeredgewidth": 0.5}
             for curve in some:
                 rows = np.flatnonzero(curve.steps >= (1 if from_one else 0))
-                if len(rows) > _MARKS:  # as many marks as stand apart along the axis, the first and the last among them
+                if (
+                    len(rows) > _MARKS
+                ):  # as many marks as can be distinguished along the axis, with the first and the last
                     steps = curve.steps[rows].astype(np.float64)
                     spaced = (np.geomspace if from_one else np.linspace)(steps[0], steps[-1], _MARKS)
                     rows = rows[np.unique(np.abs(steps[:, None] - spaced).argmin(axis=0))]
@@ -242,7 +251,7 @@ _UNREADABLE = (LookupError, TypeError, ValueError, ArithmeticError, AttributeErr
 def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGrowth]:
     """The name of the system, and the degrees, in the JSON object that `kahanmaps degrees --json` writes.
 
-    The recurrence is looked for anew; records of older versions have no patterns of singularities.
+    The recurrence is searched for again; records of older versions have no patterns of singularities.
     Raises InputError for anything else.
 
     >>> record = {"command": "degrees", "system": "top", "degrees": [1, 3, 9, 19, 33, 51, 73, 99], "eps": "generic"}
@@ -313,7 +322,7 @@ def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
     >>> curve.bits[:6].tolist(), str(curve.kind), round(curve.constant, 4)
     ([2.0, 7.0, 17.0, 32.0, 52.0, 82.0], 'quadratic', 3.0413)
     """
-    found = []
+    curves = []
     for orbit in survey.orbits:
         growth = orbit.growth
         steps, bits = np.array(growth.steps, dtype=np.int64), np.array(growth.heights, dtype=np.float64)
@@ -321,10 +330,10 @@ def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
         ratio = None
         if growth.ratio is not None and growth.kind is Growth.EXPONENTIAL:
             ratio = float(growth.ratio) ** (1 / growth.every)
-        found.append(
+        curves.append(
             HeightCurve(orbit.eps, steps, bits, growth.kind, constant, ratio, growth.end.status, survey.has_eps)
         )
-    return tuple(found)
+    return tuple(curves)
 
 
 def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, ...]:
@@ -335,23 +344,25 @@ def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, .
     orbits = record.get("orbits") if isinstance(record, Mapping) and record.get("command") == "heights" else None
     if not isinstance(orbits, list) or not 1 <= len(orbits) <= _MAX_ORBITS:
         raise InputError(f"{where}: found something else, expected an object written by 'kahanmaps heights --json'")
-    found = []
+    curves = []
     try:
         for orbit in orbits:
-            steps = [_integer(one["step"]) for one in orbit["heights"]]
-            bits = [_integer(one["bits"]) for one in orbit["heights"]]
+            steps = [_integer(height["step"]) for height in orbit["heights"]]
+            bits = [_integer(height["bits"]) for height in orbit["heights"]]
             if not steps or any(later <= earlier for earlier, later in pairwise(steps)):
-                raise InputError("steps do not increase")
+                raise InputError("expected increasing steps")
             kind, every = Growth(orbit["kind"]), max(1, _integer(orbit["every"]))
             constant = None if orbit["constant"] is None else float(orbit["constant"])
             ratio = None
             if orbit["ratio"] is not None and kind is Growth.EXPONENTIAL:
                 ratio = float(orbit["ratio"]) ** (1 / every)
             numbers = np.array(steps, dtype=np.int64), np.array(bits, dtype=np.float64)
-            found.append(HeightCurve(parse_number(orbit["eps"]), *numbers, kind, constant, ratio, str(orbit["status"])))
+            curves.append(
+                HeightCurve(parse_number(orbit["eps"]), *numbers, kind, constant, ratio, str(orbit["status"]))
+            )
     except _UNREADABLE as error:
         raise InputError(f"{where}: found an orbit that cannot be read ({error}), expected one of heights") from error
-    return tuple(found)
+    return tuple(curves)
 
 
 def _integer(value: Any) -> int:
@@ -361,7 +372,7 @@ def _integer(value: Any) -> int:
 
 
 def fit_of(curve: HeightCurve) -> Callable[[Any], Any] | None:
-    """The law that was fitted, as a function of the step, NaN where it is not positive; None where there is none.
+    """Return the fitted law as a function of the step, NaN where it is not positive; None if no law was fitted.
 
     For c n^2 and c n, c is that of the library, and the terms of lower degree fit the heights best in the sense of
     least squares. The exponential goes through the last height.

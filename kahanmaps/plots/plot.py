@@ -31,36 +31,38 @@ class Plot:
     def __reduce__(self) -> str:
         return "plot"  # there is one, `km.plot`
 
-    def degrees(self, found: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
-        """What `km.degrees` found; `scale` is "linear", "log" or "loglog"."""
+    def degrees(self, growth: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
+        """Plot the result of `km.degrees`; `scale` is "linear", "log" or "loglog"."""
         from kahanmaps.plots.growth import plot_degrees
 
-        _require(found, DegreeGrowth, "a result: km.plot.degrees(km.degrees(...))")
-        axes: Axes = plot_degrees({label: found}, scale=scale).axes[0]
+        _require(growth, DegreeGrowth, "a result: km.plot.degrees(km.degrees(...))")
+        axes: Axes = plot_degrees({label: growth}, scale=scale).axes[0]
         return axes
 
-    def heights(self, found: HeightSurvey, *, scale: str | None = None) -> Axes:
-        """What `km.heights` found."""
+    def heights(self, survey: HeightSurvey, *, scale: str | None = None) -> Axes:
+        """Plot the result of `km.heights`."""
         from kahanmaps.plots.growth import plot_heights
 
-        _require(found, HeightSurvey, "a result: km.plot.heights(km.heights(...))")
-        axes: Axes = plot_heights(found, scale=scale).axes[0]
+        _require(survey, HeightSurvey, "a result: km.plot.heights(km.heights(...))")
+        axes: Axes = plot_heights(survey, scale=scale).axes[0]
         return axes
 
-    def orbit(self, found: Trajectory, x: int = 0, y: int = 1) -> Axes:
+    def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""
-        _require(found, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")
-        points = np.asarray(found)[:, None]
-        return _drawn(Trajectories(found.variables, points, np.array([point.step for point in found])), (x, y))
+        _require(trajectory, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")
+        points = np.asarray(trajectory)[:, None]
+        return _drawn(
+            Trajectories(trajectory.variables, points, np.array([point.step for point in trajectory])), (x, y)
+        )
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
-        """As `km.portrait`."""
+        """Draw a portrait, as `km.portrait` does."""
         return plot_orbits(given, *others, **options)
 
 
-def _require(found: Any, kind: type, expected: str) -> None:
-    if not isinstance(found, kind):
-        raise InputError(f"found a {type(found).__name__}, expected {expected}")
+def _require(value: Any, kind: type, expected: str) -> None:
+    if not isinstance(value, kind):
+        raise InputError(f"found a {type(value).__name__}, expected {expected}")
 
 
 def plot_orbits(
@@ -89,13 +91,13 @@ def plot_orbits(
     return _drawn(walked(ensemble_for(real_approximation.map, value, x, steps), steps), axes)
 
 
-def _drawn(found: Trajectories, axes: Sequence[int]) -> Axes:
+def _drawn(trajectories: Trajectories, axes: Sequence[int]) -> Axes:
     from kahanmaps.plots.portraits.portrait import plot_portrait
 
-    if not all(0 <= k < len(found.variables) for k in axes):
-        raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(found.variables)}")
-    shown = [point_function(found.variables[k], found.variables) for k in axes]
-    drawn: Axes = plot_portrait(portrait_of(found, shown), Style()).axes[0]
+    if not all(0 <= k < len(trajectories.variables) for k in axes):
+        raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(trajectories.variables)}")
+    shown = [point_function(trajectories.variables[k], trajectories.variables) for k in axes]
+    drawn: Axes = plot_portrait(portrait_of(trajectories, shown), Style()).axes[0]
     return drawn
 
 

@@ -52,13 +52,13 @@ class PointFunction:
         return value
 
     def parts(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Numerator and denominator at points (..., dim)."""
+        """Return numerator and denominator at points (..., dim)."""
         with np.errstate(all="ignore"):
             return self._value(self.function.numerator, points), self._value(self.function.denominator, points)
 
     @property
     def variable(self) -> int | None:
-        """Which variable it is, None where it is none."""
+        """The index of the variable that this function is; None if it is not a variable."""
         if not self.function.denominator.is_one():
             return None
         for index, generator in enumerate(self.function.numerator.context().gens()[:-1]):
@@ -102,7 +102,9 @@ def point_function(
     if function is None:
         if is_name(text) and text not in (*names, *(parameters or {})):
             integrals = f"; integrals are named {', '.join(named)}" if named else ""
-            raise InputError(f"found the name {text}, known are {', '.join((*names, *(parameters or {})))}{integrals}")
+            raise InputError(
+                f"found the name {text}, expected one of {', '.join((*names, *(parameters or {})))}{integrals}"
+            )
         function = parse_rational_function(text, names, dict(parameters or {}))
     uses_eps = any(int(part.degrees()[-1]) > 0 for part in (function.numerator, function.denominator))
     if uses_eps and eps is None:

@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.8
-_MANY = f"{Growth.EXPONENTIAL} growth"  # drawn thin, and none of it is named
+_MANY = f"{Growth.EXPONENTIAL} growth"  # drawn as thin lines without labels
 _CONDITION_SIZE = 0.8  # of the letters of conditions, in units of that of other text
-_PLACES, _DOTS = 12, 300  # parts of a curve, at whose ends its condition may stand, and to tell what it crosses
+_PLACES, _DOTS = 12, 300  # parts of a curve: at whose ends its condition may be written, and to find what it crosses
 _INNER = 0.85  # of the width and height of the picture, the axes
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
 def plot_scan(
-    found: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
+    scan: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
 ) -> Figure:
-    """Curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
+    """Draw curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
 
     `window` is (low, high) of each parameter; by default it holds most of the points with rational parameters. With
     `modulo`, one of the primes modulo which all members were tried, the special ones among these, those on no component
@@ -56,50 +56,55 @@ def plot_scan(
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['linear growth']
     """
-    if len(found.over) != 2:
-        raise InputError(f"found a scan over {', '.join(found.over)}, expected two parameters: a plane is drawn")
+    if len(scan.over) != 2:
+        raise InputError(f"found a scan over {', '.join(scan.over)}, expected two parameters: a plane is drawn")
     style = style or Style()
     kinds: dict[str, list[Component]] = {}  # by the growth of their blocks, the slowest first
-    for _, some in found.classes:
+    for _, some in scan.classes:
         growth = growth_on(some)
         kinds.setdefault(f"{Growth.UNKNOWN if growth is None else growth.growth} growth", []).extend(some)
     if modulo is not None:
-        known = {one.prime: one for one in found.sweeps if one.complete}
+        known = {component.prime: component for component in scan.sweeps if component.complete}
         if modulo not in known:
             tried = ", ".join(map(str, known)) or "none were tried"
             raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
         # The special members, each with the growth of a component that it is on and has the degrees of.
-        rest = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
+        unassigned = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
         special = []
         for kind, some in kinds.items():
             dots, texts = list[tuple[int, ...]](), list[tuple[str, Sequence[tuple[float, ...]]]]()
-            for one in some:
-                before = rest.get(one.degrees, [])
-                rest[one.degrees] = points_outside(before, [one], modulo) if before else []
-                on = sorted(set(before) - set(rest[one.degrees]))
+            for component in some:
+                before = unassigned.get(component.degrees, [])
+                unassigned[component.degrees] = points_outside(before, [component], modulo) if before else []
+                on = sorted(set(before) - set(unassigned[component.degrees]))
                 dots += on
-                texts += [(one.text, [on[len(on) // 2]])] if on and kind != _MANY else []
+                texts += [(component.text, [on[len(on) // 2]])] if on and kind != _MANY else []
             special.append(_Kind(kind, dots, [], texts))
-        if left := [point for points in rest.values() for point in points]:
+        if left := [point for points in unassigned.values() for point in points]:
             special.append(_Kind("on no component", left, [], []))
-        return _draw(found, style, special, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
-    points = {kind: [_place(one) for one in some if one.is_rational_point] for kind, some in kinds.items()}
+        return _draw(scan, style, special, ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
+    points = {
+        kind: [_place(component) for component in some if component.is_rational_point] for kind, some in kinds.items()
+    }
     if window is None:
         every = [place for some in points.values() for place in some]
         window = window_of(np.array(every)) if len(every) > 1 else _USUAL
     drawn, context = [], ring(["u", "v", "eps"])
     for kind, some in kinds.items():
         curves = []
-        for one in some:
-            if one.dimension != 1:
+        for component in some:
+            if component.dimension != 1:
                 continue
-            equation = one.equations[0].compose(*context.gens()[:2], ctx=context)
-            function = PointFunction(one.text, RationalFunction(equation, context.constant(1)))
+            equation = component.equations[0].compose(*context.gens()[:2], ctx=context)
+            function = PointFunction(component.text, RationalFunction(equation, context.constant(1)))
             if pieces := level_curves(function, (0, 1), 2, [0.0], window)[0]:
-                curves.append((one.text, pieces))
+                curves.append((component.text, pieces))
         labels: list[tuple[str, Sequence[tuple[float, ...]]]]
-        labels = [(one.text, [_place(one)]) for one in some if one.is_rational_point]
-        for text, pieces in curves:  # on the longest piece, first where other curves seldom cross it: off the middle
+        labels = [(component.text, [_place(component)]) for component in some if component.is_rational_point]
+        for (
+            text,
+            pieces,
+        ) in curves:  # on the longest piece, preferably off its middle, where other curves rarely cross it
             longest = max(pieces, key=len)
             ends = _resampled(longest, _PLACES + 1)
             parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))
@@ -107,12 +112,12 @@ def plot_scan(
             labels.append((text, [tuple(map(float, point)) for point in nearest]))
         every_piece = [piece for _, pieces in curves for piece in pieces]
         drawn.append(_Kind(kind, points[kind], every_piece, labels if kind != _MANY else []))
-    return _draw(found, style, drawn, window, "")
+    return _draw(scan, style, drawn, window, "")
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """What has one color: points, pieces of curves, and conditions at the places where they are written."""
+    """The objects of one color: points, pieces of curves, and conditions with the places where they are written."""
 
     name: str
     points: Sequence[tuple[float, ...]]
@@ -120,7 +125,7 @@ class _Kind:
     labels: Sequence[tuple[str, Sequence[tuple[float, ...]]]]
 
 
-def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_name: str) -> Figure:
+def _draw(scan: Scan, style: Style, kinds: list[_Kind], window: Window, beside_name: str) -> Figure:
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
@@ -147,22 +152,23 @@ def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_
                 handles.append(Line2D([], [], color=color, markersize=size, linewidth=width, **shown))
         _write(axes, kinds, window, style)
         axes.set(xlim=window[0], ylim=window[1])
-        axes.set(xlabel=label_of(found.over[0]) + beside_name, ylabel=label_of(found.over[1]) + beside_name)
+        axes.set(xlabel=label_of(scan.over[0]) + beside_name, ylabel=label_of(scan.over[1]) + beside_name)
         if handles:
             legend_above(figure, handles, names, style)
     return figure
 
 
 def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None:
-    """Conditions beside what they describe, as far as there is room: curves first, which may cover points if need be.
+    """Write conditions next to their curves and points where there is room: curves first; these labels may cover
+    points.
 
-    Of points those with the fastest growth that is not exponential come first. Of the places where a text fits it takes
-    the one that the fewest curves cross.
+    Among points, those with the fastest growth that is not exponential come first. A label takes the place, of those
+    where it fits, that the fewest curves cross.
     """
     em = _CONDITION_SIZE * style.font_size
     across, high = (em / (72 * _INNER * inches) for inches in style.inches(_ASPECT))
-    wanted = [(*one, COLORS[k % len(COLORS)]) for k, kind in enumerate(kinds) for one in kind.labels]
-    wanted.sort(key=lambda one: (" = " not in one[0], -COLORS.index(one[2])))
+    labels = [(*entry, COLORS[k % len(COLORS)]) for k, kind in enumerate(kinds) for entry in kind.labels]
+    labels.sort(key=lambda entry: (" = " not in entry[0], -COLORS.index(entry[2])))
 
     def scaled(place: Sequence[float]) -> tuple[float, ...]:
         return tuple((c - low) / (end - low) for c, (low, end) in zip(place, window, strict=True))
@@ -172,38 +178,43 @@ def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None
         marks.append((x - 0.35 * across, x + 0.35 * across, y - 0.35 * high, y + 0.35 * high))
     lines = np.array([scaled(x) for kind in kinds for piece in kind.curves for x in _resampled(piece, _DOTS)])
     taken: list[tuple[float, ...]] = []
-    for text, places, color in wanted:
+    for text, places, color in labels:
         label, is_curve = label_of(text), " = " in text
         wide = LETTER_WIDTH * letter_count(label) * across
-        found: list[Any] = []
+        candidates: list[Any] = []
         for place, side, up in product(places, (1, -1), (1, -1)):
             x, y = scaled(place)
             low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.6 * high
             box = (low, low + wide, bottom, bottom + 1.2 * high)
-            covered = sum(_overlap(box, one) for one in marks)
-            if min(box) < 0 or max(box) > 1 or any(_overlap(box, one) for one in taken) or (covered and not is_curve):
+            covered = sum(_overlap(box, entry) for entry in marks)
+            if (
+                min(box) < 0
+                or max(box) > 1
+                or any(_overlap(box, entry) for entry in taken)
+                or (covered and not is_curve)
+            ):
                 continue
             held = (lines.reshape(-1, 2) > (box[0], box[2])) & (lines.reshape(-1, 2) < (box[1], box[3]))
-            found.append((covered, int(held.all(axis=1).sum()), len(found), place, side, up, box))
-        if found:
-            *_, place, side, up, box = min(found, key=lambda one: one[:3])
+            candidates.append((covered, int(held.all(axis=1).sum()), len(candidates), place, side, up, box))
+        if candidates:
+            *_, place, side, up, box = min(candidates, key=lambda entry: entry[:3])
             taken.append(box)
             where = {"ha": "left" if side > 0 else "right", "va": "center"}
             offset = (0.4 * em * side, 0.7 * em * up)
             write_beside(axes, label, place, offset, halo=2.5, size=em, color=color, zorder=20, **where)
 
 
-def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
+def _overlap(box: tuple[float, ...], other_box: tuple[float, ...]) -> bool:
+    return box[0] < other_box[1] and other_box[0] < box[1] and box[2] < other_box[3] and other_box[2] < box[3]
 
 
 def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
-    """So many points along a curve, at equal distances."""
+    """Return `count` points along a curve, at equal distances."""
     lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
     at = np.linspace(0, lengths[-1], count)
     return np.stack([np.interp(at, lengths, column) for column in piece.T], axis=-1)
 
 
-def _place(one: Component) -> tuple[float, float]:
-    first, second = (one.values or {}).values()
+def _place(component: Component) -> tuple[float, float]:
+    first, second = (component.values or {}).values()
     return float(first.p) / float(first.q), float(second.p) / float(second.q)

@@ -130,7 +130,7 @@ def squares(
                 try:
                     image = tuple(phi.step(points[-1]))
                 except SingularStep:
-                    missing.append(f"{name}: the map has no value at a point on the way")
+                    missing.append(f"{name}: the map is not defined at a point on the way")
             if image and max(entry.p.bit_length() + entry.q.bit_length() for entry in image) > MAX_BITS:
                 missing.append(f"{name}: the coordinates have more than {MAX_BITS} bits")
                 image = None
@@ -204,7 +204,7 @@ def plot_squares(
     """
     dim = squares_of_pairs[0].pair.f.dim
     if not all(np.isfinite(_table(squares.g_after_f)[0, 0]).all() for squares in squares_of_pairs):
-        raise InputError(f"found a start with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
+        raise InputError(f"found an initial point with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
     chosen = widest_axes(squares_of_pairs) if axes is None else axes
     if len(chosen) != 2 or not all(0 <= k < dim for k in chosen):
         raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
@@ -359,7 +359,7 @@ def _in_two_digits(number: float) -> str:
 def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:
     """A text beside a point, away from the middle of them all; long ones above or below, moved so as to stay inside.
 
-    `side` says how a long one is aligned, to which there is another one beside it.
+    `side` is the alignment of a long name that has another one beside it.
     """
     if not np.isfinite(point).all():
         return
@@ -384,7 +384,7 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
 
 
 def _table(lattice: Lattice) -> Floats:
-    """The points as floating-point numbers, nan where there is none or it is too large for them."""
+    """Return the points as floating-point numbers, nan for missing points and those that are too large."""
     missing = [float("nan")] * next(len(point) for row in lattice for point in row if point is not None)
-    found = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
-    return np.where(np.abs(found) < _LARGEST, found, np.nan)
+    table = np.array([[missing if point is None else to_floats(point).tolist() for point in row] for row in lattice])
+    return np.where(np.abs(table) < _LARGEST, table, np.nan)

@@ -1,4 +1,4 @@
-"""How pictures look: sizes as a journal states them, colors that color-blind readers can tell apart.
+"""The style of pictures: sizes as a journal states them, colors that color-blind readers can distinguish.
 
 The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up
 to four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown by
@@ -23,7 +23,7 @@ _MAX_PIXELS = 1 << 28  # a gigabyte while it is drawn
 
 @dataclass(frozen=True)
 class Style:
-    """How a picture is set: width and height in centimetres, letters in points, dots per inch of what is rasterised.
+    """The layout of a picture: width and height in centimetres, font size in points, dots per inch of rasterised parts.
 
     A height of None is left to the kind of picture. Raises InputError for sizes out of the range given with each, and
     for more than 2^28 dots in the picture.
@@ -50,22 +50,22 @@ class Style:
         ):
             if value is not None and not low <= value <= high:
                 # An integer may be beyond the range of floating-point numbers.
-                found = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
-                raise InputError(f"found {what.format(found)}, expected {low} to {high}")
+                given = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
+                raise InputError(f"found {what.format(given)}, expected {low} to {high}")
         self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
-        """Width and height in inches; `aspect` is height over width where the style has no height."""
+        """Width and height in inches; `aspect` is height over width if the style has no height."""
         height = self.width * aspect if self.height is None else self.height
         return self.width / CENTIMETRES_PER_INCH, height / CENTIMETRES_PER_INCH
 
     def require_pixels(self, width: float, height: float) -> None:
-        """Raise InputError where a picture of so many inches would not fit into memory, at so many dots per inch."""
-        found = width * height * self.dpi**2
-        if found > _MAX_PIXELS:
+        """Raise InputError if a picture of this size in inches, at `dpi` dots per inch, would not fit into memory."""
+        given = width * height * self.dpi**2
+        if given > _MAX_PIXELS:
             raise InputError(
-                f"found {found:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
-                f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MAX_PIXELS:.2g}: take fewer dots per "
+                f"found {given:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
+                f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MAX_PIXELS:.2g}: use fewer dots per "
                 f"inch than {self.dpi}"
             )
 

@@ -29,7 +29,7 @@ from kahanmaps.version import __version__
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
 _MAX_SYSTEM = 200_000  # characters of a system file
 _MAX_EQUATIONS = 40
-# Commands with the words that belong to them, and words.
+# Commands of LaTeX with their arguments, and words.
 _WORDS = re.compile(r"\\(?:text|mathrm|begin|end)\{[^{}]*\}|\\[A-Za-z]+|[A-Za-z]{2,}")
 # Commands of text, for names with such characters, which latex2mathml would print as they stand.
 _TEXT_COMMANDS = {
@@ -79,7 +79,7 @@ def page(
 ) -> str:
     """Return a page without its empty sections. `script` is the only program that browsers may run.
 
-    `command`, `seed` (None if nothing is random) and `file` tell how the page was made.
+    `command`, `seed` (None if nothing is random) and `file` say how to reproduce the page.
     """
     remake: list[tuple[str, str]] = [("command", Html(f"<code>{text(command)}</code>"))] if command else []
     remake += [("version", f"kahanmaps {__version__}")]

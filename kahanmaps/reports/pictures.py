@@ -83,7 +83,7 @@ class Pictures:
     def portrait(self, file: SystemFile, eps: Any) -> str:
         """Draw sixteen orbits in the plane of the first two variables (in dimension 1 against the step).
 
-        The initial points lie around the fixed points of a vector field, or are random where there is none.
+        The initial points lie around the fixed points of a vector field, or are random if there is no vector field.
         """
         at = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []

@@ -71,7 +71,7 @@ class PolynomialField:
         return _from_text, (type(self), names, texts, self.symbols)
 
     def __hash__(self) -> int:
-        # All terms would make it slow; equal fields have equal hashes all the same.
+        # Hashing all terms would be slow; this hash is also the same for equal fields.
         return hash((self.variables, self.symbols, *(len(polynomial) for polynomial in self.rhs)))
 
 

@@ -62,7 +62,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
             if degree > 2 and self.symbols:
                 raise InputError(
                     f"found right-hand sides of degree {degree} in the variables with {', '.join(self.symbols)} as "
-                    "symbols, expected at most 2: leave the parameter that makes them cubic a number"
+                    "symbols, expected at most 2: give the parameter that makes them cubic a value"
                 )
             if degree > 2:
                 raise InputError(
@@ -166,7 +166,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
             return SystemOver.of(field_of_numbers, self, values)
         system = self._over.get(field_of_numbers)
         if system is None:
-            if len(self._over) >= 8:  # random primes come and go
+            if len(self._over) >= 8:  # systems modulo random primes are used only for a while
                 self._over.clear()
             system = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
         return system
@@ -254,7 +254,7 @@ class SystemOver:
 
     @cached_property
     def _slopes(self) -> list[Any]:
-        """The derivative of f' by each variable: f''(v) as their sum costs a third of a product of the whole tensor."""
+        """The derivatives of f' by each variable; f''(v) as their sum costs a third of a product with the tensor."""
         n, entries = self.dim, self.tensor.entries()
         with self.field.working():
             return [self.field.matrix(n, n, entries[k::n]) for k in range(n)]
@@ -284,5 +284,7 @@ def as_system(value: Any) -> QuadraticSystem:
     """Convert a value to a quadratic system; it takes the arguments of `maps.kahan.as_map`, except other maps."""
     if isinstance(value, QuadraticSystem):
         return value
-    system: QuadraticSystem = import_module("kahanmaps.documents.inline").as_file(value).system  # on a floor above
+    system: QuadraticSystem = (
+        import_module("kahanmaps.documents.inline").as_file(value).system
+    )  # imported from a higher layer
     return system

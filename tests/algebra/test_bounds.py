@@ -54,8 +54,8 @@ def test_entries_of_a_matrix_with_one_bound_are_different_denominators():
     assert not K.is_zero(p)
     assert not K.is_zero(q)
     assert K.pole_degree == 12
-    one = K.matrix(1, 1, [K.polynomial(3, 1.0)])
-    assert (K.one / one[0, 0] + K.one / one[0, 0]).pole_degree == 3
+    entry = K.matrix(1, 1, [K.polynomial(3, 1.0)])
+    assert (K.one / entry[0, 0] + K.one / entry[0, 0]).pole_degree == 3
 
 
 @st.composite

@@ -147,12 +147,12 @@ def test_both_ways_to_a_quotient_lead_to_the_same(field, monkeypatch):
 def test_both_ways_to_a_product_lead_to_the_same(field, monkeypatch):
     elements = [*long_elements(field, 3), field.convert(7**900)]
     products = [a * b for a in elements for b in elements]
-    asked = []
+    requested = []
     product = etale._product
     monkeypatch.setattr(etale, "_LONG_PRODUCT", 100)
-    monkeypatch.setattr(etale, "_product", lambda *both: asked.append(both) or product(*both))
+    monkeypatch.setattr(etale, "_product", lambda *both: requested.append(both) or product(*both))
     assert [a * b for a in elements for b in elements] == products
-    assert len(asked) == len(products)
+    assert len(requested) == len(products)
     monkeypatch.setattr(etale, "_MAX_COEFFICIENTS", field.degree - 1)  # with more coefficients FLINT is faster
     assert elements[0] * elements[1] == products[1]
-    assert len(asked) == len(products)
+    assert len(requested) == len(products)

@@ -42,7 +42,7 @@ POINT = (fmpq(17, 5), fmpq(-23, 7))
 def test_the_value_of_a_polynomial_is_that_of_numbers(f, g, terms):
     P = ring(["a", "b", "c"]).from_dict(terms)
     point = (f, g, f * FIELD.variables[0] + FIELD.one)  # the denominator of f twice
-    numbers = [value(one, POINT) for one in point]
+    numbers = [value(entry, POINT) for entry in point]
     assert value(evaluate(P, FIELD, point), POINT) == evaluate(P, None, numbers)
 
 
@@ -81,7 +81,7 @@ def test_matrices_with_zeros_agree_with_numbers(pattern):
     assert value(matrix.det(), POINT) == numbers.det()
     solution = matrix.solve(FIELD.column([x + FIELD.convert(i) for i in range(n)]))
     expected = numbers.solve(fmpq_mat(n, 1, [POINT[0] + i for i in range(n)]))
-    assert [value(one, POINT) for one in solution.entries()] == expected.entries()
+    assert [value(entry, POINT) for entry in solution.entries()] == expected.entries()
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 8])

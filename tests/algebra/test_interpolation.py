@@ -36,7 +36,7 @@ def functions(names: Sequence[str], *texts: str) -> list[RationalFunction]:
     return [parse_rational_function(text, names) for text in texts]
 
 
-def found(known: Sequence[RationalFunction], names: Sequence[str]) -> Reconstruction:
+def reconstructed(known: Sequence[RationalFunction], names: Sequence[str]) -> Reconstruction:
     """The reconstruction, after checking that it gives the known functions in lowest terms."""
     box = Box(known)
     result = reconstruct(box, names)
@@ -68,7 +68,7 @@ COSTS = [  # names, functions, values, five of them to confirm, and primes
 @pytest.mark.parametrize(("names", "texts", "values", "primes"), COSTS)
 def test_no_more_values_are_taken_than_are_needed(names: str, texts: list[str], values: int, primes: int):
     known = functions(list(names), *texts)
-    result = found(known, list(names))
+    result = reconstructed(known, list(names))
     assert (result.samples, len(result.primes)) == (values, primes)
     enough, too_few = (reconstruct(Box(known), list(names), max_samples=most) for most in (values, values - 1))
     assert (enough, too_few.functions) == (result, None)
@@ -86,9 +86,9 @@ def random_functions(draw: st.DrawFn) -> tuple[list[str], list[RationalFunction]
     polynomials = st.dictionaries(st.sampled_from(exponents), small, max_size=5).map(context.from_dict)
     nonzero = polynomials.filter(lambda polynomial: not polynomial.is_zero())
     count = draw(st.integers(1, 3))
-    one = draw(nonzero)
+    entry = draw(nonzero)
     return names, [
-        RationalFunction(draw(polynomials), one if draw(st.booleans()) else draw(nonzero)) for _ in range(count)
+        RationalFunction(draw(polynomials), entry if draw(st.booleans()) else draw(nonzero)) for _ in range(count)
     ]
 
 
@@ -96,7 +96,7 @@ def random_functions(draw: st.DrawFn) -> tuple[list[str], list[RationalFunction]
 def test_random_functions(case: tuple[list[str], list[RationalFunction]]):
     names, known = case
     limit = 2 * comb(len(names) + 3, 3) if names else 0
-    assert found(known, names).samples <= limit + 9 * len(names) + SPARE
+    assert reconstructed(known, names).samples <= limit + 9 * len(names) + SPARE
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -162,10 +162,12 @@ def test_numbers_from_residues_modulo_primes_as_many_as_it_takes():
 
     short, long = (fmpq(3, 7), fmpq(2, 5)), (fmpq(-7, 3**40), fmpq(10**60 + 7, 3**50))
     for groups in ([short, long], [long, short]):
-        assert from_residues(lambda p, groups=groups: [[residue(x, p) for x in one] for one in groups], 12) == groups
-        assert from_residues(lambda p, groups=groups: [[residue(x, p) for x in one] for one in groups], 4) is None
-    asked = []
-    assert from_residues(asked.append, 5) is None
-    assert len(asked) == 1
-    assert from_residues(lambda p: asked.append(p) or [[residue(short[0], p)]], 3) == [short[:1]]
-    assert len(asked) == 4
+        assert (
+            from_residues(lambda p, groups=groups: [[residue(x, p) for x in entry] for entry in groups], 12) == groups
+        )
+        assert from_residues(lambda p, groups=groups: [[residue(x, p) for x in entry] for entry in groups], 4) is None
+    requested = []
+    assert from_residues(requested.append, 5) is None
+    assert len(requested) == 1
+    assert from_residues(lambda p: requested.append(p) or [[residue(short[0], p)]], 3) == [short[:1]]
+    assert len(requested) == 4

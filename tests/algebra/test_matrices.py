@@ -112,8 +112,8 @@ def test_rank_and_null_space_over_a_number_field_are_those_over_q(matrix):
 def test_the_minors_are_those_of_flint(n, data):
     entry = st.integers(-20, 20)
     rows = data.draw(st.lists(st.lists(entry, min_size=n + 1, max_size=n + 1), min_size=n, max_size=n))
-    found = kernel_minors(rows)
+    result = kernel_minors(rows)
     for k in range(n + 1):
-        rest = fmpz_mat([[row[j] for j in range(n + 1) if j != k] for row in rows])
-        assert found[k] == (-1) ** k * rest.det()
-    assert all(sum(a * b for a, b in zip(row, found, strict=True)) == 0 for row in rows)
+        others = fmpz_mat([[row[j] for j in range(n + 1) if j != k] for row in rows])
+        assert result[k] == (-1) ** k * others.det()
+    assert all(sum(a * b for a, b in zip(row, result, strict=True)) == 0 for row in rows)

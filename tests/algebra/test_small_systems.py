@@ -19,49 +19,49 @@ def solve(*equations, units=1e7):
     return solve_system(equations, (x, y, z), Budget(units))
 
 
-def points(found):
-    return {tuple(int(e) for e in c.point) for c in found.components if not c.free}
+def points(result):
+    return {tuple(int(e) for e in c.point) for c in result.components if not c.free}
 
 
 @given(st.sets(st.tuples(*[st.integers(-3, 3)] * 3), min_size=1, max_size=4), st.integers(0, 5))
-def test_all_points_of_a_finite_set_are_found(wanted, shear):
+def test_all_points_of_a_finite_set_are_found(expected, shear):
     """The ideal of a finite set: all products of one linear form for each point."""
-    forms = [[x - a + shear * (y - b), y - b + shear * (z - c), z - c] for a, b, c in wanted]
+    forms = [[x - a + shear * (y - b), y - b + shear * (z - c), z - c] for a, b, c in expected]
     equations = []
     for choice in itertools.product(*forms):
         total = RING.constant(1)
         for form in choice:
             total = total * form
         equations.append(total)
-    found = solve(*equations)
-    assert points(found) == wanted
-    assert found.complete
-    assert not found.irrational
+    solution = solve(*equations)
+    assert points(solution) == expected
+    assert solution.complete
+    assert not solution.irrational
 
 
 def test_products_are_branched_on_though_combinations_of_them_are_none():
     equations = [x * (2 - 3 * y - z), y * (5 * x - 7 + z), z * (x - y)]
     assert not any(len(p.factor()[1]) > 1 for p in independent(equations))
-    found = solve(*equations)
-    assert found.complete
-    wanted = [(fmpq(5, 2), fmpq(5, 2), fmpq(-11, 2)), (fmpq(7, 5), fmpq(2, 3), 0), (0, 0, z)]
-    assert [component.values for component in found.components] == wanted
+    solution = solve(*equations)
+    assert solution.complete
+    expected = [(fmpq(5, 2), fmpq(5, 2), fmpq(-11, 2)), (fmpq(7, 5), fmpq(2, 3), 0), (0, 0, z)]
+    assert [component.values for component in solution.components] == expected
 
 
 def test_irrational_solutions_are_reported():
-    found = solve(x**2 - 2, y, z)
-    assert (found.components, found.irrational, found.complete) == ([], ["x^2 - 2"], True)
+    solution = solve(x**2 - 2, y, z)
+    assert (solution.components, solution.irrational, solution.complete) == ([], ["x^2 - 2"], True)
     # x^2 = y, y^2 = 2 x: (0, 0) and three conjugate points with x^3 = 2
-    found = solve(x**2 - y, y**2 - 2 * x, z)
-    assert points(found) == {(0, 0, 0)}
-    assert found.irrational
+    solution = solve(x**2 - y, y**2 - 2 * x, z)
+    assert points(solution) == {(0, 0, 0)}
+    assert solution.irrational
 
 
 def test_a_curve_is_not_solved_and_not_dropped():
-    found = solve(x**2 + y**2 - 1, z - x)
-    assert not found.complete
-    assert found.unsolved[0].equations == (x**2 + y**2 - 1,)
-    assert "not isolated points" in found.reason
+    solution = solve(x**2 + y**2 - 1, z - x)
+    assert not solution.complete
+    assert solution.unsolved[0].equations == (x**2 + y**2 - 1,)
+    assert "not isolated points" in solution.reason
 
 
 @pytest.mark.parametrize(
@@ -75,9 +75,9 @@ def test_a_curve_is_not_solved_and_not_dropped():
     ],
 )
 def test_rational_points_of_irreducible_equations_are_found(equations, expected):
-    found = solve(*equations)
-    assert (points(found), found.complete) == (expected, True)
-    assert not any(component.free for component in found.components)
+    solution = solve(*equations)
+    assert (points(solution), solution.complete) == (expected, True)
+    assert not any(component.free for component in solution.components)
 
 
 def test_planes_of_cubics_are_decoupled():
@@ -125,14 +125,14 @@ def test_a_groebner_basis_is_given_up_at_the_end_of_the_budget_and_at_its_limits
 
 
 def test_what_the_budget_did_not_suffice_for_is_unsolved():
-    found = solve(*SPHERES, units=1)
-    assert (found.complete, found.reason) == (False, SPENT)
+    solution = solve(*SPHERES, units=1)
+    assert (solution.complete, solution.reason) == (False, SPENT)
     assert solve(*SPHERES).complete
 
 
 def test_conjugate_solutions_of_a_large_degree_are_reduced():
-    found = solve(x**4 + y * z - 3, y**4 + x + z - 1, z**4 - x * y + 2)
-    assert found.complete
-    assert not found.components
-    assert found.irrational == ["groups of 64 conjugate solutions"]
-    assert all(sum(m) <= 12 for p in found.conjugate[0].equations for m in p.monoms())
+    solution = solve(x**4 + y * z - 3, y**4 + x + z - 1, z**4 - x * y + 2)
+    assert solution.complete
+    assert not solution.components
+    assert solution.irrational == ["groups of 64 conjugate solutions"]
+    assert all(sum(m) <= 12 for p in solution.conjugate[0].equations for m in p.monoms())

@@ -269,5 +269,5 @@ def test_every_limit_has_two_sides(limits: ExpressionLimits, good: str, bad: str
 @given(rational_functions, nonzero, st.integers(0, 3))
 def test_what_is_printed_in_factors_is_read_back(function, factor, power):
     product = RationalFunction(function.numerator * factor**power, function.denominator * factor)
-    for one in (product, RationalFunction(product.numerator, RING.constant(3))):
-        assert parse_rational_function(format_factored(one), NAMES) == one
+    for entry in (product, RationalFunction(product.numerator, RING.constant(3))):
+        assert parse_rational_function(format_factored(entry), NAMES) == entry

@@ -55,9 +55,9 @@ def blind(monkeypatch):
 
 
 def test_a_proof_decides_and_the_points_stand_beside_it():
-    found = certify("c", TRUE, Settings(), PROOF, orbit(1, 2))
-    assert (found.verdict, found.evidence) == (PROVED, PROOF)
-    assert [evidence.method for evidence in found.also] == ["random points over GF(p)", "exact orbit"]
+    finding = certify("c", TRUE, Settings(), PROOF, orbit(1, 2))
+    assert (finding.verdict, finding.evidence) == (PROVED, PROOF)
+    assert [evidence.method for evidence in finding.also] == ["random points over GF(p)", "exact orbit"]
 
 
 def test_a_proved_claim_that_fails_at_a_random_point_is_a_contradiction():
@@ -79,26 +79,26 @@ def test_a_claim_proved_by_expansion_that_fails_on_the_orbit_is_a_contradiction(
 
 
 def test_a_theorem_proves_nothing_of_what_is_defined_nowhere():
-    found = certify("c", NOWHERE, Settings(), PROOF)
-    assert (found.verdict, found.also) == (UNDECIDED, ())
-    assert "not defined at any" in found.evidence.summary
+    finding = certify("c", NOWHERE, Settings(), PROOF)
+    assert (finding.verdict, finding.also) == (UNDECIDED, ())
+    assert "not defined at any" in finding.evidence.summary
 
 
 def test_a_claim_that_fails_at_random_points_is_refuted_whatever_the_orbit_says():
-    found = certify("c", FALSE_BUT_ON_AN_ORBIT, Settings(), None, orbit(1, 2, 1))
-    assert found.verdict is REFUTED
-    assert found.evidence.method == "exact rational point"
-    assert found.also[0].summary == "held exactly at 3 points of an orbit, eps = 1/10"
-    (x,) = found.witness.point
+    finding = certify("c", FALSE_BUT_ON_AN_ORBIT, Settings(), None, orbit(1, 2, 1))
+    assert finding.verdict is REFUTED
+    assert finding.evidence.method == "exact rational point"
+    assert finding.also[0].summary == "held exactly at 3 points of an orbit, eps = 1/10"
+    (x,) = finding.witness.point
     assert x not in ("1", "2")
 
 
 def test_an_orbit_refutes_what_random_points_let_pass(blind):
-    found = certify("c", FALSE, Settings(), None, orbit(1, 2))
-    assert found.verdict is REFUTED
-    assert found.evidence.summary == "fails at step 0 of an exact orbit"
-    assert (found.witness.point, found.witness.left, found.witness.right) == (("1",), ("1",), ("2",))
-    assert found.witness.eps == "1/10"
+    finding = certify("c", FALSE, Settings(), None, orbit(1, 2))
+    assert finding.verdict is REFUTED
+    assert finding.evidence.summary == "fails at step 0 of an exact orbit"
+    assert (finding.witness.point, finding.witness.left, finding.witness.right) == (("1",), ("1",), ("2",))
+    assert finding.witness.eps == "1/10"
 
 
 @pytest.mark.parametrize(

@@ -49,8 +49,10 @@ def test_verdicts_combine_to_the_weakest(verdicts, expected):
 
 
 def test_the_json_of_a_refuted_control_shows_the_witness_and_what_was_expected():
-    found = Finding("c", R, Evidence("m", "s"), (Evidence("orbit", "too"),), WITNESS, "a = b", "somebody", control=True)
-    assert found.to_json() == {
+    finding = Finding(
+        "c", R, Evidence("m", "s"), (Evidence("orbit", "too"),), WITNESS, "a = b", "somebody", control=True
+    )
+    assert finding.to_json() == {
         "claim": "c",
         "verdict": "refuted",
         "evidence": {"method": "m", "summary": "s"},
@@ -61,7 +63,7 @@ def test_the_json_of_a_refuted_control_shows_the_witness_and_what_was_expected()
             "left": {"is": "I(x~)", "value": ["1"]},
             "right": {"is": "I(x)", "value": ["2"]},
         },
-        "also": [{"method": "orbit", "summary": "too"}],
+        "further_evidence": [{"method": "orbit", "summary": "too"}],
         "formula": "a = b",
         "source": "somebody",
         "control": True,
@@ -89,7 +91,7 @@ def test_every_report_is_plain_data_for_every_eps_with_a_witness_where_it_is_ref
     assert json.loads(json.dumps(plain)) == plain
     assert (plain["eps"], plain["time_step"]) == ("every", "every")
     assert 0 < Fraction(plain["orbit"]["eps"]) < 1
-    assert all((found.witness is not None) == (found.verdict is R) for found in report.findings)
+    assert all((finding.witness is not None) == (finding.verdict is R) for finding in report.findings)
 
 
 @over_reports
@@ -126,9 +128,9 @@ def test_every_report_comes_out_the_same_from_the_same_seed_and_its_orbit_from_i
 )
 def test_what_is_proved_has_no_bound_for_an_error_and_what_is_supported_the_one_asked_for(check):
     report = check(Settings(steps=1, error_bits=200))
-    for one in report.findings:
-        for evidence in (one.evidence, *one.also):
+    for entry in report.findings:
+        for evidence in (entry.evidence, *entry.also):
             bound = evidence.data.get("error_bound")
             assert (bound is not None) == ("false with probability" in evidence.summary)
-            assert bound is None or (one.verdict is S and int(bound.removeprefix("2^-")) >= 200)
-    assert {one.verdict for one in report.findings} & {P, S}
+            assert bound is None or (entry.verdict is S and int(bound.removeprefix("2^-")) >= 200)
+    assert {finding.verdict for finding in report.findings} & {P, S}

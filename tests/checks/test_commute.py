@@ -61,19 +61,19 @@ def report_of(name: str) -> Report:
 
 def parts(report: Report) -> tuple[list, list, list]:
     """The findings on pairs, on the splitting field, and the controls."""
-    controls = [found for found in report.findings if found.control]
-    field = [found for found in report.findings if "splitting field" in found.claim]
-    return [found for found in report.findings if found not in controls + field], field, controls
+    controls = [finding for finding in report.findings if finding.control]
+    field = [finding for finding in report.findings if "splitting field" in finding.claim]
+    return [finding for finding in report.findings if finding not in controls + field], field, controls
 
 
 @over_members
 def test_every_pair_of_associated_systems_up_to_sign_is_proved_to_commute(name):
     pairs, _, _ = parts(report_of(name))
-    assert {found.verdict for found in pairs} == {PROVED}
+    assert {entry.verdict for entry in pairs} == {PROVED}
     factors = len(MEMBERS[name].factors)
     # One factor: the only other rational associated system is -f_0.
     assert len(pairs) == (comb(2 ** (factors - 1), 2) if factors > 1 else 1)
-    assert len({found.claim for found in pairs}) == len(pairs)
+    assert len({entry.claim for entry in pairs}) == len(pairs)
 
 
 @over_members
@@ -95,7 +95,7 @@ def test_without_the_theorem_the_pairs_of_a_class_are_supported(name, monkeypatc
     monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
     report = check_commute(SystemFile.from_member(MEMBERS[name]), settings=QUICK)
     pairs, _, (control,) = parts(report)
-    assert {found.verdict for found in pairs} == {SUPPORTED}
+    assert {entry.verdict for entry in pairs} == {SUPPORTED}
     assert control.verdict is REFUTED
 
 
@@ -113,27 +113,27 @@ def signed(member: FamilyMember, *signs: int) -> SystemFile:
 
 
 def test_two_files_of_one_class_are_proved_to_commute_by_the_theorem():
-    found = only(check_commute(signed(SPLIT3, 1, 1, -1), signed(SPLIT3, 1, -1, 1), QUICK))
-    assert found.verdict is PROVED
-    assert "Theorem 9" in found.evidence.data["theorem"]
+    result = only(check_commute(signed(SPLIT3, 1, 1, -1), signed(SPLIT3, 1, -1, 1), QUICK))
+    assert result.verdict is PROVED
+    assert "Theorem 9" in result.evidence.data["theorem"]
 
 
 def test_one_member_at_two_steps_is_refuted():
     file = SystemFile.from_member(SPLIT3)
     report = check_commute(file, file, Settings(eps="1/5", steps=2), eps2=fmpq(1, 3))
-    found = only(report)
-    assert found.verdict is REFUTED
-    verify_commute_witness(found.witness, SPLIT3.chosen.system, SPLIT3.chosen.system, "5/3")
-    assert found.witness.eps == "1/5"
+    result = only(report)
+    assert result.verdict is REFUTED
+    verify_commute_witness(result.witness, SPLIT3.chosen.system, SPLIT3.chosen.system, "5/3")
+    assert result.witness.eps == "1/5"
     assert report.to_json()["eps2"] == "1/3"
 
 
 @given(systems(dims=(2,)), systems(dims=(2,)), points(2, rationals(9)))
 def test_the_verdict_on_a_random_pair_agrees_with_an_independent_computation(f, g, x):
     assume(any(f.rhs) and any(g.rhs))
-    found = only(pair(f, g))
-    if found.verdict is REFUTED:
-        verify_commute_witness(found.witness, f, g)
+    result = only(pair(f, g))
+    if result.verdict is REFUTED:
+        verify_commute_witness(result.witness, f, g)
     else:
         assert commute_at(f, g, Fraction(2, 7), exact(*x)) in (True, None)
 
@@ -150,9 +150,9 @@ def test_the_verdict_on_a_random_pair_agrees_with_an_independent_computation(f, 
     ],
 )
 def test_a_pair_without_a_reason_to_commute_is_refuted(f, g, eps):
-    found = only(pair(f, g, Settings(eps=eps, steps=2)))
-    assert found.verdict is REFUTED
-    verify_commute_witness(found.witness, f, g)
+    result = only(pair(f, g, Settings(eps=eps, steps=2)))
+    assert result.verdict is REFUTED
+    verify_commute_witness(result.witness, f, g)
 
 
 @pytest.mark.parametrize(("monomial", "power"), [("x1*x2", 40), ("1", 400)])
@@ -160,18 +160,18 @@ def test_a_commuting_pair_disturbed_in_a_far_digit_is_refuted(monomial, power):
     f, g = SPLIT3.associate((1, 1, 1)).system, SPLIT3.associate((1, 1, -1)).system
     tiny = system_of(" ".join(f.variables), *[f"({monomial})/10^{power}"] + ["0"] * 5)
     disturbed = QuadraticSystem([a + b for a, b in zip(g.rhs, tiny.rhs, strict=True)])
-    found = only(pair(f, disturbed, Settings(steps=1)))
-    assert found.verdict is REFUTED
-    verify_commute_witness(found.witness, f, disturbed)
+    result = only(pair(f, disturbed, Settings(steps=1)))
+    assert result.verdict is REFUTED
+    verify_commute_witness(result.witness, f, disturbed)
 
 
 def test_shears_along_one_direction_are_supported():
     # x' = h(y), y' = 0: the maps are x + 2 eps h(y), and the components of f are dependent.
     f, g = system_of("x y", "y^2 + 3*y", "0"), system_of("x y", "y^2/7 - 1", "0")
-    found = only(pair(f, g))
-    assert found.verdict is SUPPORTED
-    assert found.evidence.method == "random points over GF(p)"
-    assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
+    result = only(pair(f, g))
+    assert result.verdict is SUPPORTED
+    assert result.evidence.method == "random points over GF(p)"
+    assert int(result.evidence.data["error_bound"].split("^")[1]) <= -100
 
 
 def map_of(*image):
@@ -195,7 +195,7 @@ AT_A_TENTH = System("x' = (10*eps - 1)*(x + y); y' = (10*eps - 1)*x^2")  # 0 at 
     ],
 )
 def test_the_identity_is_no_map_that_commutes_with_another(f, g, eps, message):
-    files = [load(one) if isinstance(one, str) else one for one in (f, g)]
+    files = [load(entry) if isinstance(entry, str) else entry for entry in (f, g)]
     with pytest.raises(InputError, match=message):
         check_commute(*files, Settings(eps=eps, steps=2))
 

@@ -47,21 +47,21 @@ HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*
 WEIERSTRASS = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
 
 
-def verify_claim_witness(found: Finding, system: QuadraticSystem, function: RationalFunction) -> None:
+def verify_claim_witness(finding: Finding, system: QuadraticSystem, function: RationalFunction) -> None:
     """I(x~) and I(x) recomputed for a claimed function of x and eps."""
-    assert found.verdict is REFUTED
-    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
+    assert finding.verdict is REFUTED
+    x, (eps,) = exact(*finding.witness.point), exact(finding.witness.eps)
     image = kahan_step(system, eps, x)
     assert image is not None
-    verify_witness(found.witness, [function_value(function, image, eps)], [function_value(function, x, eps)])
+    verify_witness(finding.witness, [function_value(function, image, eps)], [function_value(function, x, eps)])
 
 
 def check_claim(system: QuadraticSystem, text: str, how: Settings = QUICK) -> Finding:
     """The finding on one claimed integral, its witness verified if it is refuted."""
-    found = only(check_integrals(file_of(system, I=text), how))
-    if found.verdict is REFUTED:
-        verify_claim_witness(found, system, claim(text, " ".join(system.variables)))
-    return found
+    result = only(check_integrals(file_of(system, I=text), how))
+    if result.verdict is REFUTED:
+        verify_claim_witness(result, system, claim(text, " ".join(system.variables)))
+    return result
 
 
 def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Certainty]:
@@ -70,9 +70,9 @@ def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Certain
 
 @given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
 def test_modified_h_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
-    found = set(proved(hamiltonian, Settings(eps=eps, steps=2)))
+    results = set(proved(hamiltonian, Settings(eps=eps, steps=2)))
     # At one eps, as for H = q p at eps = 1, there may be no map at all, and modified H may be a constant, as for H = 0.
-    assert found == {PROVED} or ((eps is not None or hamiltonian.H.is_constant()) and found == {UNDECIDED})
+    assert results == {PROVED} or ((eps is not None or hamiltonian.H.is_constant()) and results == {UNDECIDED})
 
 
 def written_out(hamiltonian: CubicHamiltonian) -> str:
@@ -86,9 +86,9 @@ def written_out(hamiltonian: CubicHamiltonian) -> str:
 
 
 def test_modified_h_written_out_is_supported():
-    found = check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS))
-    assert found.verdict is SUPPORTED
-    assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
+    finding = check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS))
+    assert finding.verdict is SUPPORTED
+    assert int(finding.evidence.data["error_bound"].split("^")[1]) <= -100
 
 
 @pytest.mark.parametrize(("term", "power"), [("q", 300), ("eps^2/(1 - 2*eps^2*q)", 50)])
@@ -142,10 +142,15 @@ over_family = pytest.mark.parametrize(("member", "classes"), FAMILY.values(), id
 
 @over_family
 def test_a_class_has_modified_h_and_h_and_k_of_every_system_and_those_of_the_commutant(member, classes):
-    found = [integral.name for integral, _, _ in known_integrals(SystemFile.from_member(member))]
+    results = [integral.name for integral, _, _ in known_integrals(SystemFile.from_member(member))]
     labels = [associate.label for associate in member.associated()][1:]
     assert len(labels) == classes - 1
-    assert found == ["modified H", "H~", *(f"K~_{label}" for label in labels), *(f"H~_{k}" for k in range(1, member.m))]
+    assert results == [
+        "modified H",
+        "H~",
+        *(f"K~_{label}" for label in labels),
+        *(f"H~_{k}" for k in range(1, member.m)),
+    ]
 
 
 @over_family
@@ -170,13 +175,13 @@ def test_claims_of_the_caller_come_first_and_alone_unless_the_known_ones_are_req
     names = [integral.name for integral, _, _ in known_integrals(file)]
     for options, expected in (({}, ["K"]), ({"known": True}, ["K", *names])):
         report = check_integrals(file, QUICK, {"K": "q"}, **options)
-        assert [found.claim for found in report.findings] == [f"{name} is conserved" for name in expected]
+        assert [finding.claim for finding in report.findings] == [f"{name} is conserved" for name in expected]
         assert (report.findings[0].verdict, report.findings[0].holds) == (REFUTED, False)
     file = file_of(LOTKA_VOLTERRA, I="x", J="y")
     for extra, expected in (("J", "J"), (["x*y", "I"], ["I1", "I"]), ({"K": "x*y"}, "K")):
-        assert [found.claim.split()[0] for found in check_integrals(file, QUICK, extra).findings] == [*expected]
+        assert [finding.claim.split()[0] for finding in check_integrals(file, QUICK, extra).findings] == [*expected]
     report = check_integrals(file, QUICK, {"K": "x*y"}, known=True)
-    assert [found.claim.split()[0] for found in report.findings] == ["K", "I", "J"]
+    assert [finding.claim.split()[0] for finding in report.findings] == ["K", "I", "J"]
 
 
 def test_two_integrals_of_one_name_and_no_claims_at_all_are_wrong_use():
@@ -204,8 +209,8 @@ def test_two_integrals_of_one_name_and_no_claims_at_all_are_wrong_use():
 )
 def test_a_constant_is_no_integral_and_the_claim_says_where_one_has_values(text, eps, condition, verdict):
     file = file_of(QuadraticSystem.from_text(["x", "y"], ["x^2", "x*y"]), I=text)
-    found = only(check_integrals(file, Settings(eps=eps, steps=1)))
-    assert (found.verdict, found.claim, found.applies) == (verdict, f"I is conserved{condition}", True)
+    result = only(check_integrals(file, Settings(eps=eps, steps=1)))
+    assert (result.verdict, result.claim, result.applies) == (verdict, f"I is conserved{condition}", True)
 
 
 @pytest.mark.parametrize(
@@ -221,8 +226,8 @@ def test_a_constant_is_no_integral_and_the_claim_says_where_one_has_values(text,
 def test_a_modified_hamiltonian_that_is_a_constant_is_no_integral(H, eps, verdict):
     # f is linear with f'^2 = -w^2, and H + grad H . (x~ - x)/3 = (3 - w^2 eps^2)/(1 + w^2 eps^2) H/3.
     file = parse_system(f'variables = ["q", "p"]\n[hamiltonian]\nH = "{H}"\nJ = "standard"\n')
-    found = check_integrals(file, Settings(eps=eps, steps=1)).findings[0]
-    assert (found.verdict, found.applies) == (verdict, verdict is PROVED)
+    result = check_integrals(file, Settings(eps=eps, steps=1)).findings[0]
+    assert (result.verdict, result.applies) == (verdict, verdict is PROVED)
     if eps is not None:
         claimed = check_integrals(file, Settings(eps=eps, steps=1), claim("1/2*q^2", "q p"))
         assert claimed.verdict is REFUTED  # what nobody claimed does not count
@@ -234,16 +239,16 @@ def test_an_integral_of_the_commutant_lemma_may_be_0(H, verdict):
     A = fmpq_mat(4, 4, [int(i == j and i % 2 == 1) for i in range(4) for j in range(4)])
     member = FamilyMember(A, parse_polynomial(H, ["x1", "x2", "x3", "x4"]))
     report = check_integrals(SystemFile.from_member(member), QUICK)
-    found = next(one for one in report.findings if one.claim == "H~_1 is conserved")
-    assert (found.verdict, found.applies) == (verdict, verdict is PROVED)
+    result = next(finding for finding in report.findings if finding.claim == "H~_1 is conserved")
+    assert (result.verdict, result.applies) == (verdict, verdict is PROVED)
     assert report.verdict is PROVED
 
 
 def test_an_orbit_alone_never_makes_a_claim_proved_or_supported():
     # x is constant along the orbit of a start with y = 0, and nowhere else.
-    found = check_claim(system_of("x y", "y", "x*y"), "x", Settings(eps="1/10", start=(2, 0), steps=5))
-    assert found.verdict is REFUTED
-    assert found.also[-1].summary.startswith("held exactly at 6 points")
+    finding = check_claim(system_of("x y", "y", "x*y"), "x", Settings(eps="1/10", start=(2, 0), steps=5))
+    assert finding.verdict is REFUTED
+    assert finding.also[-1].summary.startswith("held exactly at 6 points")
 
 
 def test_a_system_without_any_integral_is_wrong_use():

@@ -98,11 +98,11 @@ def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
     primes = Fraction(3, 5) * N / Fraction(math.log(2**62))
     bad = Fraction(max(1, math.ceil(bits / 62)), 1) / primes
     roots = Fraction(degree) / N
-    found = log2_error(CoefficientSize(degree, float(bits)), poles)
+    result = log2_error(CoefficientSize(degree, float(bits)), poles)
     # At most floor(bits/62) primes divide a coefficient; ceil is one more at the most.
     # Doubled: given that no denominator vanishes, which is more likely than not.
-    assert found <= math.log2(2 * (bad + roots)) + 1e-9
-    assert found >= math.log2(2 * (max(1, bits // 62) / primes + roots)) - 1e-9
+    assert result <= math.log2(2 * (bad + roots)) + 1e-9
+    assert result >= math.log2(2 * (max(1, bits // 62) / primes + roots)) - 1e-9
 
 
 @pytest.mark.parametrize(("conjugates", "bits"), [(2, 62), (24, 6200.0)])

@@ -100,7 +100,7 @@ def test_an_expansion_refutes_what_random_points_let_pass(monkeypatch):
     held = Decision(Certainty.SUPPORTED, Evidence("random points over GF(p)", "held"))
     monkeypatch.setattr(certify, "decide", lambda *arguments: held)
     claim = ClaimedIntegral("I", parse_rational_function("x^2 + y^2 + z^2", ["x", "y", "z", "eps"]))
-    found = certify.certify("I is conserved", conservation(TOP, claim, None), Settings())
-    assert found.verdict is Certainty.REFUTED
-    assert found.evidence.method == "exact rational point"
-    assert found.witness.left != found.witness.right
+    finding = certify.certify("I is conserved", conservation(TOP, claim, None), Settings())
+    assert finding.verdict is Certainty.REFUTED
+    assert finding.evidence.method == "exact rational point"
+    assert finding.witness.left != finding.witness.right

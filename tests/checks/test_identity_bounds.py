@@ -127,23 +127,23 @@ BROKEN = [
 
 def difference_sizes(claim, o):
     """The numerators and denominators in lowest terms of the differences of all pairs of a claim."""
-    found = []
+    results = []
     for left, right in claim.function(o):
         difference = left - right
         entries = difference.entries() if hasattr(difference, "entries") else [difference]
-        found += [lowest(entry) for entry in entries if not entry.numerator.is_zero()]
-    return found
+        results += [lowest(entry) for entry in entries if not entry.numerator.is_zero()]
+    return results
 
 
 @together("claim, control", BROKEN)
 def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, monkeypatch):
-    found = member("m=1")
-    examined = verifier_of(found)
-    bounds = broken(control, specialize.bound_objects(found, None, 3))
+    result = member("m=1")
+    examined = verifier_of(result)
+    bounds = broken(control, specialize.bound_objects(result, None, 3))
     monkeypatch.setattr(examined, "bounds", lambda: bounds)
     statement = ClaimAtPoints(examined, claim)
     needs, (equation, poles) = statement.needs, statement.bound
-    functions = specialize.member_functions(found, sorted(needs - {"roots"}), None, 10**9, 3)
+    functions = specialize.member_functions(result, sorted(needs - {"roots"}), None, 10**9, 3)
     sizes = difference_sizes(claim, broken(control, functions))
     for above, below in sizes:
         assert true_size(above)[0] <= equation.degree

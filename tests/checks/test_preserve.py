@@ -64,10 +64,10 @@ def file(hamiltonian: CubicHamiltonian) -> SystemFile:
     return SystemFile.from_hamiltonian(hamiltonian)
 
 
-def at_witness(found: Finding, system: QuadraticSystem):
+def at_witness(finding: Finding, system: QuadraticSystem):
     """x, eps, x~ of a witness, x~ computed anew."""
-    assert found.verdict is REFUTED
-    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
+    assert finding.verdict is REFUTED
+    x, (eps,) = exact(*finding.witness.point), exact(finding.witness.eps)
     image = kahan_step(system, eps, x)
     assert image is not None
     return x, eps, image
@@ -75,25 +75,25 @@ def at_witness(found: Finding, system: QuadraticSystem):
 
 @given(hamiltonians(dims=(1, 2, 3)), st.sampled_from([None, "-2/3"]))
 def test_the_determinant_density_is_proved_for_every_constant_skew_j_and_no_point_contradicts_it(hamiltonian, eps):
-    found = only(check_measure(file(hamiltonian), Settings(eps=eps, steps=2)))
+    result = only(check_measure(file(hamiltonian), Settings(eps=eps, steps=2)))
     # At one eps, as for H = q p at eps = 1, there may be no map at all.
-    assert found.verdict is PROVED or (eps is not None and found.verdict is UNDECIDED)
-    assert found.formula == "phi = det(I - eps f'(x))"
+    assert result.verdict is PROVED or (eps is not None and result.verdict is UNDECIDED)
+    assert result.formula == "phi = det(I - eps f'(x))"
 
 
 def check_density(system: QuadraticSystem, phi: str, how: Settings = QUICK) -> Finding:
     """The finding on a claimed density; a witness is verified with det dPhi from dual numbers."""
-    found = only(check_measure(file_of(system, phi=phi), how))
-    if found.verdict is REFUTED:
-        x, eps, image = at_witness(found, system)
+    result = only(check_measure(file_of(system, phi=phi), how))
+    if result.verdict is REFUTED:
+        x, eps, image = at_witness(result, system)
         function = claim(phi, " ".join(system.variables))
         here = determinant(unit(system.dim) - eps * slope(system, x))
         there = determinant(unit(system.dim) + eps * slope(system, image))
         after, before = function_value(function, image, eps), function_value(function, x, eps)
-        verify_witness(found.witness, [after * here], [before * there])
+        verify_witness(result.witness, [after * here], [before * there])
         jacobian = kahan_jacobian(system, eps, x)
         assert after != before * determinant(jacobian)
-    return found
+    return result
 
 
 @pytest.mark.parametrize(
@@ -106,9 +106,9 @@ def check_density(system: QuadraticSystem, phi: str, how: Settings = QUICK) -> F
     ],
 )
 def test_a_right_density_is_supported(system, phi):
-    found = check_density(system, phi)
-    assert found.verdict is SUPPORTED
-    assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
+    finding = check_density(system, phi)
+    assert finding.verdict is SUPPORTED
+    assert int(finding.evidence.data["error_bound"].split("^")[1]) <= -100
 
 
 @pytest.mark.parametrize(
@@ -143,33 +143,33 @@ def test_what_is_no_density_is_wrong_use(phi, variables, message):
         check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi and claim(phi, variables))
 
 
-def verify_law(found: Finding, hamiltonian: CubicHamiltonian) -> None:
+def verify_law(finding: Finding, hamiltonian: CubicHamiltonian) -> None:
     """The law fails at the witness: the entry shown, and dPhi Pi(x) dPhi^T is not Pi(x~)."""
-    x, eps, image = at_witness(found, hamiltonian.system)
+    x, eps, image = at_witness(finding, hamiltonian.system)
     forward = unit(hamiltonian.dim) + eps * slope(hamiltonian.system, image)
     backward = unit(hamiltonian.dim) - eps * slope(hamiltonian.system, x)
     left = forward @ tensor(hamiltonian, eps, x) @ forward.T
     right = backward @ tensor(hamiltonian, eps, image) @ backward.T
-    i, j = (int(k) - 1 for k in found.witness.left_label.split("(", 1)[1].split(")", 1)[0].split(","))
-    verify_witness(found.witness, [left[i][j]], [right[i][j]])
+    i, j = (int(k) - 1 for k in finding.witness.left_label.split("(", 1)[1].split(")", 1)[0].split(","))
+    verify_witness(finding.witness, [left[i][j]], [right[i][j]])
     jacobian = kahan_jacobian(hamiltonian.system, eps, x)
     moved = jacobian @ tensor(hamiltonian, eps, x) @ jacobian.T
     assert (moved != tensor(hamiltonian, eps, image)).any()
 
 
-def verify_jacobi(found: Finding, hamiltonian: CubicHamiltonian) -> None:
+def verify_jacobi(finding: Finding, hamiltonian: CubicHamiltonian) -> None:
     """The cyclic sum of the triple shown, with the derivatives of Pi from dual numbers."""
-    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
+    x, (eps,) = exact(*finding.witness.point), exact(finding.witness.eps)
     n, Pi = hamiltonian.dim, tensor(hamiltonian, eps, x)
     # Pi is of degree 2 in x: the central difference is the derivative.
     moved = [[tuple(a + (i == l) * s for i, a in enumerate(x)) for s in (1, -1)] for l in range(n)]
     up, down = ([tensor(hamiltonian, eps, points[k]) for points in moved] for k in (0, 1))
-    i, j, k = (int(a) - 1 for a in found.witness.left_label.split("(", 1)[1].split(")", 1)[0].split(","))
+    i, j, k = (int(a) - 1 for a in finding.witness.left_label.split("(", 1)[1].split(")", 1)[0].split(","))
 
     def along(a, b, c):
         return sum((Pi[a][l] * (up[l][b][c] - down[l][b][c]) / 2 for l in range(n)), Fraction(0))
 
-    verify_witness(found.witness, [along(i, j, k) + along(j, k, i) + along(k, i, j)], [Fraction(0)])
+    verify_witness(finding.witness, [along(i, j, k) + along(j, k, i) + along(k, i, j)], [Fraction(0)])
 
 
 @pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS)
@@ -257,11 +257,11 @@ def test_a_tensor_with_denominators_is_differentiated():
         is SUPPORTED
     )
     rows = [["0", "1/y", "0"], ["-1/y", "0", "1/(x - z)"], ["0", "1/(z - x)", "0"]]
-    found = check_poisson(file_of(LORENZ), QUICK, MatrixPoissonTensor.from_text(rows, "xyz")).findings[1]
-    assert found.verdict is REFUTED
+    result = check_poisson(file_of(LORENZ), QUICK, MatrixPoissonTensor.from_text(rows, "xyz")).findings[1]
+    assert result.verdict is REFUTED
     # sum_l P_1l d_l P_23 + P_2l d_l P_31 + P_3l d_l P_12, of which only P_32 d_2 P_12 is not 0
-    x, y, z = exact(*found.witness.point)
-    assert exact(*found.witness.left) == (1 / ((x - z) * y**2),)
+    x, y, z = exact(*result.witness.point)
+    assert exact(*result.witness.left) == (1 / ((x - z) * y**2),)
 
 
 def test_a_map_without_an_inverse_has_no_measure_to_judge():

@@ -52,10 +52,10 @@ def test_the_report_as_text(kahanmaps):
 
 def test_text_json_and_markdown_say_the_same(once):
     _, lines, verdict = report(once("analyze nahm_tetrahedral").out)
-    found = once("analyze nahm_tetrahedral --json").json
+    result = once("analyze nahm_tetrahedral --json").json
     markdown = once("analyze nahm_tetrahedral --markdown").out
-    assert [(line["section"], line["status"], line["text"]) for line in found["statements"]] == lines
-    assert (found["verdict"]["integrability"], found["verdict"]["sentence"]) == verdict
+    assert [(line["section"], line["status"], line["text"]) for line in result["statements"]] == lines
+    assert (result["verdict"]["integrability"], result["verdict"]["sentence"]) == verdict
     assert all(text in markdown.replace("\\", "") for _, _, text in lines)
 
 
@@ -102,13 +102,13 @@ def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, 
 
 @pytest.mark.usefixtures("one_process")
 def test_seconds_end_an_analysis_and_what_is_complete_is_printed_unchanged(kahanmaps, monkeypatch, tmp_path):
-    whole = kahanmaps("analyze weierstrass").out.split("\n\n")
+    complete = kahanmaps("analyze weierstrass").out.split("\n\n")
     monkeypatch.setattr(table, "linear_symmetries", time_is_over)
     outcome = kahanmaps("analyze weierstrass --seconds 1000")
     *sections, skipped, verdict = outcome.out.split("\n\n")
     assert outcome.status == 3
     assert outcome.err == "stopped after 1000 s (--seconds): symmetries\n"
-    assert (len(sections), [section for section in sections if section not in whole]) == (8, [])
+    assert (len(sections), [section for section in sections if section not in complete]) == (8, [])
     assert skipped.splitlines()[1:] == [
         f"note\t{part}: stopped (--seconds)" for part in ("symmetries", "commuting systems")
     ]
@@ -154,22 +154,22 @@ def test_seconds_end_a_process_at_any_load():
 
 @pytest.mark.usefixtures("one_process")
 def test_sections_are_reported_as_soon_as_they_are_final(kahanmaps, monkeypatch):
-    told = []
-    monkeypatch.setattr("kahanmaps_cli.commands.analyze.print_stdout", lambda text, **_: told.append(text.strip()))
+    messages = []
+    monkeypatch.setattr("kahanmaps_cli.commands.analyze.print_stdout", lambda text, **_: messages.append(text.strip()))
     seen = {}
     for part in ("find_densities", "height_survey", "linear_symmetries"):
-        whole = getattr(table, part)
+        original = getattr(table, part)
 
-        def looked_at(*args, part=part, whole=whole, **options):
-            seen[part] = list(told)
-            return whole(*args, **options)
+        def recorded(*args, part=part, original=original, **options):
+            seen[part] = list(messages)
+            return original(*args, **options)
 
-        monkeypatch.setattr(table, part, looked_at)
+        monkeypatch.setattr(table, part, recorded)
     kahanmaps("analyze weierstrass")
     assert ("integrals" in seen["find_densities"], "measure" in seen["find_densities"]) == (True, False)
     assert ("the flow" in seen["height_survey"], "growth" in seen["height_survey"]) == (True, False)
     assert ("singularities" in seen["linear_symmetries"], "symmetry" in seen["linear_symmetries"]) == (True, False)
-    assert [text for text in ("integrals", "growth", "verdict") if told.count(text) != 1] == []
+    assert [text for text in ("integrals", "growth", "verdict") if messages.count(text) != 1] == []
 
 
 @pytest.mark.slow

@@ -188,8 +188,8 @@ def test_different_results_of_one_task_are_reported_and_those_of_the_target_are_
     assert "1 task with different results in two databases, those of one.db were kept" in done.err
     assert task.key in done.err
     assert batch("export --db one.db --jsonl").records[1]["result"] == {"value": 1}
-    (told,) = batch("merge one.db two.db --json -q").json["merged"]
-    assert (told["conflicts"], told["conflicting"]) == (1, [task.key])
+    (messages,) = batch("merge one.db two.db --json -q").json["merged"]
+    assert (messages["conflicts"], messages["conflicting"]) == (1, [task.key])
     assert batch("merge one.db one.db").status == 2
 
 
@@ -225,19 +225,21 @@ def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, start, 
 
 
 def test_nothing_is_printed_in_the_handler_of_ctrl_c_which_may_find_a_line_half_written(batch, monkeypatch):
-    told: list[str] = []
+    messages: list[str] = []
 
     @contextmanager
     def pressed(interrupt: Callable[[], None]) -> Iterator[None]:
         with monkeypatch.context() as patched:
-            patched.setattr("kahanmaps_cli.screen.progress.click.echo", lambda *_, **__: told.append("in the handler"))
+            patched.setattr(
+                "kahanmaps_cli.screen.progress.click.echo", lambda *_, **__: messages.append("in the handler")
+            )
             patched.setattr("kahanmaps.experiments.running.local.LocalWorkers.in_flight", 2)
             interrupt()
         yield
 
     monkeypatch.setattr("kahanmaps_cli.commands.batch.interruptible", pressed)
     done = batch("run", PAUSE, "-j", "2")
-    assert (done.status, told) == (130, [])
+    assert (done.status, messages) == (130, [])
 
 
 def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batch, monkeypatch):
@@ -295,5 +297,5 @@ def test_bad_files_are_skipped_with_a_list(kahanmaps, tmp_path, monkeypatch):
     (tmp_path / "spec").write_text('[experiments.o]\ntask = "orbit"\nsystem = "*.toml"\noptions = {eps = 1}\n')
     assert "skipped\tb.toml" in kahanmaps("batch run spec --dry-run --skip-bad").out
     assert kahanmaps("batch run spec --skip-bad -j 1 --db o.db").status == 0
-    [one] = kahanmaps("batch status --db o.db --json").json["experiments"]
-    assert (one["tasks"], [skipped["system"] for skipped in one["skipped"]]) == (1, ["b.toml", "c.toml"])
+    [entry] = kahanmaps("batch status --db o.db --json").json["experiments"]
+    assert (entry["tasks"], [skipped["system"] for skipped in entry["skipped"]]) == (1, ["b.toml", "c.toml"])

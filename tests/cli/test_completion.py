@@ -22,7 +22,7 @@ def question(line: str) -> dict[str, str]:
 
 
 @pytest.fixture
-def asked(kahanmaps, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
+def ask(kahanmaps, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
     """Ask at the end of a line, in a folder."""
 
     def ask(line: str, folder: Path | None = None) -> Outcome:
@@ -38,11 +38,11 @@ def asked(kahanmaps, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
 
 
 @pytest.fixture
-def offered(asked: Callable[..., Outcome]) -> Callable[..., list[str]]:
+def offered(ask: Callable[..., Outcome]) -> Callable[..., list[str]]:
     """What is offered for the last word of a line."""
 
     def offer(line: str, folder: Path | None = None) -> list[str]:
-        outcome = asked(line, folder)
+        outcome = ask(line, folder)
         assert outcome.err == ""
         return [item.partition(",")[2] for item in outcome.out.splitlines() if item]
 

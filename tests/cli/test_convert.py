@@ -4,8 +4,8 @@
 def test_the_command_in_the_comment_makes_the_same_file_again(kahanmaps):
     line = "convert --vars=I,y --rhs=I*y --rhs='-2/3*I^2' --to pari --what map,jacobian --name two"
     first = kahanmaps(line).out
-    (told,) = [text for text in first.splitlines() if "kahanmaps convert" in text]
-    assert kahanmaps(told.split("kahanmaps ", 2)[2]).out == first
+    (messages,) = [text for text in first.splitlines() if "kahanmaps convert" in text]
+    assert kahanmaps(messages.split("kahanmaps ", 2)[2]).out == first
 
 
 def test_an_inline_system_becomes_a_system_file(kahanmaps, tmp_path):

@@ -70,10 +70,10 @@ def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_pat
 def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path):
     path = tmp_path / "x.npy"
     outcome = interrupted(f"{TOP} --steps {10**9} --random 5 --every 10 --json", path, signal.SIGTERM)
-    found = outcome.json
-    assert (outcome.status, found["status"]) == (130, "interrupted")
-    assert f"interrupted after step {found['steps_taken']}" in outcome.err
-    assert np.load(path).shape == tuple(found["output"]["shape"]) == (found["steps_taken"] // 10 + 1, 5, 3)
+    result = outcome.json
+    assert (outcome.status, result["status"]) == (130, "interrupted")
+    assert f"interrupted after step {result['steps_taken']}" in outcome.err
+    assert np.load(path).shape == tuple(result["output"]["shape"]) == (result["steps_taken"] // 10 + 1, 5, 3)
 
 
 def npy(array) -> bytes:
@@ -132,5 +132,5 @@ def test_integrals_may_contain_an_algebraic_parameter(kahanmaps, tmp_path):
     path.write_text("1/2,1/3,1/5,1/11\n")
     command = "ensemble henon_heiles -p c='sqrt(2)' --eps 1/10 --steps 0 --json"
     record = kahanmaps(command, "--integral c*c --integral c*c*q1 --starts", path).json
-    assert [one["initial"] for one in record["drift"]] == pytest.approx([2, 1])
-    assert [one["orbits"] for one in record["drift"]] == [1, 1]
+    assert [entry["initial"] for entry in record["drift"]] == pytest.approx([2, 1])
+    assert [entry["orbits"] for entry in record["drift"]] == [1, 1]

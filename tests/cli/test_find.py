@@ -76,11 +76,11 @@ def test_the_commuting_systems_of_a_member_that_does_not_say_so_can_be_pasted(ka
     assert out[0] == f"# find-commuting: inline, {kind}, every eps (the time step is 2 eps)"
     assert out[1] == "bracket\tthe g with [f, g] = 0 have dimension 2"
     assert not any("trivial" in line for line in out)
-    found = [line.split("\t")[2] for line in out if line.startswith("proved\tg and -g")]
-    assert len(found) == 3  # 9 solutions: 0, f, -f and three pairs
+    results = [line.split("\t")[2] for line in out if line.startswith("proved\tg and -g")]
+    assert len(results) == 3  # 9 solutions: 0, f, -f and three pairs
     assert any("B = [[-5, 6, 0, 0], [-4, 5, 0, 0], [0, 4, -5, -4], [-4, 0, 6, 5]]" in line for line in out)
     assert out[-1] == f"# complete: among the {kind} only these, 0, f and -f commute with f"
-    outcome = kahanmaps("check-commute", *(f"'{word}'" for word in shlex.split(found[0])), "paper_m2 --json")
+    outcome = kahanmaps("check-commute", *(f"'{word}'" for word in shlex.split(results[0])), "paper_m2 --json")
     assert (outcome.status, outcome.json["holds"]) == (0, True)
 
 
@@ -94,7 +94,7 @@ def test_darboux_polynomials_of_a_flow_have_cofactors_that_nobody_gave(kahanmaps
     ]
     data = kahanmaps(f"{words} --json").json
     assert (data["flow"], data["cofactors"], data["reason"]) == (True, [], "")
-    assert [one["cofactor"] for one in data["spaces"]] == ["-20"]
+    assert [entry["cofactor"] for entry in data["spaces"]] == ["-20"]
     beside = "find-integrals lorenz -p b=20 --flow --max-degree 2 -q"
     assert "T1\tproved\texp(20*t)*(x^2 - 20*z)\n\tdepends on time\n" in kahanmaps(beside).out
     data = kahanmaps(f"{beside} --json").json
@@ -118,7 +118,7 @@ def test_a_hirota_kimura_basis_may_contain_images(kahanmaps):
 
 def claims(report):
     """Claim -> the rest, without the control."""
-    return {found["claim"]: found for found in report["claims"] if "control" not in found}
+    return {entry["claim"]: entry for entry in report["claims"] if "control" not in entry}
 
 
 def image(kahanmaps, system, point, eps):
@@ -173,5 +173,5 @@ def test_integrals_of_the_command_line_are_checked_first_and_those_known_where_t
 ):
     report = kahanmaps(f"check-integrals euler_top {options} --json").json
     signs = {"refuted": "-", "proved": ""}
-    told = [signs[one["verdict"]] + one["claim"].removesuffix(" is conserved") for one in report["claims"]]
-    assert told == expected.split()
+    messages = [signs[entry["verdict"]] + entry["claim"].removesuffix(" is conserved") for entry in report["claims"]]
+    assert messages == expected.split()

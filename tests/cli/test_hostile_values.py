@@ -77,7 +77,7 @@ def cases(values: dict[str, list[str]]) -> list[tuple[str, str]]:
 def mistakes_of(words: str, name: str, values: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> list[str]:
     """What a command should not have done with these values of one parameter."""
     parameter = next(p for p in dict(LEAVES)[words].params if p.name == name)
-    found = []
+    results = []
     for kind in kinds_of(parameter):
         for value in values.get(kind, ()):
             line = line_with(words, parameter, value)
@@ -90,8 +90,8 @@ def mistakes_of(words: str, name: str, values: dict[str, list[str]], capsys: pyt
                 or longest > LONGEST_LINE
                 or (status == 2 and not err)
             ):
-                found.append(f"{[word[:40] for word in line]}: {status}, {longest}: {err[:300]}")
-    return found
+                results.append(f"{[word[:40] for word in line]}: {status}, {longest}: {err[:300]}")
+    return results
 
 
 @pytest.fixture

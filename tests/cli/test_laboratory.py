@@ -24,8 +24,8 @@ def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
 
 @pytest.mark.parametrize("form", ["", "--json"])
 def test_what_seconds_stopped_says_so_and_nothing_is_begun_after_it(kahanmaps, monkeypatch, form):
-    whole = _ProjectiveMap.images
-    images = lambda space, X: (time_is_over if space.prime == 7 else whole)(space, X)  # noqa: E731
+    complete = _ProjectiveMap.images
+    images = lambda space, X: (time_is_over if space.prime == 7 else complete)(space, X)  # noqa: E731
     monkeypatch.setattr(_ProjectiveMap, "images", images)
     outcome = kahanmaps(f"cycles weierstrass --prime 5 --prime 7 --prime 11 --seconds 1000 {form}")
     assert outcome.status == 3
@@ -61,18 +61,18 @@ def test_where_the_transient_is_cut_nothing_was_counted_and_no_number_is_printed
 
 def test_starts_from_a_file(kahanmaps, tmp_path):
     (tmp_path / "starts.csv").write_text("x,y\n1,0\n1/2,1/3\n")
-    found = kahanmaps("lyapunov harmonic --eps 1/10 --steps 50 --json --starts", tmp_path / "starts.csv").json
-    assert found["orbits"] == 2
-    assert found["per_time"] == pytest.approx([0, 0], abs=1e-12)
+    result = kahanmaps("lyapunov harmonic --eps 1/10 --steps 50 --json --starts", tmp_path / "starts.csv").json
+    assert result["orbits"] == 2
+    assert result["per_time"] == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_values_of_eps_that_disagree_are_reported(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.DEFAULT_EPS", (1, 2))
     from kahanmaps.systems.quadratic import QuadraticSystem
 
-    found = height_survey(QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"]), starts=2, steps=40)
-    assert (found.kind, found.kinds) == (Growth.UNDECIDED, (Growth.PERIODIC, Growth.QUADRATIC))
-    assert found.text == "heights of exact orbits are undecided: the eps disagree (2 periodic, 2 quadratic)"
+    survey = height_survey(QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"]), starts=2, steps=40)
+    assert (survey.kind, survey.kinds) == (Growth.UNDECIDED, (Growth.PERIODIC, Growth.QUADRATIC))
+    assert survey.text == "heights of exact orbits are undecided: the eps disagree (2 periodic, 2 quadratic)"
 
 
 def test_no_orbit_is_begun_after_the_budget_is_spent(monkeypatch):
@@ -82,7 +82,7 @@ def test_no_orbit_is_begun_after_the_budget_is_spent(monkeypatch):
 
     monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.height_growth", expensive)
     survey = height_survey(load("weierstrass").system, starts=3, steps=4, effort=-6)
-    assert (len(survey.orbits), survey.is_whole) == (1, False)
+    assert (len(survey.orbits), survey.is_complete) == (1, False)
 
 
 def test_wrong_values_in_the_library():

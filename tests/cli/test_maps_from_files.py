@@ -59,9 +59,9 @@ def test_a_map_with_eps_needs_it_and_one_without_does_not(kahanmaps):
 def test_what_is_found_out_about_any_map(kahanmaps, name, command):
     file = read_system(path := EXAMPLES[NAMES.index(name)])
     command = command.replace("q,p", ",".join(file.variables))
-    found = kahanmaps(f"{command} {path} --json -q")
-    assert found.status in (0, 3)
-    record = json.loads(found.out)
+    result = kahanmaps(f"{command} {path} --json -q")
+    assert result.status in (0, 3)
+    record = json.loads(result.out)
     if not file.map.has_eps:
         assert record["convention"] == NO_EPS
     plain = kahanmaps(f"{command} {path} -q").out
@@ -72,9 +72,9 @@ def test_what_is_found_out_about_any_map(kahanmaps, name, command):
     "command", ["check-integrals --vars x,y --image 'y;(3+y)/x' --integral x", "check-commute lyness fibonacci"]
 )
 def test_a_witness_of_a_map_without_eps_has_none(kahanmaps, command):
-    found = kahanmaps(f"{command} --json -q")
-    assert found.status == 1
-    record = json.loads(found.out)
+    result = kahanmaps(f"{command} --json -q")
+    assert result.status == 1
+    record = json.loads(result.out)
     assert record["claims"][0]["witness"]["eps"] is None
     assert not re.search(r"\beps\b", kahanmaps(f"{command} -q").out)
 
@@ -113,9 +113,9 @@ def word(tmp_path):
 )
 def test_orbits_are_stepped(kahanmaps, word, name, arithmetic):
     line = f"orbit {word(name)} --start {STARTS[name]} --eps 1/10 --steps 1 --arithmetic {arithmetic} --format jsonl -q"
-    found = kahanmaps(line)
-    records = [json.loads(text) for text in found.out.splitlines()]
-    assert (found.status, records[-1]["status"]) == (0, "completed")
+    result = kahanmaps(line)
+    records = [json.loads(text) for text in result.out.splitlines()]
+    assert (result.status, records[-1]["status"]) == (0, "completed")
     assert len(records[0]["composition"]) == {"four": 4, "ten letters": 10}[name]
 
 
@@ -134,18 +134,18 @@ LINES = [
 @pytest.mark.parametrize(("name", "line"), [*(("four", line) for line in LINES), ("ten letters", "degrees --terms 1")])
 def test_commands_go_through_the_factors(kahanmaps, word, name, line):
     quiet = "" if line == "systems" else " -q"
-    found = kahanmaps(f"{line} {word(name)} --json{quiet}")
-    record = json.loads(found.out)
+    result = kahanmaps(f"{line} {word(name)} --json{quiet}")
+    record = json.loads(result.out)
     if line.startswith("check"):
         is_density = name == "four" and "measure" in line
-        assert (record["verdict"], found.status) == (("supported", 0) if is_density else ("refuted", 1))
+        assert (record["verdict"], result.status) == (("supported", 0) if is_density else ("refuted", 1))
     if line.startswith("find-density") and name == "four":
         assert record["densities"]
 
 
 @pytest.mark.parametrize("line", ["systems {} --latex", "convert {} --to sympy", "convert {} --to c"])
 def test_formulas_are_refused_in_one_line(kahanmaps, word, line):
-    found = kahanmaps(line.format(word("ten letters")))
-    assert found.status == 2
-    (error,) = found.err.strip().splitlines()
+    result = kahanmaps(line.format(word("ten letters")))
+    assert result.status == 2
+    (error,) = result.err.strip().splitlines()
     assert "formulas are too large to be multiplied out" in error

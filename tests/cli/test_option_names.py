@@ -21,25 +21,25 @@ REFUSED = [
 
 def by_name() -> dict[str, set[str]]:
     """The commands that have an option; pictures and pages have words of their own for a few things."""
-    found: dict[str, set[str]] = defaultdict(set)
+    result: dict[str, set[str]] = defaultdict(set)
     for words, command in all_commands():
         if not isinstance(command, click.Group) and words.split()[0] not in ("plot", "report", "convert"):
             for option in options_of(command):
                 for name in names_of(option):
-                    found[name].add(words)
-    return found
+                    result[name].add(words)
+    return result
 
 
 def test_whoever_takes_eps_takes_the_time_step():
     assert by_name()["--eps"] == by_name()["--time-step"] != set()
 
 
-@together("option, value, found", REFUSED)
-def test_a_value_that_is_none_is_refused_by_every_command(kahanmaps, option, value, found):
+@together("option, value, result", REFUSED)
+def test_a_value_that_is_none_is_refused_by_every_command(kahanmaps, option, value, result):
     assert by_name()[option]
     for words in by_name()[option]:
         outcome = kahanmaps(words, f"{option} {value}")
-        assert (outcome.status, f"found {found}" in outcome.err) == (2, True), words
+        assert (outcome.status, f"found {result}" in outcome.err) == (2, True), words
 
 
 def test_the_old_name_of_an_option_still_works(kahanmaps):
@@ -53,9 +53,9 @@ def parsed(words: list[str]) -> None:
     context = click.Context(cli)
     name = "kahanmaps"
     while isinstance(command, click.Group) and words:
-        found = command.get_command(context, words[0])
-        assert found is not None, words[0]
-        name, command, words = words[0], found, words[1:]
+        result = command.get_command(context, words[0])
+        assert result is not None, words[0]
+        name, command, words = words[0], result, words[1:]
     try:
         command.make_context(name, list(words), parent=context)
     except click.BadParameter as error:

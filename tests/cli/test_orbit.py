@@ -21,19 +21,19 @@ LORENZ = "orbit lorenz --start 1,-1/2,2 --eps 1/20"
 
 
 def test_a_start_and_parameters_may_be_written_as_people_paste_them(kahanmaps):
-    rest = "--eps 1/10 --steps 2"
-    plain = kahanmaps(f"orbit 'dx/dt = a*x - x*y, dy/dt = x*y - b*y' -p a=2 -p b=1/3 --start 1,-1/2 {rest}")
+    others = "--eps 1/10 --steps 2"
+    plain = kahanmaps(f"orbit 'dx/dt = a*x - x*y, dy/dt = x*y - b*y' -p a=2 -p b=1/3 --start 1,-1/2 {others}")
     assert plain.status == 0, plain.err
     for start in ("'[1,-1/2]'", "'1 -1/2'", "'(1, -1/2)'"):
-        line = f"orbit 'x_dot = a*x - x*y; y_dot = x*y - b*y' -p a=2,b=1/3 --start {start} {rest}"
+        line = f"orbit 'x_dot = a*x - x*y; y_dot = x*y - b*y' -p a=2,b=1/3 --start {start} {others}"
         assert kahanmaps(line).out == plain.out
 
 
 def test_a_file_of_xpp_is_a_system(kahanmaps, tmp_path):
     path = tmp_path / "lorenz.ode"
     path.write_text("par s=10,r=28,b=8/3\nx'=s*(y-x)\ny'=x*(r-z)-y\nz'=x*y-b*z\ndone\n")
-    rest = "--start 1,2,3 --eps 1/10 --steps 2 --format csv"
-    assert kahanmaps(f"orbit {path} {rest}").out == kahanmaps(f"orbit lorenz {rest}").out
+    others = "--start 1,2,3 --eps 1/10 --steps 2 --format csv"
+    assert kahanmaps(f"orbit {path} {others}").out == kahanmaps(f"orbit lorenz {others}").out
 
 
 def test_the_header_has_the_documented_shape(kahanmaps):
@@ -70,12 +70,12 @@ def test_an_orbit_can_be_made_again_from_its_header(kahanmaps, arithmetic):
 def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_command_line(kahanmaps, tmp_path):
     toml = kahanmaps("systems euler_top --toml").out
     (tmp_path / "top.toml").write_text(toml)
-    rest = "--start 1,2,3 --eps 1/10 --steps 2 --format jsonl"
-    from_catalogue = kahanmaps(f"orbit euler_top {rest}").records[1:]
-    assert kahanmaps("orbit", tmp_path / "top.toml", rest).records[1:] == from_catalogue
+    others = "--start 1,2,3 --eps 1/10 --steps 2 --format jsonl"
+    from_catalogue = kahanmaps(f"orbit euler_top {others}").records[1:]
+    assert kahanmaps("orbit", tmp_path / "top.toml", others).records[1:] == from_catalogue
     inline = "--vars x1,x2,x3 --rhs x2*x3 --rhs -2*x3*x1 --rhs=x1*x2"
-    assert kahanmaps(f"orbit {inline} {rest}").records[1:] == from_catalogue
-    piped = shell(f"kahanmaps orbit - {rest}", tmp_path, stdin=toml.encode())
+    assert kahanmaps(f"orbit {inline} {others}").records[1:] == from_catalogue
+    piped = shell(f"kahanmaps orbit - {others}", tmp_path, stdin=toml.encode())
     assert piped.records[1:] == from_catalogue
 
 
@@ -109,9 +109,9 @@ def npz(kahanmaps, tmp_path):
     def run(command: str) -> SimpleNamespace:
         status = kahanmaps(command, "-q -o", tmp_path / "orbit.npz").status
         with np.load(tmp_path / "orbit.npz", allow_pickle=False) as arrays:
-            found = {name: arrays[name] for name in arrays.files}
-        found["meta"] = json.loads(str(found["meta"]))
-        return SimpleNamespace(status=status, **found)
+            results = {name: arrays[name] for name in arrays.files}
+        results["meta"] = json.loads(str(results["meta"]))
+        return SimpleNamespace(status=status, **results)
 
     return run
 
@@ -119,17 +119,17 @@ def npz(kahanmaps, tmp_path):
 @pytest.mark.parametrize("prime", [10007, 2**63 - 25])
 def test_npz_holds_residues_as_integers(npz, kahanmaps, prime):
     command = f"{TOP} --steps 3 --arithmetic mod:{prime}"
-    found = npz(command)
-    assert found.x.dtype == np.int64
-    assert found.x.tolist() == kahanmaps(f"{command} --format jsonl").points
+    result = npz(command)
+    assert result.x.dtype == np.int64
+    assert result.x.tolist() == kahanmaps(f"{command} --format jsonl").points
 
 
 def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monkeypatch):
     monkeypatch.setattr("kahanmaps.maps.orbits.writers.MAX_PADDED_BYTES", 1000)
-    found = npz(f"{TOP} --steps 20")
-    assert (found.status, found.meta["end"]["status"]) == (3, "budget")
-    assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))
-    assert 1 < len(found.x) < 20
+    result = npz(f"{TOP} --steps 20")
+    assert (result.status, result.meta["end"]["status"]) == (3, "budget")
+    assert result.step.tolist() == list(range(result.meta["end"]["steps"] + 1))
+    assert 1 < len(result.x) < 20
 
 
 def test_progress_goes_to_standard_error_only(kahanmaps, slow_clock):
@@ -229,9 +229,9 @@ LV = "orbit lotka_volterra --start 1,2 --eps 1/10 --steps 3"
 
 
 def test_json_has_the_points_of_jsonl(kahanmaps):
-    whole = kahanmaps(f"{LV} --json --integral x*y").json
+    complete = kahanmaps(f"{LV} --json --integral x*y").json
     header, *points, end = map(json.loads, kahanmaps(f"{LV} --format jsonl --integral x*y").out.splitlines())
-    assert whole.pop("command") == "orbit"
-    assert whole.pop("points") == [{k: v for k, v in one.items() if k != "record"} for one in points]
-    assert {"record": "end", **whole.pop("end")} == end
-    assert {"record": "header", **whole} == header
+    assert complete.pop("command") == "orbit"
+    assert complete.pop("points") == [{k: v for k, v in point.items() if k != "record"} for point in points]
+    assert {"record": "end", **complete.pop("end")} == end
+    assert {"record": "header", **complete} == header

@@ -44,15 +44,15 @@ def test_the_period_is_that_of_the_orbit_walked(kahanmaps, pair, scaled, name, p
         for _ in range(starts):
             start = ",".join(str(rng.randrange(prime)) for _ in range(dim))
             options = f"--start {start} --eps 1/25 --arithmetic mod:{prime}"
-            found = kahanmaps("period", system, options, "--json").json
+            result = kahanmaps("period", system, options, "--json").json
             end = walked(kahanmaps, ("orbit", system, options))
             if end["status"] == "singular":
-                assert found["meets_pole"] is True
+                assert result["meets_pole"] is True
             elif end["status"] == "periodic":
-                assert (found["period"], found["meets_pole"]) == (str(end["period"]), False)
+                assert (result["period"], result["meets_pole"]) == (str(end["period"]), False)
                 compared += end["period"] > 1
             else:
-                assert int(found["period"]) > end["steps"]
+                assert int(result["period"]) > end["steps"]
     assert compared >= 4
 
 

@@ -23,9 +23,9 @@ def drawn(monkeypatch):
     seen = []
     draw = drawing.plot_portrait
 
-    def spy(found, style, **how):
-        seen.append((found, how))
-        return draw(found, style, **how)
+    def spy(result, style, **how):
+        seen.append((result, how))
+        return draw(result, style, **how)
 
     monkeypatch.setattr(drawing, "plot_portrait", spy)
     return seen
@@ -34,9 +34,9 @@ def drawn(monkeypatch):
 def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn):
     line = f"{PLOT} lotka_volterra --eps 1/20 --steps 30 --flow -p"
     assert kahanmaps(line, "a=1.4142135623730951").status == kahanmaps(line, "'a=root of t^2 - 2 near 1.4'").status == 0
-    near, found = (portrait for portrait, _ in drawn)
-    np.testing.assert_allclose(found.points, near.points, rtol=1e-9)
-    assert len(found.flow.solutions) == len(near.flow.solutions) > 0
+    near, result = (portrait for portrait, _ in drawn)
+    np.testing.assert_allclose(result.points, near.points, rtol=1e-9)
+    assert len(result.flow.solutions) == len(near.flow.solutions) > 0
     top = f"{PLOT} euler_top --eps 1/10 --start 1,1,1 --colour-by F1 -p"
     assert kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").status == 0
 
@@ -69,7 +69,7 @@ def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, 
     command = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --window=-2,2,-2,2 --levels modified_H"
     kahanmaps(command)
     outcome = kahanmaps(command + " --levels-at=-1/2,1000")
-    through, at = (found.levels for found, _ in drawn)
+    through, at = (portrait.levels for portrait, _ in drawn)
     assert len(through) == 1
     assert [bool(pieces) for pieces in at] == [True, False]
     assert "1 of 2 levels of modified_H have no curve in the window" in outcome.err
@@ -88,7 +88,7 @@ def test_points_are_coloured_by_an_integral_that_a_theorem_gives(kahanmaps, draw
     words = f"{PLOT} weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --colour-by"
     kahanmaps(f"{words} 'modified H'")
     kahanmaps(f"{words} H")  # of the flow, which the map does not conserve
-    kept, moved = (np.ptp(found.values) for found, _ in drawn)
+    kept, moved = (np.ptp(portrait.values) for portrait, _ in drawn)
     assert kept < 1e-13
     assert moved > 1e-4
 
@@ -117,6 +117,6 @@ def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
 @pytest.mark.usefixtures("unrendered")
 def test_a_record_of_an_incomplete_survey_is_reported(kahanmaps, tmp_path):
     record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").json
-    (tmp_path / "r.json").write_text(json.dumps({**record, "whole": False}))
+    (tmp_path / "r.json").write_text(json.dumps({**record, "complete": False}))
     done = kahanmaps("plot heights -o - --format svg --from", tmp_path / "r.json")
     assert (done.status, "stopped early" in done.err) == (3, True)

@@ -36,8 +36,8 @@ def test_a_command_says_what_it_found(kahanmaps, pair, tmp_path, monkeypatch, re
     outcome = kahanmaps(with_its_file(words).replace("{pair}", str(pair)))
     assert outcome.status == int(status or 0), outcome.err
     said = " ".join(f"{outcome.out} {outcome.err}".split())
-    missing = [one for one in expected if not one.startswith("not: ") and one not in said]
-    wrongly = [one for one in expected if one.startswith("not: ") and one.removeprefix("not: ") in said]
+    missing = [entry for entry in expected if not entry.startswith("not: ") and entry not in said]
+    wrongly = [entry for entry in expected if entry.startswith("not: ") and entry.removeprefix("not: ") in said]
     assert (missing, wrongly) == ([], []), said
     assert "Traceback" not in said
     if "jsonl" in words or (" --json" in words and not words.startswith("orbit")):  # whose --json is one object

@@ -51,13 +51,13 @@ def test_blocks_say_degrees_growth_and_where(plane):
 def test_the_json_has_what_is_needed_to_run_it_again_and_files_of_an_earlier_scan_are_replaced(kahanmaps, tmp_path):
     for name in ("lotka_volterra-1.toml", "lotka_volterra-2.toml", "lotka_volterra-x.toml"):
         (tmp_path / name).write_text("old")
-    found = kahanmaps(f"scan {QUICK} --seed 3 --json --write-to {tmp_path}").json
-    assert (found["command"], found["over"], found["seed"], found["eps"]) == ("scan", ["a"], 3, "every")
-    assert found["document"]["name"] == "lotka_volterra"
-    ((only,),) = [one["components"] for one in found["classes"]]
+    result = kahanmaps(f"scan {QUICK} --seed 3 --json --write-to {tmp_path}").json
+    assert (result["command"], result["over"], result["seed"], result["eps"]) == ("scan", ["a"], 3, "every")
+    assert result["document"]["name"] == "lotka_volterra"
+    ((only,),) = [entry["components"] for entry in result["classes"]]
     assert (only["equations"], only["values"], only["growth"]) == (["a + 1"], {"a": "-1"}, "linear")
     assert (only["confirmed"], only["tried"], only["primes"]) == (3, 3, [11, 13, 17])
-    assert [one["seen"] for one in found["sweeps"]] == [11, 13, 17]
+    assert [entry["measured"] for entry in result["sweeps"]] == [11, 13, 17]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lotka_volterra-1.toml", "lotka_volterra-x.toml"]
     assert tomllib.loads((tmp_path / "lotka_volterra-1.toml").read_text())["parameters"]["a"] == "-1"
 
@@ -71,9 +71,9 @@ def test_an_inline_system_need_not_declare_what_varies(kahanmaps, plane, cases):
 
 
 def test_members_are_printed_as_system_files(kahanmaps):
-    found = kahanmaps(f"scan {QUICK} --toml").out
-    assert found.startswith("# -1\n")
-    assert tomllib.loads(found)["parameters"]["a"] == "-1"
+    result = kahanmaps(f"scan {QUICK} --toml").out
+    assert result.startswith("# -1\n")
+    assert tomllib.loads(result)["parameters"]["a"] == "-1"
 
 
 def test_verdicts_are_asked_for(kahanmaps, plane):

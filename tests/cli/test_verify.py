@@ -41,10 +41,10 @@ def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, once, t
 def test_controls_are_refuted_and_that_is_success(once):
     outcome = once(f"{QUICK} --controls --json")
     assert outcome.status == 0
-    *found, last = outcome.json["claims"]
-    assert {claim["verdict"] for claim in found} == {"refuted"}
-    assert all(claim["control"] and claim["expected"] == "refuted" for claim in found)
-    assert {claim["key"] for claim in found} == set(expected(2, 6))
+    *result, last = outcome.json["claims"]
+    assert {claim["verdict"] for claim in result} == {"refuted"}
+    assert all(claim["control"] and claim["expected"] == "refuted" for claim in result)
+    assert {claim["key"] for claim in result} == set(expected(2, 6))
     assert last["verdict"] == "proved"
 
 
@@ -64,4 +64,4 @@ def test_what_survives_of_variations_is_a_table(kahanmaps):
     answer = kahanmaps("verify --beyond --m 2 -q")
     assert answer.status == 0
     assert "| `dx/det(I - eps f') is invariant for f` | proved | proved | proved | | proved | proved |" in answer.out
-    assert "fails for m = 1, H = u1^3 + v1 at x = (0, 0)" in answer.out
+    assert "fails for `m = 1, H = u1^3 + v1` at `x = (0, 0)`" in answer.out

@@ -55,7 +55,7 @@ def sound(latex):
 def polynomials():
     exponents = st.tuples(*[st.integers(0, 12)] * len(NAMES))
     terms = st.dictionaries(exponents, rationals().filter(bool), max_size=6)
-    return terms.map(lambda found: RING.from_dict(found))
+    return terms.map(lambda result: RING.from_dict(result))
 
 
 @some
@@ -101,7 +101,7 @@ def test_the_derivative_has_a_prime_beside_its_index():
     assert piece == "x_1' = -x_1^2"
     root = sound(piece)
     assert "".join(next(root.iter("msubsup")).itertext()) == "x1′"
-    assert [one.text for one in root.iter("mo") if one.get("form") == "prefix"] == ["−"]
+    assert [entry.text for entry in root.iter("mo") if entry.get("form") == "prefix"] == ["−"]
 
 
 def test_terms_are_not_parted_within_braces_and_no_bracket_needs_its_partner():
@@ -118,7 +118,7 @@ def test_names_of_every_kind_become_mathml(name):
 
 def test_a_name_of_several_letters_does_not_look_like_a_product():
     product, fraction = sound("2 px_1 x py"), sound(r"\frac{x px}{2} + \cdots\ \text{(10 terms)}")
-    upright = [one.text for one in product.iter("mi") if one.get("mathvariant") == "normal"]
+    upright = [entry.text for entry in product.iter("mi") if entry.get("mathvariant") == "normal"]
     assert upright == ["p", "x", "p", "y"]
     assert len(list(product.iter("mspace"))) == 2
     assert "(10\xa0terms)" in "".join(fraction.itertext())

@@ -29,8 +29,8 @@ def html_of(thing):
     html = thing._repr_html_()
     assert len(html) < LARGEST
     tree = ElementTree.fromstring(f"<div>{html}</div>")
-    assert "script" not in {one.tag for one in tree.iter()}
-    assert not {one.get("style", "") for one in tree.iter() if "background" in one.get("style", "")}
+    assert "script" not in {entry.tag for entry in tree.iter()}
+    assert not {entry.get("style", "") for entry in tree.iter() if "background" in entry.get("style", "")}
     return tree
 
 
@@ -174,7 +174,7 @@ def test_hostile_and_huge_findings_are_escaped_and_cut():
     long = "9" * 10**6
     witness = Witness((long,) * 50, long, (EVIL,), (long,), EVIL, EVIL, EVIL, {EVIL: (long,)})
     evidence = Evidence(EVIL, long, {"hypotheses": [long] * 99, "theorem": EVIL})
-    place = {"misprint": EVIL, "broken": long, "section": 3, "section_title": EVIL}
+    place = {"misprint": EVIL, "violation": long, "section": 3, "section_title": EVIL}
     finding = Finding(EVIL + long, Certainty.REFUTED, evidence, (evidence,) * 99, witness, long, EVIL, place=place)
     html_of(finding)
     html_of(Report(EVIL, (finding,) * 1000, {"system": EVIL, "eps": long, "time_step": long}, [EVIL] * 100))
@@ -210,7 +210,7 @@ def test_every_text_is_well_formed_once_it_is_escaped(text):
     ],
 )
 def test_no_text_becomes_an_element(html):
-    assert "script" not in {one.tag for one in well_formed(html).iter()}
+    assert "script" not in {entry.tag for entry in well_formed(html).iter()}
     assert "alert" in "".join(well_formed(html).itertext())
 
 

@@ -34,12 +34,12 @@ over_the_smaller_systems = pytest.mark.parametrize("name", quick(names(), _SMALL
 def findings(file):
     """What check-integrals and check-measure say of a file; nothing where it claims nothing."""
     settings = Settings(steps=3)
-    found = []
+    results = []
     if file.integrals or file.hamiltonian is not None:
-        found += check_integrals(file, settings).findings
+        results += check_integrals(file, settings).findings
     if file.density is not None or file.hamiltonian is not None:
-        found += check_measure(file, settings).findings
-    return found
+        results += check_measure(file, settings).findings
+    return results
 
 
 @over_the_catalogue
@@ -56,11 +56,11 @@ def test_every_claim_of_a_file_holds_at_random_parameters_for_every_eps(name):
     file = load(
         name, {key: fmpq(rng.choice((-1, 1)) * rng.randint(1, 9), rng.randint(1, 5)) for key in load(name).parameters}
     )
-    found = findings(file)
-    assert all(finding.verdict in HOLDS for finding in found)
+    result = findings(file)
+    assert all(finding.verdict in HOLDS for finding in result)
     claimed = {f"{integral} is conserved" for integral in file.integrals}
-    assert claimed <= {finding.claim for finding in found}
-    measures = [finding for finding in found if "measure" in finding.claim]
+    assert claimed <= {finding.claim for finding in result}
+    measures = [finding for finding in result if "measure" in finding.claim]
     assert len(measures) == (file.density is not None) + (file.hamiltonian is not None)
 
 
@@ -91,9 +91,9 @@ def with_altered_claims(file):
 @over_the_catalogue
 def test_every_altered_claim_is_refuted_with_a_rational_witness(name):
     file = with_altered_claims(load(name))
-    found = findings(file)
-    assert len(found) == len(file.integrals) + (file.density is not None)
-    for finding in found:
+    result = findings(file)
+    assert len(result) == len(file.integrals) + (file.density is not None)
+    for finding in result:
         assert finding.verdict is Certainty.REFUTED, finding.claim
         assert finding.witness.field == "QQ"
         assert finding.witness.left != finding.witness.right

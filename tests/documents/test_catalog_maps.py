@@ -66,20 +66,20 @@ def test_another_claim_of_an_example_is_refuted(name):  # so the checks can fail
 def test_the_degrees_are_those_that_are_stated(name):
     known = FILES[name].catalog
     terms = min(len(known["degrees"]), 5)  # the others measures the slow test below
-    found = degree_growth(FILES[name].map, None, max_terms=terms)
-    assert list(found.degrees[1:]) == known["degrees"][:terms]
+    growth = degree_growth(FILES[name].map, None, max_terms=terms)
+    assert list(growth.degrees[1:]) == known["degrees"][:terms]
 
 
 @pytest.mark.parametrize("name", [name for name in map_names() if "growth" in FILES[name].catalog])
 @pytest.mark.slow
 def test_the_growth_is_the_one_that_is_stated(name):
     known = FILES[name].catalog
-    found = degree_growth(FILES[name].map, None, max_degree=20_000)
-    assert list(found.degrees[1:])[: len(known["degrees"])] == known["degrees"][: len(found.degrees) - 1]
-    assert str(found.growth if not found.looks_exponential else "exponential") == known["growth"]
+    growth = degree_growth(FILES[name].map, None, max_degree=20_000)
+    assert list(growth.degrees[1:])[: len(known["degrees"])] == known["degrees"][: len(growth.degrees) - 1]
+    assert str(growth.growth if not growth.looks_exponential else "exponential") == known["growth"]
     if "dynamical_degree" in known:
-        assert known["dynamical_degree"].replace("x", "t") in found.growth_text.replace("root of ", "") or (
-            known["dynamical_degree"] == "x - 2" and "dynamical degree 2" in found.growth_text
+        assert known["dynamical_degree"].replace("x", "t") in growth.growth_text.replace("root of ", "") or (
+            known["dynamical_degree"] == "x - 2" and "dynamical degree 2" in growth.growth_text
         )
 
 
@@ -95,9 +95,9 @@ def test_the_dimensions_of_the_relations_are_those_that_are_stated(name):
 @pytest.mark.parametrize("name", quick(map_names(), ["lyness", "mcmillan"]))
 def test_the_blind_analysis_gives_the_stated_verdict(name):
     known = FILES[name].catalog
-    found = analyze(FILES[name])
-    assert found.conclusion.kind == known["verdict"]
-    assert found.integral_count == known.get("codimension", found.integral_count)
+    analysis = analyze(FILES[name])
+    assert analysis.conclusion.kind == known["verdict"]
+    assert analysis.integral_count == known.get("codimension", analysis.integral_count)
 
 
 @pytest.mark.parametrize("name", quick(UNREPAIRED, ["repaired_octahedral"]))
@@ -116,8 +116,8 @@ def test_without_the_terms_in_eps_the_repaired_maps_are_kahan_s_and_not_integrab
 
 
 def _gap(first, second, eps):
-    one, other = (map_.at(eps, QQ).step((fmpq(1, 3), fmpq(2, 5))) for map_ in (first, second))
-    return [a - b for a, b in zip(one, other, strict=True)]
+    entry, other = (map_.at(eps, QQ).step((fmpq(1, 3), fmpq(2, 5))) for map_ in (first, second))
+    return [a - b for a, b in zip(entry, other, strict=True)]
 
 
 def test_five_steps_of_lyness_and_eight_of_todd_close_for_a_1():
@@ -129,14 +129,14 @@ def test_five_steps_of_lyness_and_eight_of_todd_close_for_a_1():
 
 def test_maps_of_different_kinds_commute_or_not():
     # The Kahan map of x' = x^2 is x/(1 - 2 eps x); of x' = 3 x^2 at a third of eps it is the same.
-    one = parse_system('variables = ["x"]\n[map]\nimage = ["x/(1 - 2*eps*x)"]')
+    entry = parse_system('variables = ["x"]\n[map]\nimage = ["x/(1 - 2*eps*x)"]')
     other = parse_system('variables = ["x"]\n[system]\nrhs = ["x^2 + eps^2*x^2"]')
     third = parse_system('variables = ["x"]\n[bilinear]\nequations = ["X - x = eps*(x + X)"]')
-    assert str(check_commute(one, other).verdict) == "proved"
-    assert str(check_commute(one, third).verdict) == "refuted"
+    assert str(check_commute(entry, other).verdict) == "proved"
+    assert str(check_commute(entry, third).verdict) == "refuted"
     settings = Settings(eps=fmpq(1, 5))
-    assert str(check_commute(one, one, settings, fmpq(1, 3)).verdict) == "proved"
-    report = check_commute(third, one, settings, fmpq(1, 3))
+    assert str(check_commute(entry, entry, settings, fmpq(1, 3)).verdict) == "proved"
+    report = check_commute(third, entry, settings, fmpq(1, 3))
     assert str(report.verdict) == "refuted"
     assert "the map of g is taken at eps2 = 1/3" in report.notes[0]
 

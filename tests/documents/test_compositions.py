@@ -106,11 +106,11 @@ def test_parts_share_a_symbol_and_are_given_functions_of_it(tmp_path, of):
     assert map_.symbols == ("b",)
     for b in ("5", "-2/7"):
         number = fmpq(*map(int, b.split("/")))
-        one = read_system(path, {"b": b}).map.at(EPS)
-        assert map_.at(EPS, values=[number]).step(START) == one.step(START)
-        assert map_.at(EPS, values=[number]).inverse.step(START) == one.inverse.step(START)
+        entry = read_system(path, {"b": b}).map.at(EPS)
+        assert map_.at(EPS, values=[number]).step(START) == entry.step(START)
+        assert map_.at(EPS, values=[number]).inverse.step(START) == entry.inverse.step(START)
         if of not in WITHOUT:
-            assert one.step(START) != map_.at(EPS, values=[number + 1]).step(START)
+            assert entry.step(START) != map_.at(EPS, values=[number + 1]).step(START)
 
 
 def test_a_symbol_that_a_part_cannot_have_is_refused(tmp_path):

@@ -107,9 +107,9 @@ def test_what_is_no_equation_is_refused_with_what_to_write(text, words):
 @pytest.mark.parametrize("word", ["polarised", "polarized"])
 def test_a_cubic_field_is_read_with_the_discretization_that_the_message_names(word):
     text = f'[system]\nrhs = "x\' = x^3"\ndiscretization = "{word}"'
-    found = km.parse_system(text).map
-    assert found.title == "polarised map"
-    assert found.at("1/4").step(["1/2", "1/3"]) == (fmpq(1, 3), fmpq(3, 5))  # as in maps/polarised.py
+    result = km.parse_system(text).map
+    assert result.title == "polarised map"
+    assert result.at("1/4").step(["1/2", "1/3"]) == (fmpq(1, 3), fmpq(3, 5))  # as in maps/polarised.py
 
 
 LORENZ = """# the Lorenz equations, as XPP's own example has them
@@ -172,7 +172,7 @@ def test_values_and_definitions_stand_in_the_places_of_their_names(lines, rhs):
         ("par eps=1\nx'=eps*x", "rename it"),
         ("x'=x^3", 'discretization = "polarised"'),
         ("\x00\x1b[31m", "line 1"),
-        ("q=x\n" + "q=q*q\n" * 100 + "x'=q", "characters with its definitions put in"),
+        ("q=x\n" + "q=q*q\n" * 100 + "x'=q", "characters after its definitions are inserted"),
         ("\n".join(f"f{k}(x)=x" for k in range(1000)), "and 950 more"),
     ],
 )

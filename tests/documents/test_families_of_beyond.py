@@ -90,5 +90,5 @@ def test_integrals_of_the_families_are_proved_and_no_constants(equations, values
 
 def test_three_integrals_of_the_coupled_nahm_systems_also_where_degrees_are_linear():
     for values in ({"a": -1, "b": -1}, {"a": 2, "b": "1/2"}):
-        found = km.find_integrals(km.System(NAHM, **values))
-        assert (found.codimension, found.formula_count) == (3, 3)
+        search = km.find_integrals(km.System(NAHM, **values))
+        assert (search.codimension, search.formula_count) == (3, 3)

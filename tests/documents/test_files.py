@@ -177,9 +177,9 @@ LARGE = {
 
 @together("text, expected, words", wrong_files())
 def test_the_mistakes_of_a_wrong_file_are_reported_by_key(text, expected, words):
-    found = mistakes(text)
-    assert [key for key, _ in found] == expected
-    assert [one for one in words if not any(one in sentence for _, sentence in found)] == []
+    result = mistakes(text)
+    assert [key for key, _ in result] == expected
+    assert [word for word in words if not any(word in sentence for _, sentence in result)] == []
 
 
 @pytest.mark.parametrize(("text", "expected"), LARGE.values(), ids=LARGE)
@@ -202,12 +202,12 @@ FIELD = GF(PRIME)
 WITH_PARAMETERS = [name for name in names() if load(name).parameters and load(name).kind != "family"]
 
 
-def same_maps(one, other, seed=0):
+def same_maps(first, second, seed=0):
     rng = random.Random(seed)
     for _ in range(3):
-        x = [FIELD.random(rng) for _ in range(other.dim)]
-        assert list(one.polarised(x, x)) == list(other.value(x))
-        assert one.jacobian(x) == other.jacobian(x)
+        x = [FIELD.random(rng) for _ in range(second.dim)]
+        assert list(first.polarised(x, x)) == list(second.value(x))
+        assert first.jacobian(x) == second.jacobian(x)
 
 
 @pytest.mark.parametrize("name", WITH_PARAMETERS)

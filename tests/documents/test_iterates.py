@@ -19,8 +19,8 @@ def read(text):
     ("text", "words"),
     [
         ("F0*x~, F0", "expected what a letter stands for"),
-        ("F0*x~, x = y", "no names of something else"),
-        ("F0*x~, F0 = x, F0 = y", "expected each once"),
+        ("F0*x~, x = y", "no names that are already in use"),
+        ("F0*x~, F0 = x, F0 = y", "expected each of them once"),
         ("F0~, F0 = F1, F1 = x", "unknown name 'F1'"),
         ("F0~, F0 = x/y", "division"),
         ("x" + "~" * 17, "expected at most 16"),
@@ -80,17 +80,17 @@ def test_a_file_may_claim_them_and_is_written_with_them():
     file = km.parse_system(TOML)
     assert (list(file.integrals), list(file.integrals_in_iterates)) == (["I"], ["A"])
     assert km.parse_system(file.to_toml()) == file
-    assert [str(one.verdict) for one in km.check_integrals(file).findings] == ["proved", "proved"]
+    assert [str(finding.verdict) for finding in km.check_integrals(file).findings] == ["proved", "proved"]
     refuted = km.parse_system(TOML.replace("x*y~ - y", "x*y~ + y"))
     assert refuted != file
-    assert [str(one.verdict) for one in km.check_integrals(refuted).findings] == ["proved", "refuted"]
+    assert [str(finding.verdict) for finding in km.check_integrals(refuted).findings] == ["proved", "refuted"]
 
 
 @pytest.mark.slow
 def test_what_the_search_prints_is_a_claim_that_holds():
-    found = km.find_integrals(km.load("lagrange_top"))
-    assert len(found.in_iterates) == 1
-    text = km.load("lagrange_top").to_toml().partition("[integrals]")[0] + found.toml_section()
+    search = km.find_integrals(km.load("lagrange_top"))
+    assert len(search.in_iterates) == 1
+    text = km.load("lagrange_top").to_toml().partition("[integrals]")[0] + search.toml_section()
     report = km.check_integrals(km.parse_system(text))
-    assert [one.claim.split()[0] for one in report.findings] == [f"I{k}" for k in range(1, 5)]
+    assert [finding.claim.split()[0] for finding in report.findings] == [f"I{k}" for k in range(1, 5)]
     assert report.verdict is Certainty.PROVED

@@ -99,8 +99,8 @@ def test_over_the_determinant_there_are_k_plus_1_integrals(k):
     for x, y in map_.pairs(len(orbits) + 8):
         here, there = (int(map_.map.determinant(point)) for point in (x, y))
         rows.append([(v * here - u * there) % p for u, v in zip(values(x), values(y), strict=True)])
-    found = null_space(rows, len(orbits), p)
-    lowest = [min(sum(next(iter(o))) for o, c in zip(orbits, vector, strict=True) if c) for vector in found]
+    basis = null_space(rows, len(orbits), p)
+    lowest = [min(sum(next(iter(o))) for o, c in zip(orbits, vector, strict=True) if c) for vector in basis]
     assert lowest == list(range(1, n + 1, 2))
 
 

@@ -186,8 +186,8 @@ def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
     tasks.append(Task("test", {"family": {"m": 2}}, {}))
     tasks.append(Task("test", {"document": "first", "parameters": {}}, {"other": {"document": "third"}}))
     with closing(shared.workers(texts.__getitem__)) as workers:
-        found = {record.key: record.result["documents"] for record in done(workers, [Job(task) for task in tasks])}
-    assert [found[task.key] for task in tasks] == [
+        results = {record.key: record.result["documents"] for record in done(workers, [Job(task) for task in tasks])}
+    assert [results[task.key] for task in tasks] == [
         {"first": "one = 1"},
         {"second": "two = 2"},
         {},

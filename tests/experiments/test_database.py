@@ -55,12 +55,12 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("make", "told"), WRONG)
-def test_what_is_no_database_of_results_is_refused_and_left_alone(path, make, told):
+@pytest.mark.parametrize(("make", "message"), WRONG)
+def test_what_is_no_database_of_results_is_refused_and_left_alone(path, make, message):
     make(path)
     before = path.read_bytes() if path.is_file() else None
     for how in ({"readonly": True}, {}, {"create": True}):
-        with pytest.raises(StoreError, match=told):
+        with pytest.raises(StoreError, match=message):
             Store.open(path, **how).status()
     assert before is None or path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]

@@ -104,13 +104,13 @@ def test_columns_come_in_the_documented_order():
 
 def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result():
     task = Task("orbit", {"family": {"seed": 1, "m": 2}}, {"seed": 2, "verdict": "v", "host": "h"})
-    (found,) = table([row(task=task, result={"seed": 3, "m": 4, "system": 5, "verdict": 6}, verdict="proved")])
+    (result,) = table([row(task=task, result={"seed": 3, "m": 4, "system": 5, "verdict": 6}, verdict="proved")])
     names = ["seed", "family.seed", "result.seed", "m", "result.m", "result.system"]
-    assert [found[name] for name in names] == ["2", "1", "3", "2", "4", "5"]
+    assert [result[name] for name in names] == ["2", "1", "3", "2", "4", "5"]
     names = ["verdict", "option.verdict", "result.verdict", "host", "option.host"]
-    assert [found[name] for name in names] == ["proved", "v", "6", "hilbert", "h"]
-    (found,) = table([row(result={"a": {"b": 1}, "a.b": 2, "result.a.b": 3})])
-    assert [found[name] for name in ("a.b", "result.a.b", "result.result.a.b")] == ["1", "2", "3"]
+    assert [result[name] for name in names] == ["proved", "v", "6", "hilbert", "h"]
+    (result,) = table([row(result={"a": {"b": 1}, "a.b": 2, "result.a.b": 3})])
+    assert [result[name] for name in ("a.b", "result.a.b", "result.result.a.b")] == ["1", "2", "3"]
 
 
 @pytest.mark.parametrize(
@@ -139,9 +139,9 @@ def test_a_cell_says_the_value(value, text):
 
 @given(many_rows())
 def test_a_table_reads_back_cell_by_cell(rows):
-    found = table(rows)
-    assert len(found) == len(rows)
-    for cells, source in zip(found, rows, strict=True):
+    outcome = table(rows)
+    assert len(outcome) == len(rows)
+    for cells, source in zip(outcome, rows, strict=True):
         record = source.record
         result = dict(flatten(record.result or {})) if record else {}
         parts = [*dict(flatten(source.task.system or {})).values(), *source.task.options.values(), *result.values()]
@@ -156,7 +156,7 @@ def test_a_table_reads_back_cell_by_cell(rows):
 @given(many_rows())
 def test_stable_exports_are_the_same_bytes_wherever_the_work_was_done(rows):
     run = {"seconds": 9.0, "peak_memory": None, "host": "noether", "stderr": "x", "versions": {}, "finished": "later"}
-    others = [replace(one, record=one.record and replace(one.record, **run)) for one in rows]
+    others = [replace(row, record=row.record and replace(row.record, **run)) for row in rows]
     assert jsonl(rows, stable=True) == jsonl(others, stable=True)
     assert csv_text(rows, stable=True) == csv_text(others, stable=True)
 
@@ -225,34 +225,34 @@ def parquet(tmp_path):
     ],
 )
 def test_a_column_of_parquet_has_the_type_that_fits_all_its_values(parquet, values, kind, expected):
-    found = parquet([row(number, result={"x": value}) for number, value in enumerate(values)]).read()
-    assert str(found.schema.field("x").type) == kind
-    assert found["x"].to_pylist() == expected
+    result = parquet([row(number, result={"x": value}) for number, value in enumerate(values)]).read()
+    assert str(result.schema.field("x").type) == kind
+    assert result["x"].to_pylist() == expected
 
 
 def test_parquet_has_the_columns_of_the_csv_file(parquet):
     rows = [row(0, result={"seed": 1, "a": {"b": 2}}), row(1, FILE), Row("e", 2, FAMILY, None)]
     for stable in (False, True):
-        found = parquet(rows, stable=stable).read()
-        beside = [name for name in found.column_names if name.endswith(".number")]
+        result = parquet(rows, stable=stable).read()
+        beside = [name for name in result.column_names if name.endswith(".number")]
         assert beside == ["parameters.a.number", "eps.number"]
-        assert found["parameters.a.number"].to_pylist() == [None, 0.5, None]
-        found = found.drop_columns(beside)
-        assert found.column_names == columns(rows, stable=stable)
-        assert [{name: cell(value) for name, value in line.items()} for line in found.to_pylist()] == table(
+        assert result["parameters.a.number"].to_pylist() == [None, 0.5, None]
+        result = result.drop_columns(beside)
+        assert result.column_names == columns(rows, stable=stable)
+        assert [{name: cell(value) for name, value in line.items()} for line in result.to_pylist()] == table(
             rows, stable=stable
         )
 
 
 def test_numbers_of_parquet_stand_beside_the_exact_text(parquet):
     values = ["7/3", None, 2, f"1{'0' * 400}", "-1e5"]
-    found = parquet([row(number, result={"x": value}) for number, value in enumerate(values)]).read()
-    assert found["x"].to_pylist() == ["7/3", None, "2", f"1{'0' * 400}", "-1e5"]
-    assert found["x.number"].to_pylist() == [7 / 3, None, 2.0, math.inf, -1e5]
-    found = parquet([row(0, result={"x": "7/3"}), row(1, result={"x": "more"})]).read()
-    assert "x.number" not in found.column_names
-    found = parquet([row(0, result={"x": "7/3", "x.number": 5})]).read()
-    assert found["x.number"].to_pylist() == [5]
+    result = parquet([row(number, result={"x": value}) for number, value in enumerate(values)]).read()
+    assert result["x"].to_pylist() == ["7/3", None, "2", f"1{'0' * 400}", "-1e5"]
+    assert result["x.number"].to_pylist() == [7 / 3, None, 2.0, math.inf, -1e5]
+    result = parquet([row(0, result={"x": "7/3"}), row(1, result={"x": "more"})]).read()
+    assert "x.number" not in result.column_names
+    result = parquet([row(0, result={"x": "7/3", "x.number": 5})]).read()
+    assert result["x.number"].to_pylist() == [5]
 
 
 def test_without_pyarrow_the_error_says_what_to_install(tmp_path, monkeypatch):

@@ -77,9 +77,9 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
         with pytest.raises(InputError, match="without values"):
             RationalRange(first, last, step)
         return
-    found = RationalRange(first, last, step)
-    assert len(found) == len(expected)
-    assert [fraction(value) for value in found] == expected
+    result = RationalRange(first, last, step)
+    assert len(result) == len(expected)
+    assert [fraction(value) for value in result] == expected
 
 
 def combinations(axes: dict[str, list[int]], zips: list[list[str]]) -> list[dict[str, int]]:

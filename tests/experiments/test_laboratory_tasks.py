@@ -76,7 +76,7 @@ COUNTED = {"status": "complete", "reason": ""}
 
 
 @pytest.mark.parametrize(
-    ("name", "system", "asked", "expected"),
+    ("name", "system", "requested", "expected"),
     [
         ("degrees", TOP, {}, QUADRATIC),
         ("degrees", RIVALS, {}, EXPONENTIAL),
@@ -105,41 +105,41 @@ COUNTED = {"status": "complete", "reason": ""}
         ),
     ],
 )  # fmt: skip
-def test_what_is_known_is_found(name, system, asked, expected):
-    found = perform(name, system, **asked)
-    assert {key: found[key] for key in expected} == expected
+def test_what_is_known_is_found(name, system, requested, expected):
+    record = perform(name, system, **requested)
+    assert {key: record[key] for key in expected} == expected
 
 
 def test_what_is_missing_has_a_reason(monkeypatch):
     # Four integrals by petrera-pfadler-suris-2009, not all of them quotients of small degree in x alone.
     monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.TWO_POINT_BASES", ())
-    found = perform("find-integrals", of_catalogue("clebsch_first_flow"), max_degree=2)
-    assert (found["status"], found["codimension"] > found["integrals"] > 0) == ("formulas missing", True)
-    assert "no closed form" in found["reason"]
+    record = perform("find-integrals", of_catalogue("clebsch_first_flow"), max_degree=2)
+    assert (record["status"], record["codimension"] > record["integrals"] > 0) == ("formulas missing", True)
+    assert "no closed form" in record["reason"]
 
 
 def test_a_census_is_that_of_the_library():
-    found = perform("cycles", WEIERSTRASS, prime=31, eps="1/10", report=True)
+    record = perform("cycles", WEIERSTRASS, prime=31, eps="1/10", report=True)
     census = cycle_census(WEIERSTRASS.system, "1/10", 31)
-    (run,) = found["runs"]
+    (run,) = record["runs"]
     assert run["lengths"] == [list(pair) for pair in census.lengths.items()]
     assert (run["indeterminate"], run["pre_indeterminate"], run["periodic"]) == (3, 613, 377)
-    assert (found["points"], found["longest"], found["status"]) == ("993", 21, "complete")
+    assert (record["points"], record["longest"], record["status"]) == ("993", 21, "complete")
     assert "lengths" not in perform("cycles", WEIERSTRASS, prime=31, eps="1/10")["runs"][0]
 
 
 def test_exponents_are_those_of_the_library():
-    found = perform("lyapunov", LORENZ, eps="1/400", orbits=4, box="5", steps=50, transient=10, seed=3)
+    record = perform("lyapunov", LORENZ, eps="1/400", orbits=4, box="5", steps=50, transient=10, seed=3)
     direct = lyapunov_exponents(LORENZ.system, starts_in_box(4, 3, 5.0, 3), "1/400", 50, transient=10)
-    assert found["exponents"] == direct.mean.tolist()
-    assert (found["largest"], found["smallest"]) == (found["exponents"][0], found["exponents"][2])
-    assert (found["status"], found["counted"], found["ended"]) == ("completed", 50, 0)
+    assert record["exponents"] == direct.mean.tolist()
+    assert (record["largest"], record["smallest"]) == (record["exponents"][0], record["exponents"][2])
+    assert (record["status"], record["counted"], record["ended"]) == ("completed", 50, 0)
     # The divergence of the Lorenz equations is -10 - 1 - 8/3, and the sum has to be near it.
-    assert found["sum"] == pytest.approx(-41 / 3, abs=0.05)
+    assert record["sum"] == pytest.approx(-41 / 3, abs=0.05)
 
 
 @pytest.mark.parametrize(
-    ("name", "system", "asked", "words"),
+    ("name", "system", "requested", "words"),
     [
         ("find-integrals", TOP, {"symbolic": "b"}, "b"),
         ("scan", TOP, {"over": "b"}, "found the symbol 'b'"),
@@ -153,22 +153,22 @@ def test_exponents_are_those_of_the_library():
         ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found 1 steps after 0, expected at least 2"),
     ],
 )
-def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
+def test_an_impossible_task_is_refused_in_a_sentence(name, system, requested, words):
     with pytest.raises(InputError, match=words):
-        perform(name, system, **asked)
+        perform(name, system, **requested)
 
 
 @pytest.mark.slow
 def test_the_survey_of_the_catalogue_finds_what_the_catalogue_knows():
-    found: dict[str, list[Any]] = {}
+    result: dict[str, list[Any]] = {}
     spec = km.read_spec(SURVEY)
     tasks = {task.key: (experiment.name, task) for experiment in spec.experiments for task in experiment.tasks()}
     for record in km.run(spec, jobs=2):
         experiment, task = tasks[record.key]
         assert record.is_ok
-        found.setdefault(experiment, []).append((task, record))
-    assert {record.result["growth"] for _, record in found["members"]} == {"quadratic"}
-    counts = {task.system["name"]: record.result["codimension"] for task, record in found["integrals"]}
+        result.setdefault(experiment, []).append((task, record))
+    assert {record.result["growth"] for _, record in result["members"]} == {"quadratic"}
+    counts = {task.system["name"]: record.result["codimension"] for task, record in result["integrals"]}
     assert {name: counts[name] for name in ("euler_top", "lorenz", "clebsch_first_flow", "paper_m3")} == {
         "euler_top": 2,
         "lorenz": 0,

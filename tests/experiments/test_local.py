@@ -79,11 +79,11 @@ def tries(folder: Path, number: int, times: int) -> int:
 
 def done(jobs: Sequence[Job], workers: int = 2, **settings: Any) -> dict[str, Record]:
     """The records by key; every job has one and only one."""
-    found: list[Record] = []
+    results: list[Record] = []
     for records in Batch(jobs, LocalWorkers(workers, {}.__getitem__, **settings)):
-        found += records
-    assert sorted(record.key for record in found) == sorted(job.task.key for job in jobs)
-    return {record.key: record for record in found}
+        results += records
+    assert sorted(record.key for record in results) == sorted(job.task.key for job in jobs)
+    return {record.key: record for record in results}
 
 
 def pids_of(workers: LocalWorkers) -> list[int]:
@@ -195,12 +195,12 @@ def test_an_error_caused_by_lack_of_memory_is_reported_as_such(error, is_memory)
     caused, met = InputError("found no numbers"), ValueError("no value")
     caused.__cause__, met.__context__ = error, error
     for raised in (error, caused, met):
-        found = failure(raised)
+        result = failure(raised)
         if is_memory:
-            assert found == {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
+            assert result == {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
         else:
-            assert found["outcome"] is Outcome.FAILED
-            assert ("stderr" in found) is (raised is not caused)  # a traceback, where nobody raised it on purpose
+            assert result["outcome"] is Outcome.FAILED
+            assert ("stderr" in result) is (raised is not caused)  # a traceback, where nobody raised it on purpose
 
 
 def test_the_time_of_one_task_is_not_that_of_the_tasks_before_it():
@@ -349,7 +349,7 @@ def test_a_lost_task_has_no_result_and_the_next_run_does_it_again(tmp_path: Path
         assert (status.missing, status.outcomes) == (1, {Outcome.OK: 1})
         assert [row.record is None for row in store.rows(missing=True)] == [False, True]
         lost = [store.find(record.key)[0] for record in records if record.outcome is Outcome.LOST]
-        assert [(found.record, found.attempts) for found in lost] == [(None, 0)]
+        assert [(entry.record, entry.attempts) for entry in lost] == [(None, 0)]
     (tmp_path / "tries" / "15-99").write_text("x" * 99)  # from here on it lives
     again = list(run(spec, db))
     assert [str(record.outcome) for record in again] == ["ok"]

@@ -71,17 +71,17 @@ def test_a_signature_says_what_a_task_can_be_asked():
 
 
 def test_a_task_is_done_with_what_its_options_stand_for():
-    asked = {}
+    requested = {}
 
     @task("a-task")
     def f(system: Any, eps: Any, start: Any, at: Any, other: Any = None) -> dict[str, Any]:
-        asked.update(locals())
+        requested.update(locals())
         return {"verdict": "proved"}
 
     options = {"eps": "1/10", "start": "1/2,0", "at": None, "other": "a system"}
     assert task_kind("a-task").perform("S", options) == {"verdict": "proved"}
     expected = {"system": "S", "eps": fmpq(1, 10), "start": (fmpq(1, 2), fmpq(0)), "at": None, "other": "a system"}
-    assert {name: asked[name] for name in expected} == expected
+    assert {name: requested[name] for name in expected} == expected
 
 
 def test_an_unknown_task_is_refused_with_the_known_ones_and_a_suggestion():

@@ -54,20 +54,20 @@ def undisturbed(fault_tasks, tmp_path_factory) -> str:
 def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_interruptions(
     undisturbed: str, tmp_path: Path
 ):
-    found = run(MIXED, tmp_path / "b.db", jobs=2, only=["space"])
-    assert len(list(islice(found, 1))) == 1
-    found.close()  # type: ignore[attr-defined]
+    outcome = run(MIXED, tmp_path / "b.db", jobs=2, only=["space"])
+    assert len(list(islice(outcome, 1))) == 1
+    outcome.close()  # type: ignore[attr-defined]
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
 
 
 def test_a_record_is_in_the_database_before_it_is_yielded(tmp_path: Path):
-    found = run(PAUSES.format(milliseconds=1, last=20), tmp_path / "a.db")
-    for record in islice(found, 5):
+    outcome = run(PAUSES.format(milliseconds=1, last=20), tmp_path / "a.db")
+    for record in islice(outcome, 5):
         with Store.open(tmp_path / "a.db", readonly=True) as store:
             ((_, stored, _, _),) = store.find(record.key)
         assert stored == record
-    found.close()  # type: ignore[attr-defined]
+    outcome.close()  # type: ignore[attr-defined]
 
 
 def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):

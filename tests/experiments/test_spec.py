@@ -32,14 +32,14 @@ from kahanmaps.family.random_members import (
 
 def test_the_last_axis_runs_fastest_and_systems_slowest():
     text = LORENZ.replace('"lorenz"', '["lorenz", "riccati"]') + 'axes = {eps = [1, 2], seed = "0..2"}'
-    found = [(task.system["name"], task.options["eps"], task.options["seed"]) for task in tasks(text) if task.system]
-    assert found == list(product(["lorenz", "riccati"], ["1", "2"], [0, 1, 2]))
+    results = [(task.system["name"], task.options["eps"], task.options["seed"]) for task in tasks(text) if task.system]
+    assert results == list(product(["lorenz", "riccati"], ["1", "2"], [0, 1, 2]))
 
 
 def test_zipped_axes_run_together():
     text = FAMILY + 'zip = [["m", "steps"]]\naxes = {m = "2..4", eps = [1, 2], steps = [30, 20, 10]}'
-    found = [(task.value("m"), task.value("eps"), task.value("steps")) for task in tasks(text)]
-    assert found == [(m, eps, steps) for m, steps in [(2, 30), (3, 20), (4, 10)] for eps in "12"]
+    results = [(task.value("m"), task.value("eps"), task.value("steps")) for task in tasks(text)]
+    assert results == [(m, eps, steps) for m, steps in [(2, 30), (3, 20), (4, 10)] for eps in "12"]
 
 
 @pytest.mark.parametrize(
@@ -77,17 +77,17 @@ def test_paths_of_systems_are_relative_to_the_folder_of_the_spec(folder, tmp_pat
     ],
 )
 def test_systems_are_names_paths_patterns_or_lists_of_these(folder, system, names):
-    found = tasks(LORENZ.replace('"lorenz"', system) + "axes = {eps = 1}", folder=folder)
-    assert [task.system["name"] for task in found if task.system] == names
+    result = tasks(LORENZ.replace('"lorenz"', system) + "axes = {eps = 1}", folder=folder)
+    assert [task.system["name"] for task in result if task.system] == names
 
 
 def test_a_second_system_is_a_recipe_like_the_first(folder):
     text = COMMUTE + 'system = "lotka_volterra"\naxes = {other = ["harmonic", "rotor.toml"]}'
-    found = tasks(text, folder=folder)
+    result = tasks(text, folder=folder)
     spec = parse_spec(text, folder=folder)
-    assert [task.options["other"]["name"] for task in found] == ["harmonic", "rotor"]
-    named = {task.options["other"]["document"] for task in found}
-    assert named | {task.system["document"] for task in found} == set(spec.documents)
+    assert [task.options["other"]["name"] for task in result] == ["harmonic", "rotor"]
+    named = {task.options["other"]["document"] for task in result}
+    assert named | {task.system["document"] for task in result} == set(spec.documents)
     assert all(isinstance(json.loads(text), dict) for text in spec.documents.values())
 
 
@@ -119,10 +119,10 @@ OTHER_KEYS = [
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "is_same"), [(*pair, True) for pair in SAME_KEYS] + [(*pair, False) for pair in OTHER_KEYS]
+    ("first", "second", "is_same"), [(*pair, True) for pair in SAME_KEYS] + [(*pair, False) for pair in OTHER_KEYS]
 )
-def test_the_same_question_has_the_same_key_and_another_one_another_key(one, other, is_same):
-    assert (task_of(one).key == task_of(other).key) is is_same
+def test_the_same_question_has_the_same_key_and_another_one_another_key(first, second, is_same):
+    assert (task_of(first).key == task_of(second).key) is is_same
 
 
 @settings(max_examples=20)
@@ -167,16 +167,16 @@ DEFINITIONS = [
 ]
 
 
-@together("one, other, is_same", DEFINITIONS)
-def test_experiments_have_the_same_definition_where_they_say_the_same(one, other, is_same):
-    assert (only(one).definition == only(other).definition) is is_same
+@together("first, second, is_same", DEFINITIONS)
+def test_experiments_have_the_same_definition_where_they_say_the_same(first, second, is_same):
+    assert (only(first).definition == only(second).definition) is is_same
 
 
 def test_a_range_and_the_list_of_its_values_are_two_definitions_of_the_same_tasks():
     # They are two texts, and a range is never spelt out to compare them: planning finds the tasks again by their keys.
-    one, other = (only(LORENZ + f"axes = {{eps = 1, seed = {seed}}}") for seed in ('"0..2"', "[0, 1, 2]"))
-    assert one.definition != other.definition
-    assert list(one.tasks()) == list(other.tasks())
+    entry, other = (only(LORENZ + f"axes = {{eps = 1, seed = {seed}}}") for seed in ('"0..2"', "[0, 1, 2]"))
+    assert entry.definition != other.definition
+    assert list(entry.tasks()) == list(other.tasks())
 
 
 @pytest.mark.parametrize(
@@ -201,13 +201,13 @@ def test_the_limits_of_an_experiment_come_before_those_of_all():
 
 
 @pytest.mark.parametrize(
-    ("axes", "told"),
+    ("axes", "message"),
     [
         ('seed = "1..1e18", steps = "1..1e9", eps = "1..1e18"', "x 1,000,000,000 steps x"),
         ('eps = "1..1e6", seed = "1..1e6", steps = "1..5"', "a has 1,000,000 eps+seed x 5 steps"),
     ],
 )
-def test_absurd_products_are_refused_in_no_time_and_space(axes, told):
+def test_absurd_products_are_refused_in_no_time_and_space(axes, message):
     text = LORENZ + f"axes = {{{axes}}}" + ('\nzip = [["eps", "seed"]]' if "1..5" in axes else "")
     tracemalloc.start()
     try:
@@ -217,7 +217,7 @@ def test_absurd_products_are_refused_in_no_time_and_space(axes, told):
         tracemalloc.stop()
     assert key == "experiments"
     assert "expected at most 1,000,000 (--max-tasks allows more)" in sentence
-    assert told in sentence
+    assert message in sentence
     assert peak < 50_000_000  # 1 MB
 
 

@@ -51,20 +51,20 @@ SYSTEMS = CASES.pop("a system")
 
 @together("text, expected", [case for cases in CASES.values() for case in cases])
 def test_a_mistake_is_reported_once_with_its_key(text, expected):
-    wanted = [words.split(": ", 1) for words in expected.split(" ;; ")]
-    found = mistakes(text)
-    assert [key for key, _ in found] == [key for key, _ in wanted]
-    assert all(told.startswith(words) for (_, told), (_, words) in zip(found, wanted, strict=True))
+    required = [words.split(": ", 1) for words in expected.split(" ;; ")]
+    result = mistakes(text)
+    assert [key for key, _ in result] == [key for key, _ in required]
+    assert all(message.startswith(words) for (_, message), (_, words) in zip(result, required, strict=True))
 
 
 @pytest.mark.parametrize(("system", "expected"), SYSTEMS)
 def test_a_wrong_system_is_reported_once_with_its_key(folder, monkeypatch, system, expected):
     monkeypatch.chdir(folder)
     text = LORENZ.replace('"lorenz"', system) + "axes = {eps = 1" + (", m = 2}" if "family" in system else "}")
-    ((found, told),) = mistakes(text, folder=folder)
+    ((result, messages),) = mistakes(text, folder=folder)
     key, sentence = expected.split(": ", 1)
-    assert found == f"experiments.a.{key}"
-    assert told.startswith(sentence.replace("FOLDER", str(folder)))
+    assert result == f"experiments.a.{key}"
+    assert messages.startswith(sentence.replace("FOLDER", str(folder)))
 
 
 def test_nothing_in_a_message_is_obeyed_by_a_terminal():
@@ -87,9 +87,9 @@ def test_nothing_in_a_message_is_obeyed_by_a_terminal():
     ],
 )
 def test_invalid_toml_is_refused_in_a_sentence(text, sentence):
-    ((key, told),) = mistakes(text)
+    ((key, messages),) = mistakes(text)
     assert key == "TOML"
-    assert told.split(" (")[0] == sentence.split(" (")[0]
+    assert messages.split(" (")[0] == sentence.split(" (")[0]
 
 
 KEYS = ["task", "system", "options", "axes", "zip", "limits", "eps", "time_step", "m", "seed", "parameters", "name"]
@@ -181,12 +181,12 @@ def test_a_file_that_says_the_same_as_another_is_named_with_it_or_left_out(spec,
     (tmp_path / "members" / "copy").mkdir()
     (tmp_path / "members" / "copy" / "a.toml").write_text(GOOD)
     text = spec(ORBITS.replace('"members/*.toml"', '["members/a.toml", "members/copy/*.toml"]'))
-    told = "found a twice, expected every system once: members/copy/a.toml says the same as members/a.toml"
-    with pytest.raises(SpecError, match=f"system.2.: {told}"):
+    messages = "found a twice, expected every system once: members/copy/a.toml says the same as members/a.toml"
+    with pytest.raises(SpecError, match=f"system.2.: {messages}"):
         read_spec(text)
     [experiment] = read_spec(text, skip_bad=True).experiments
     assert [task.system["name"] for task in experiment.tasks()] == ["a"]
-    assert experiment.skipped == (("members/copy/a.toml", told),)
+    assert experiment.skipped == (("members/copy/a.toml", messages),)
 
 
 def test_the_list_is_in_the_database_and_follows_the_plan(spec, tmp_path):

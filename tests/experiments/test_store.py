@@ -64,11 +64,11 @@ def test_the_later_record_counts_but_no_failure_replaces_a_result(store, records
     store.plan("a", "1", LIMITS, tasks(1), {})
     for record in records:
         store.add([record])
-    (found,) = store.find(task(1).key)
-    assert (found.record, found.attempts) == (kept, attempts)
+    (result,) = store.find(task(1).key)
+    assert (result.record, result.attempts) == (kept, attempts)
     store.add(records)
-    (found,) = store.find(task(1).key)
-    assert (found.record, found.attempts) == (kept, 2 * attempts)
+    (result,) = store.find(task(1).key)
+    assert (result.record, result.attempts) == (kept, 2 * attempts)
 
 
 def test_the_same_definition_is_resumed_without_making_a_single_task(store):
@@ -134,7 +134,7 @@ def test_documents_are_kept_and_may_come_up_while_tasks_are_made(store):
         store.document("0123")
     with pytest.raises(StoreError, match="not the one with this digest"):
         store.plan("b", "1", LIMITS, [], {"0123": "text"})
-    assert [one.name for one in store.experiments()] == ["a"]
+    assert [entry.name for entry in store.experiments()] == ["a"]
 
 
 def test_each_task_is_handed_out_once_whatever_is_added_meanwhile(store):
@@ -160,9 +160,9 @@ plans = st.lists(st.lists(numbers, max_size=15), min_size=1, max_size=3)
 @given(plans=plans, done=st.dictionaries(numbers, st.booleans()), parts=st.integers(1, 4), data=st.data())
 def test_pending_rows_and_status_agree_with_a_model(plans, done, parts, data):
     names = [f"e{place}" for place in range(len(plans))]
-    asked = data.draw(st.none() | st.lists(st.sampled_from(names), unique=True))
+    requested = data.draw(st.none() | st.lists(st.sampled_from(names), unique=True))
     retry = data.draw(st.booleans())
-    chosen = [(name, plan) for name, plan in zip(names, plans, strict=True) if asked is None or name in asked]
+    chosen = [(name, plan) for name, plan in zip(names, plans, strict=True) if requested is None or name in requested]
     rows = [(name, place, number) for name, plan in chosen for place, number in enumerate(plan)]
     everything = {number for plan in plans for number in plan}
     done = {number: is_ok for number, is_ok in done.items() if number in everything}
@@ -181,13 +181,15 @@ def test_pending_rows_and_status_agree_with_a_model(plans, done, parts, data):
 
         for part in range(parts):
             shard = (part + 1, parts)
-            assert seeds(store.pending(asked, retry_failed=retry, shard=shard)) == expected[part]
-            assert store.count_pending(asked, retry_failed=retry, shard=shard) == len(expected[part])
-        whole = seeds(store.pending(asked, retry_failed=retry))
-        assert sorted(whole) == sorted(number for part in expected for number in part)
+            assert seeds(store.pending(requested, retry_failed=retry, shard=shard)) == expected[part]
+            assert store.count_pending(requested, retry_failed=retry, shard=shard) == len(expected[part])
+        complete = seeds(store.pending(requested, retry_failed=retry))
+        assert sorted(complete) == sorted(number for part in expected for number in part)
 
-        assert [(r.experiment, r.number, seed(r.task)) for r in store.rows(asked, missing=True)] == rows
-        assert [(r.experiment, r.number, seed(r.task)) for r in store.rows(asked)] == [r for r in rows if r[2] in done]
+        assert [(r.experiment, r.number, seed(r.task)) for r in store.rows(requested, missing=True)] == rows
+        assert [(r.experiment, r.number, seed(r.task)) for r in store.rows(requested)] == [
+            r for r in rows if r[2] in done
+        ]
         for status, plan in zip(store.status(), plans, strict=True):
             good = sum(done.get(number, False) for number in set(plan))
             bad = sum(not done.get(number, True) for number in set(plan))
@@ -274,14 +276,14 @@ def test_shards_merged_in_any_order_are_the_whole(plan, bad, parts):
 
     with TemporaryDirectory(dir=MEMORY) as name, small_chunks():
         folder = Path(name)
-        whole = contents(run(folder / "whole.db", (1, 1)))
+        complete = contents(run(folder / "whole.db", (1, 1)))
         shards = [run(folder / f"{part}.db", (part, parts)) for part in range(1, parts + 1)]
         for count, order in enumerate(permutations(shards)):
             with Store.open(folder / f"merged{count}.db", create=True) as store:
                 for shard in (*order, order[0]):
                     store.merge(shard)
                 assert store.count_pending() == 0
-            assert contents(folder / f"merged{count}.db") == whole
+            assert contents(folder / f"merged{count}.db") == complete
 
 
 plain = st.recursive(

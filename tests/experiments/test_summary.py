@@ -43,16 +43,16 @@ def test_tasks_are_counted_by_outcome_and_verdict():
 
 @given(st.lists(st.integers(-20, 20) | st.floats(-1e9, 1e9) | st.fractions().map(str), min_size=1, max_size=30))
 def test_quantiles_are_values_that_occur_at_their_rank(values):
-    found = numbers_of([row({"x": value}) for value in values], stable=True)["x"]
+    result = numbers_of([row({"x": value}) for value in values], stable=True)["x"]
     ordered = sorted(eval(str(value)) for value in values)  # Python rounds quotients of integers correctly
-    assert (found["n"], found["same"]) == (len(values), len(set(ordered)) == 1)
+    assert (result["n"], result["same"]) == (len(values), len(set(ordered)) == 1)
     for name, percent in QUANTILES.items():  # the least value with so many percent at or below it
-        assert found[name] == next(x for x in ordered if 100 * sum(y <= x for y in ordered) >= percent * len(values))
+        assert result[name] == next(x for x in ordered if 100 * sum(y <= x for y in ordered) >= percent * len(values))
 
 
 def test_numbers_beyond_the_range_of_doubles_are_counted_at_the_ends():
-    found = numbers_of([row({"x": value}) for value in ("1e9999", 7, f"-1{'0' * 400}/3")])["x"]
-    assert (found["n"], found["min"], found["median"], found["max"]) == (3, None, 7, None)
+    result = numbers_of([row({"x": value}) for value in ("1e9999", 7, f"-1{'0' * 400}/3")])["x"]
+    assert (result["n"], result["min"], result["median"], result["max"]) == (3, None, 7, None)
 
 
 @pytest.mark.parametrize("text", ["", "1/0", "1e99999", "0x10", "1_000", "nan", "1" * 2001, "١", None, [1]])

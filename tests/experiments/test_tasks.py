@@ -59,7 +59,7 @@ def normal_form(system: SystemFile) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("name", "system", "asked", "call"),
+    ("name", "system", "requested", "call"),
     [
         ("check-commute", MEMBER, {"eps": "1/3"}, lambda: check_commute(MEMBER, None, Settings(eps="1/3"))),
         (
@@ -87,8 +87,8 @@ def normal_form(system: SystemFile) -> Any:
         ),
     ],
 )
-def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(name, system, asked, call):
-    result, report = perform(name, system, report=True, **asked), call()
+def test_a_check_counts_the_claims_of_the_report_and_keeps_what_does_not_hold(name, system, requested, call):
+    result, report = perform(name, system, report=True, **requested), call()
     assert result["verdict"] == str(report.verdict)
     assert result["report"] == json.loads(json.dumps(report.to_json()))
     counted = [f for f in report.findings if f.applies and not f.control]
@@ -133,25 +133,29 @@ def test_a_start_is_drawn_from_the_seed_unless_given(name):
 
 @pytest.mark.parametrize(("system", "steps", "growth"), [(MEMBER, 40, "quadratic"), (LORENZ, 9, "exponential")])
 def test_heights_are_those_of_the_library(system, steps, growth):
-    found = height_growth(
+    outcome = height_growth(
         KahanMap(system.system, "1/10"), start_of(system), steps, normal_form=normal_form(system)
     ).to_json()
     result = perform("heights", system, eps="1/10", steps=steps)
-    assert result["growth"] == found["kind"] == growth
-    assert (result["heights"], result["constant"], result["reached"]) == (found["heights"], found["constant"], steps)
+    assert result["growth"] == outcome["kind"] == growth
+    assert (result["heights"], result["constant"], result["reached"]) == (
+        outcome["heights"],
+        outcome["constant"],
+        steps,
+    )
 
 
 @pytest.mark.parametrize("prime", [None, 10007])
 def test_a_period_is_that_of_the_library(prime):
-    found = period_of(normal_form(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
+    period = period_of(normal_form(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
     result = perform("period", MEMBER, eps="1/10", **({} if prime is None else {"prime": prime}))
-    assert result["period"] == (None if found.period is None else str(found.period))
-    assert (result["status"], result["meets_pole"]) == (found.status, found.meets_pole)
-    assert result["planes"] == [plane.text for plane in found.planes]
+    assert result["period"] == (None if period.period is None else str(period.period))
+    assert (result["status"], result["meets_pole"]) == (period.status, period.meets_pole)
+    assert result["planes"] == [plane.text for plane in period.planes]
 
 
 @pytest.mark.parametrize(
-    ("name", "system", "asked", "words"),
+    ("name", "system", "requested", "words"),
     [
         ("check-commute", LORENZ, {}, "kind \\[family\\]"),
         ("check-commute", LORENZ, {"other": RIVALS}, "lorenz has dimension 3 and lotka_volterra 2"),
@@ -168,9 +172,9 @@ def test_a_period_is_that_of_the_library(prime):
         ("period", MEMBER, {"eps": "1/7", "prime": 7}, "the prime 7 divides the denominator of 1/7"),
     ],
 )
-def test_an_impossible_task_is_refused_in_a_sentence(name, system, asked, words):
+def test_an_impossible_task_is_refused_in_a_sentence(name, system, requested, words):
     with pytest.raises(InputError, match=words):
-        perform(name, system, **asked)
+        perform(name, system, **requested)
 
 
 FILES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
@@ -202,16 +206,16 @@ def test_a_batch_takes_all_kinds_of_map_and_says_of_each_task_that_does_not(tmp_
     text = SPEC.replace("{files}", ", ".join(f'"{path}"' for path in FILES))
     database = tmp_path / "maps.db"
     list(run(parse_spec(text, "maps.toml"), database))
-    found, verdicts = {}, set()
+    answer, verdicts = {}, set()
     with Store.open(database) as store:
         for row in store.rows():
-            found.setdefault(row.task.kind, []).append((row.record.outcome, row.record.result or {}))
+            answer.setdefault(row.task.kind, []).append((row.record.outcome, row.record.result or {}))
             verdicts.add((row.task.kind, row.record.verdict))
-    assert sorted(result["degrees"][3] for _, result in found["degrees"]) == [8, 9, 19, 19, 74]
-    assert [outcome for outcome, _ in found["singularities"]] == ["ok"] * 5
-    assert {(outcome, result["status"]) for outcome, result in found["orbit"]} == {("ok", "completed")}
+    assert sorted(result["degrees"][3] for _, result in answer["degrees"]) == [8, 9, 19, 19, 74]
+    assert [outcome for outcome, _ in answer["singularities"]] == ["ok"] * 5
+    assert {(outcome, result["status"]) for outcome, result in answer["orbit"]} == {("ok", "completed")}
     assert {verdict for kind, verdict in verdicts if kind == "check-measure"} == {"proved"}
-    assert [outcome for outcome, _ in found["find-integrals"]] == ["ok"] * 5
+    assert [outcome for outcome, _ in answer["find-integrals"]] == ["ok"] * 5
 
 
 WITHOUT_EPS = """

@@ -130,19 +130,19 @@ def test_there_is_one_rational_associated_system_for_every_choice_of_signs_up_to
 )
 def test_associated_systems_over_a_number_field_commute_with_the_member_and_others_do_not(chi, count):
     member = random_member_with_chi(parse_chi(chi), seed=3)
-    found = list(member.conjugate_associates())
-    assert len(found) == count
-    for one in found:
-        K = one.root.number_field
+    results = list(member.conjugate_associates())
+    assert len(results) == count
+    for result in results:
+        K = result.root.number_field
         powers = [K.convert_matrix(member.A**k) for k in range(member.m)]
         unit = K.identity(member.dim)
-        B = sum((P * c for P, c in zip(powers, one.coefficients, strict=True)), unit * 0)
+        B = sum((P * c for P, c in zip(powers, result.coefficients, strict=True)), unit * 0)
         assert B * B == unit != B
-        file = km.SystemFile.from_conjugate(one)
+        file = km.SystemFile.from_conjugate(result)
         assert km.parse_system(file.to_toml()) == file
         assert km.check_commute(km.SystemFile.from_member(member), file).holds
-    if found:
+    if results:
         # The square of B + 1 is not 1.
-        wrong = replace(found[0], coefficients=(found[0].coefficients[0] + 1, *found[0].coefficients[1:]))
+        wrong = replace(results[0], coefficients=(results[0].coefficients[0] + 1, *results[0].coefficients[1:]))
         wrong_file = km.SystemFile.from_conjugate(wrong)
         assert km.check_commute(km.SystemFile.from_member(member), wrong_file).verdict is km.Certainty.REFUTED

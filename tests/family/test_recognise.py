@@ -48,9 +48,9 @@ def forgotten(member: FamilyMember) -> CubicHamiltonian:
 
 def found_in(hamiltonian: CubicHamiltonian):
     """The member found, which has to be there."""
-    found = find_family_structure(hamiltonian)
-    assert found is not None
-    return found
+    structure = find_family_structure(hamiltonian)
+    assert structure is not None
+    return structure
 
 
 def involutions(member: FamilyMember) -> set[str]:
@@ -60,24 +60,24 @@ def involutions(member: FamilyMember) -> set[str]:
 
 @over_generic
 def test_the_splitting_is_found_again(member):
-    found = found_in(forgotten(member))
-    assert found.is_generic
-    assert (found.dimension, found.member.H) == (member.m, member.H)
-    assert involutions(found.member) == involutions(member)
-    assert sorted(f.degree for f in found.member.factors) == sorted(f.degree for f in member.factors)
+    result = found_in(forgotten(member))
+    assert result.is_generic
+    assert (result.dimension, result.member.H) == (member.m, member.H)
+    assert involutions(result.member) == involutions(member)
+    assert sorted(f.degree for f in result.member.factors) == sorted(f.degree for f in member.factors)
 
 
 @given(st.sampled_from([(1, -2), (3, 5), (1, 2, 3), (0, 1, -4)]), st.integers(0, 10**6))
 def test_a_symplectic_disguise_hides_nothing(eigenvalues, seed):
     member = random_member_with_eigenvalues(eigenvalues, seed % 5)
     S = random_symplectic(member.m, random.Random(seed))
-    found = found_in(moved(forgotten(member), S))
-    assert found.is_standard
-    assert found.is_generic
+    result = found_in(moved(forgotten(member), S))
+    assert result.is_standard
+    assert result.is_generic
     # In the new coordinates x = S z the matrix B is S^-T B S^T.
     inverse = S.inv().transpose()
     expected = {str(s * inverse * g.B * S.transpose()) for g in member.associated() for s in (1, -1)}
-    assert involutions(found.member) == expected
+    assert involutions(result.member) == expected
 
 
 @pytest.mark.parametrize(("n", "seed"), [(4, 0), (4, 1), (6, 2)])
@@ -133,21 +133,21 @@ def test_the_dimension_is_that_of_all_matrices_entry_by_entry(n, seed):
 @pytest.mark.parametrize("power", [2, 3])
 def test_nilpotent_structure_is_found_and_not_generic(power):
     member = random_member_with_chi((t - 5) ** power, 1)
-    found = found_in(forgotten(member))
-    assert (found.is_generic, found.dimension, chi(found.A)) == (False, power, (t - 1) ** power)
-    nilpotent = found.A - QQ.identity(2 * power)
+    result = found_in(forgotten(member))
+    assert (result.is_generic, result.dimension, chi(result.A)) == (False, power, (t - 1) ** power)
+    nilpotent = result.A - QQ.identity(2 * power)
     assert evaluate_at_matrix(t ** (power - 1), nilpotent) != nilpotent * 0 == evaluate_at_matrix(t**power, nilpotent)
-    assert found.text == (f"H does not split: A, not scalar, with A Hess(H) = Hess(H) A^T has chi = (t - 1)^{power}")
+    assert result.text == (f"H does not split: A, not scalar, with A Hess(H) = Hess(H) A^T has chi = (t - 1)^{power}")
 
 
 def test_a_member_of_another_system_is_refused():
-    found = found_in(forgotten(GENERIC["m = 2, split"]))
+    result = found_in(forgotten(GENERIC["m = 2, split"]))
     with pytest.raises(HypothesisError, match=r"not H\(T y\)"):
-        replace(found, hamiltonian=CubicHamiltonian(2 * found.hamiltonian.H, found.hamiltonian.J))
+        replace(result, hamiltonian=CubicHamiltonian(2 * result.hamiltonian.H, result.hamiltonian.J))
     with pytest.raises(HypothesisError, match="J is not T"):
-        replace(found, T=2 * found.T)
+        replace(result, T=2 * result.T)
     with pytest.raises(HypothesisError, match="sign -1"):
-        replace(found, member=replace(found.member, signs=(1, -1)))
+        replace(result, member=replace(result.member, signs=(1, -1)))
 
 
 def hamiltonian(text: str, n: int) -> CubicHamiltonian:
@@ -163,10 +163,10 @@ def steps_like(normal_form: SystemNormalForm, system: QuadraticSystem) -> bool:
 
 def test_a_declared_member_keeps_its_a():
     member = random_member_with_eigenvalues(["1/2", -7], 3)
-    found = system_normal_form(member.chosen.system, member=member)
-    assert (found.declared, found.T) == (True, None)
-    assert found.form.A == member.A
-    assert found.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
+    normal_form = system_normal_form(member.chosen.system, member=member)
+    assert (normal_form.declared, normal_form.T) == (True, None)
+    assert normal_form.form.A == member.A
+    assert normal_form.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
 
 
 @over_members
@@ -180,11 +180,11 @@ def test_the_structure_steps_like_the_system(name):
 def test_with_another_J_there_is_a_change_of_coordinates(n):
     member = random_member_with_eigenvalues([1, -2, 3][: n // 2], 2)
     other = moved(CubicHamiltonian(member.H, standard_structure(n)), invertible(n, 5))
-    found = system_normal_form(other.system, other)
-    assert found.T * standard_structure(n) * found.T.transpose() == other.J
-    assert steps_like(found, other.system)
+    normal_form = system_normal_form(other.system, other)
+    assert normal_form.T * standard_structure(n) * normal_form.T.transpose() == other.J
+    assert steps_like(normal_form, other.system)
     # x = S z alone, without T, are other coordinates
-    assert not steps_like(SystemNormalForm(found.form, None, False, ""), other.system)
+    assert not steps_like(SystemNormalForm(normal_form.form, None, False, ""), other.system)
 
 
 # None, with the reason.
@@ -201,6 +201,6 @@ REASONS = [
 
 @pytest.mark.parametrize(("system", "reason"), REASONS)
 def test_without_a_structure_the_reason_is_said(system, reason):
-    found = system_normal_form(system)
-    assert isinstance(found, NoNormalForm)
-    assert found.reason.startswith(reason)
+    normal_form = system_normal_form(system)
+    assert isinstance(normal_form, NoNormalForm)
+    assert normal_form.reason.startswith(reason)

@@ -38,8 +38,8 @@ def test_the_map_over_Q_is_the_map_over_the_algebra(chi):
     point = [K.convert(fmpq_poly([QQ.random(rng) for _ in range(m)])) for _ in range(2)]
     expected = KahanMap(PLANAR, fmpq(1, 7), K).step(point)
     split = [element.polynomial[k] for element in point for k in range(m)]
-    found = KahanMap(over_algebra(PLANAR, chi), fmpq(1, 7), QQ).step(split)
-    assert list(found) == [element.polynomial[k] for element in expected for k in range(m)]
+    result = KahanMap(over_algebra(PLANAR, chi), fmpq(1, 7), QQ).step(split)
+    assert list(result) == [element.polynomial[k] for element in expected for k in range(m)]
 
 
 def test_over_nilpotent_elements_the_map_is_that_of_curves():
@@ -47,9 +47,9 @@ def test_over_nilpotent_elements_the_map_is_that_of_curves():
     map_ = KahanMap(PLANAR, fmpq(1, 7), QQ)
     x, v = [fmpq(1, 3), fmpq(2)], [fmpq(1), fmpq(-1, 2)]
     split = [x[0], v[0], x[1], v[1]]
-    found = KahanMap(over_algebra(PLANAR, t**2), fmpq(1, 7), QQ).step(split)
+    result = KahanMap(over_algebra(PLANAR, t**2), fmpq(1, 7), QQ).step(split)
     along = (KahanMap(PLANAR.over(QQ), fmpq(1, 7)).jacobian(x) * fmpq_mat([[v[0]], [v[1]]])).entries()
-    assert list(found) == [value for pair in zip(map_.step(x), along, strict=True) for value in pair]
+    assert list(result) == [value for pair in zip(map_.step(x), along, strict=True) for value in pair]
 
 
 @over_moduli
@@ -81,11 +81,11 @@ def test_the_components_of_another_function_are_not_conserved():
 
 @over_moduli
 def test_what_was_made_over_an_algebra_is_recognised(chi):
-    found = tensor_structure(over_algebra(PLANAR, chi))
-    assert found is not None
-    assert (found.rank, found.chi.degree()) == (2, chi.degree())
-    assert sorted(e for _, e in found.chi.factor()[1]) == sorted(e for _, e in chi.factor()[1])
-    assert found.text.startswith("a planar system over K = Q[t]/(")
+    structure = tensor_structure(over_algebra(PLANAR, chi))
+    assert structure is not None
+    assert (structure.rank, structure.chi.degree()) == (2, chi.degree())
+    assert sorted(e for _, e in structure.chi.factor()[1]) == sorted(e for _, e in chi.factor()[1])
+    assert structure.text.startswith("a planar system over K = Q[t]/(")
 
 
 @pytest.mark.parametrize("name", ["nahm_tetrahedral", "lotka_volterra", "euler_top", "kirchhoff_case"])

@@ -79,9 +79,9 @@ def test_heights_in_normal_form_are_those_of_the_points_of_the_generic_orbit(nam
     normal_form, system = structure_and_system(name)
     start, steps = START[: system.dim], 12
     expected = [height(point.x) for point in Orbit(KahanMap(system, "1/10"), start, steps)]
-    found = growth(system, start, steps, normal_form=normal_form)
-    assert found.heights == tuple(expected)
-    assert found.method == "normal-form"
+    result = growth(system, start, steps, normal_form=normal_form)
+    assert result.heights == tuple(expected)
+    assert result.method == "normal-form"
     assert growth(system, start, steps).heights == tuple(expected)
 
 
@@ -92,10 +92,10 @@ def test_heights_in_normal_form_are_those_of_the_points_of_the_generic_orbit(nam
 def test_heights_at_some_steps_are_those_of_all_steps(name, every, method):
     normal_form, system = structure_and_system(name)
     every_step = growth(system, START[:4], 40).heights
-    found = growth(system, START[:4], 40, normal_form=normal_form, every=every)
-    assert found.steps == tuple(range(0, 41, every))
-    assert found.heights == every_step[::every]
-    assert found.method == method
+    result = growth(system, START[:4], 40, normal_form=normal_form, every=every)
+    assert result.steps == tuple(range(0, 41, every))
+    assert result.heights == every_step[::every]
+    assert result.method == method
 
 
 # The catalogue: every system, with the reason for the answer. Elliptic: orbits on elliptic curves (or, for the
@@ -115,22 +115,22 @@ def test_systems_of_the_catalogue_grow_as_theory_says(name):
     kind, constant, _ = CATALOGUE[name]
     file = load(name)
     normal_form = system_normal_form(file.system, file.hamiltonian, file.member)
-    found = growth(file.system, START[: file.system.dim], 64, normal_form=normal_form, max_digits=12_000)
-    assert found.kind is kind
-    assert (found.constant is None) == (constant is None)
-    if constant is not None and found.end.is_whole:
-        assert decimal_text(found.constant) == constant
+    result = growth(file.system, START[: file.system.dim], 64, normal_form=normal_form, max_digits=12_000)
+    assert result.kind is kind
+    assert (result.constant is None) == (constant is None)
+    if constant is not None and result.end.is_complete:
+        assert decimal_text(result.constant) == constant
     elif constant is not None:  # the last steps are missing: the constant is less accurate
-        assert abs(found.constant / Fraction(constant) - 1) < Fraction(1, 500)
+        assert abs(result.constant / Fraction(constant) - 1) < Fraction(1, 500)
 
 
 @pytest.mark.parametrize(("name", "factor"), [("lorenz", Fraction(3)), ("lotka_volterra", Fraction(2))])
 def test_exponential_growth_ends_at_the_budget_with_the_growth_of_the_degrees_as_its_ratio(name, factor):
     system = load(name).system
-    found = growth(system, START[: system.dim], 64)
-    assert (found.kind, found.end.status) == (E, "budget")
-    assert found.constant is None
-    assert abs(found.ratio / factor - 1) < Fraction(1, 1000)
+    result = growth(system, START[: system.dim], 64)
+    assert (result.kind, result.end.status) == (E, "budget")
+    assert result.constant is None
+    assert abs(result.ratio / factor - 1) < Fraction(1, 1000)
 
 
 @pytest.mark.parametrize(
@@ -160,10 +160,10 @@ def test_the_level_cubic_of_a_plane_decides_how_heights_grow(name, kind):
     ],
 )
 def test_the_constant_of_a_moebius_map_is_the_height_of_its_multiplier(rhs, eps, expected):
-    found = growth(system_of(x=rhs), ["1/3"], 256, eps)
-    assert found.kind is LIN
+    result = growth(system_of(x=rhs), ["1/3"], 256, eps)
+    assert result.kind is LIN
     # Heights are off a line by rounding and by O(1), a few bits: 3.5 s/n^1.5 is below 0.005 then.
-    assert abs(float(found.constant) - expected) < 0.005
+    assert abs(float(result.constant) - expected) < 0.005
 
 
 def translation_constant(block: IntegerBlock) -> Fraction:
@@ -188,18 +188,18 @@ def test_the_constant_of_a_member_is_the_sum_of_the_canonical_heights_of_its_pla
     start = [fmpq(1, 2), fmpq(1, 3), fmpq(-1, 5), fmpq(2, 7), fmpq(3, 4), fmpq(-2, 3)][: system.dim]
     blocks, _ = NormalSteps(normal_form, fmpq(1, 10)).blocks(start)
     expected = sum(map(translation_constant, blocks))
-    found = growth(system, start, 60, normal_form=normal_form)
-    assert found.kind is Q
-    assert abs(found.constant / expected - 1) < Fraction(1, 2000)  # measured: at most 2 parts in 10^4
+    result = growth(system, start, 60, normal_form=normal_form)
+    assert result.kind is Q
+    assert abs(result.constant / expected - 1) < Fraction(1, 2000)  # measured: at most 2 parts in 10^4
     # Control: the constants of the planes are not so small that one of them might be missing.
     assert all(translation_constant(block) > expected / 5 for block in blocks)
 
 
 @given(st.integers(1, 500), st.integers(-300, 300), st.integers(0, 10**4), st.integers(8, 60), st.integers(1, 9))
 def test_the_constant_of_a_parabola_is_its_leading_coefficient(a, b, c, n, every):
-    found = of_heights([a * k * k + b * k + c for k in range(n + 1)], every)
-    assert found.kind is Q
-    assert found.constant == Fraction(a, every**2)
+    result = of_heights([a * k * k + b * k + c for k in range(n + 1)], every)
+    assert result.kind is Q
+    assert result.constant == Fraction(a, every**2)
 
 
 @pytest.mark.parametrize(
@@ -218,39 +218,39 @@ def test_what_fits_no_rule_is_undecided(heights, why):
 
 @pytest.mark.parametrize("heights", [[7], [7, 8], [k * k + 9 for k in range(8)], [20 * k + 9 for k in range(8)]])
 def test_few_heights_decide_nothing(heights):
-    found = of_heights(heights)
-    assert found.kind is U
-    assert found.constant is None
-    assert "expected 9 or more" in found.reason
+    result = of_heights(heights)
+    assert result.kind is U
+    assert result.constant is None
+    assert "expected 9 or more" in result.reason
 
 
 def test_a_budget_that_is_spent_ends_an_orbit_and_a_survey_and_says_so():
     top = load("euler_top").system
-    whole = height_survey(top, "1/10", starts=3, steps=20)
-    assert (whole.is_whole, "early" in whole.text) == (True, False)
+    complete = height_survey(top, "1/10", starts=3, steps=20)
+    assert (complete.is_complete, "early" in complete.text) == (True, False)
     before = counted()
     height_survey(top, "1/10", starts=1, steps=20)
-    one = counted() - before
-    found = height_survey(top, "1/10", starts=3, steps=20, effort=Budget(1.5 * one))
-    assert (found.is_whole, len(found.orbits)) == (False, 2)
-    assert found.orbits[0] == whole.orbits[0]
-    cut = found.orbits[1].growth
+    entry = counted() - before
+    survey = height_survey(top, "1/10", starts=3, steps=20, effort=Budget(1.5 * entry))
+    assert (survey.is_complete, len(survey.orbits)) == (False, 2)
+    assert survey.orbits[0] == complete.orbits[0]
+    cut = survey.orbits[1].growth
     assert cut.end.message == f"work limit reached after step {cut.end.steps}; raise --effort"
-    assert cut.heights == whole.orbits[1].growth.heights[: len(cut.heights)]
+    assert cut.heights == complete.orbits[1].growth.heights[: len(cut.heights)]
     assert 9 < len(cut.heights) < 21
-    assert found.text.endswith("; the survey ended early; raise --effort")
+    assert survey.text.endswith("; the survey ended early; raise --effort")
 
 
 def test_a_time_limit_leaves_the_orbits_that_were_finished():
-    top, told = load("euler_top").system, []
+    top, messages = load("euler_top").system, []
 
     def stop(sentence):
-        told.append(sentence)
-        if len(told) == 3:
+        messages.append(sentence)
+        if len(messages) == 3:
             raise TimeLimit
 
-    found = height_survey(top, "1/10", starts=3, steps=20, progress=stop)
-    assert (found.is_whole, found.orbits) == (False, height_survey(top, "1/10", starts=3, steps=20).orbits[:2])
-    told.clear()
+    survey = height_survey(top, "1/10", starts=3, steps=20, progress=stop)
+    assert (survey.is_complete, survey.orbits) == (False, height_survey(top, "1/10", starts=3, steps=20).orbits[:2])
+    messages.clear()
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         height_survey(top, "1/10", starts=3, steps=20, effort=Budget(1e9), progress=stop)

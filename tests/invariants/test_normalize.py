@@ -38,20 +38,20 @@ def disguised(function: RationalFunction, rng: random.Random, constant: bool) ->
 @pytest.mark.parametrize(("name", "claim"), CLAIMED)
 def test_claims_of_the_catalogue_are_normalized_to_integrals_that_tend_to_those_of_the_flow(name, claim):
     file = km.load(name)
-    found = normalized(file.integrals[claim], file.dim)
-    alpha, beta, gamma = found.coefficients
+    normal_form = normalized(file.integrals[claim], file.dim)
+    alpha, beta, gamma = normal_form.coefficients
     I = file.integrals[claim]
     combined = RationalFunction(alpha * I.numerator + beta * I.denominator, gamma * I.denominator)
-    assert combined == found.function
+    assert combined == normal_form.function
     assert all((degree_in(P, file.dim) == 0 and not P.is_zero()) or P is beta for P in (alpha, beta, gamma))
-    assert found.leading is not None
-    assert is_primitive(found.leading)
-    assert normalized(found.function, file.dim).function == found.function
+    assert normal_form.leading is not None
+    assert is_primitive(normal_form.leading)
+    assert normalized(normal_form.function, file.dim).function == normal_form.function
     if name != POLARISED:
-        assert Laboratory(file, flow=True).verdict_on(found.leading)[0].holds
+        assert Laboratory(file, flow=True).verdict_on(normal_form.leading)[0].holds
     rng = random.Random(f"{name} {claim}")
     for constant in (True, False):
-        assert normalized(disguised(found.function, rng, constant), file.dim).function == found.function
+        assert normalized(disguised(normal_form.function, rng, constant), file.dim).function == normal_form.function
 
 
 def test_a_function_that_is_not_conserved_does_not_tend_to_an_integral_of_the_flow():
@@ -75,8 +75,8 @@ def test_a_function_that_is_not_conserved_does_not_tend_to_an_integral_of_the_fl
     ],
 )
 def test_what_is_subtracted_and_divided_out(text, shown):
-    found = normalized(parse_rational_function(text, ["x", "y", "a", "eps"]), 2)
-    assert found.function == parse_rational_function(shown, ["x", "y", "a", "eps"])
+    normal_form = normalized(parse_rational_function(text, ["x", "y", "a", "eps"]), 2)
+    assert normal_form.function == parse_rational_function(shown, ["x", "y", "a", "eps"])
 
 
 SYSTEMS = [
@@ -93,12 +93,12 @@ SYSTEMS = [
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_integrals_are_found_normalized(system):
-    found = km.find_integrals(system)
-    assert found.integrals
-    for one in found.integrals:
-        again = normalized(one.function, found.file.dim)
-        assert (again.function, again.is_shifted) == (one.function, False)
+    search = km.find_integrals(system)
+    assert search.integrals
+    for integral in search.integrals:
+        again = normalized(integral.function, search.file.dim)
+        assert (again.function, again.is_shifted) == (integral.function, False)
         assert is_primitive(again.leading)
-        assert Laboratory(found.file, flow=True).verdict_on(again.leading)[0].holds
-        assert one.verdict.holds
-        assert km.check_integrals(found.file, one.text).holds
+        assert Laboratory(search.file, flow=True).verdict_on(again.leading)[0].holds
+        assert integral.verdict.holds
+        assert km.check_integrals(search.file, integral.text).holds

@@ -18,10 +18,10 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def darboux(system: QuadraticSystem) -> dict[str, str]:
-    found = affine_darboux(system)
-    assert found.complete
-    assert found.reason == ""
-    return {str(d.function): str(d.cofactor) for d in found.functions}
+    polynomials = affine_darboux(system)
+    assert polynomials.complete
+    assert polynomials.reason == ""
+    return {str(d.function): str(d.cofactor) for d in polynomials.functions}
 
 
 def test_known_hyperplanes() -> None:
@@ -63,10 +63,10 @@ def test_where_hyperplanes_are_not_counted() -> None:
 
 def test_a_hyperplane_of_equilibria() -> None:
     system = QuadraticSystem.from_text(["x", "y", "z"], ["x*(1 + y)", "x*(z - 2)", "x*(y - 3*z)"])
-    found = affine_darboux(system)
-    assert [str(d.function) for d in found.functions] == ["x"]
-    assert not found.complete  # the flow does not move on x = 0, where others may hide
-    assert "degenerates" in found.reason
+    polynomials = affine_darboux(system)
+    assert [str(d.function) for d in polynomials.functions] == ["x"]
+    assert not polynomials.complete  # the flow does not move on x = 0, where others may hide
+    assert "degenerates" in polynomials.reason
 
 
 @st.composite
@@ -94,12 +94,12 @@ def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
     system, T = case
     n = system.dim
     planted = [T[0, j] for j in range(n)]
-    found = affine_darboux(system)
+    polynomials = affine_darboux(system)
     integrals = affine_integrals(system)
-    if found.complete:
+    if polynomials.complete:
         # An integral, or one of those found up to integrals.
         forms = [[fmpq(entry) for entry in v] for v in integrals]
-        normals = [[d.function.derivative(j).leading_coefficient() for j in range(n)] for d in found.functions]
+        normals = [[d.function.derivative(j).leading_coefficient() for j in range(n)] for d in polynomials.functions]
         assert any(
             rank(QQ, fmpq_mat([*forms, *extra, planted])) == len(forms) + len(extra)
             for extra in [[], *([v] for v in normals)]
@@ -110,7 +110,7 @@ def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
         image = phi.step(x)
         for v in integrals:
             assert sum(c * a for c, a in zip(v, x, strict=True)) == sum(c * a for c, a in zip(v, image, strict=True))
-        for d in found.functions:
+        for d in polynomials.functions:
             before, after = (evaluate(d.function, QQ, point) for point in (x, image))
             assert after * (1 - fmpq(1, 7) * evaluate(d.cofactor, QQ, x)) == before * (
                 1 + fmpq(1, 7) * evaluate(d.cofactor, QQ, image)
@@ -147,14 +147,14 @@ def test_what_the_map_makes_of_a_hyperplane_is_seen_at_its_points(system, eps, s
     n = system.dim
     D = fmpq_mat(n, n, [scales[i] if i == j else 0 for i in range(n) for j in range(n)])
     system = system.composed(D.inv(), [fmpq(0)] * n).transformed(D)
-    for one in affine_darboux(system).functions:
-        fate, images = under_map(system, one.function, eps), images_of(system, one.function, eps)
+    for entry in affine_darboux(system).functions:
+        fate, images = under_map(system, entry.function, eps), images_of(system, entry.function, eps)
         images = [image for image in images if image is not None]
         if fate == "undefined":
             assert images == []
             continue
         assert len(images) > n
-        assert all(evaluate(one.function, QQ, list(image)) == 0 for image in images)
+        assert all(evaluate(entry.function, QQ, list(image)) == 0 for image in images)
         differences = [[a - b for a, b in zip(image, images[0], strict=True)] for image in images[1:]]
         spanned = rank(QQ, fmpq_mat(differences))
         assert spanned == n - 1 if fate == "invariant" else spanned < n - 1

@@ -52,18 +52,18 @@ relations = [{monomials = "degree <= 2", dimension = 0}]
 FOUR = ("x y", "y", "-x + x^2")  # q'' = -q + q^2: at eps = 1 the fourth iterate is the identity
 
 
-def results(found):
+def results(result):
     """Everything but the file itself."""
-    return {key: value for key, value in found.to_json().items() if key != "document"}
+    return {key: value for key, value in result.to_json().items() if key != "document"}
 
 
 @pytest.mark.parametrize(("symbols", "eps"), [((), None), (("b",), "1/3")])
 def test_the_claims_and_facts_of_a_file_are_not_read(symbols, eps):
-    found = [
+    result = [
         results(analyze(parse_system(PLANE + claims, "same"), symbols=symbols, eps=eps)) for claims in ("", NONSENSE)
     ]
-    assert found[0] == found[1]
-    assert found[0]["verdict"]["integrals"] == 1
+    assert result[0] == result[1]
+    assert result[0]["verdict"]["integrals"] == 1
 
 
 def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
@@ -80,18 +80,18 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
 
 
 def test_where_the_budget_is_spent_steps_are_skipped_and_reported():
-    found = analyze(load("lagrange_top"), effort=-20)
-    skipped = [text.partition(": ")[0] for text in found.skipped]
-    assert found.skipped == [f"{part}: work limit reached; raise --effort" for part in skipped]
+    analysis = analyze(load("lagrange_top"), effort=-20)
+    skipped = [text.partition(": ")[0] for text in analysis.skipped]
+    assert analysis.skipped == [f"{part}: work limit reached; raise --effort" for part in skipped]
     assert {"integrals", "densities", "heights", "commuting systems"} <= set(skipped) <= set(PARTS)
-    assert found.work == "effort -20, 0.0 million units"
-    assert [line.text for line in dict(found.sections)["not done"]] == found.skipped
-    assert (found.conclusion.kind, found.conclusion.growth) == ("undecided", "unknown")
+    assert analysis.work == "effort -20, 0.0 million units"
+    assert [line.text for line in dict(analysis.sections)["not done"]] == analysis.skipped
+    assert (analysis.conclusion.kind, analysis.conclusion.growth) == ("undecided", "unknown")
     # none was found, which is not that there is none
-    assert found.conclusion.sentence.startswith("The growth is undecided: ")
-    assert found.conclusion.sentence.endswith("; the integrals were not counted.")
-    data = json.loads(json.dumps(found.to_json()))
-    assert (data["verdict"]["integrals"], data["integrals"], data["skipped"]) == (None, None, found.skipped)
+    assert analysis.conclusion.sentence.startswith("The growth is undecided: ")
+    assert analysis.conclusion.sentence.endswith("; the integrals were not counted.")
+    data = json.loads(json.dumps(analysis.to_json()))
+    assert (data["verdict"]["integrals"], data["integrals"], data["skipped"]) == (None, None, analysis.skipped)
 
 
 def test_a_part_that_gives_up_leaves_the_others(monkeypatch):
@@ -99,11 +99,11 @@ def test_a_part_that_gives_up_leaves_the_others(monkeypatch):
         raise InputError("found 1, expected 2")
 
     monkeypatch.setattr(table, "linear_symmetries", refuses)
-    found = analyze(load("nahm_tetrahedral"))
-    assert found.skipped == ["symmetries: found 1, expected 2"]
-    assert found.symmetries is None
-    assert found.commuting is not None
-    assert found.conclusion.kind == "integrable"
+    analysis = analyze(load("nahm_tetrahedral"))
+    assert analysis.skipped == ["symmetries: found 1, expected 2"]
+    assert analysis.symmetries is None
+    assert analysis.commuting is not None
+    assert analysis.conclusion.kind == "integrable"
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
@@ -118,13 +118,13 @@ def test_mistakes_and_interrupts_are_not_swallowed(monkeypatch, error):
 
 def test_the_flow_of_a_polarised_map_is_part_of_the_report():
     steps = [step for step in ANALYSES if step.name in ("integrals", "densities", "the flow")]
-    found = analyze(load("duffing_polarised"), analyses=steps)
-    assert dict(found.sections)["the flow"]
-    assert [line for line in found.skipped if "flow" in line] == []
+    analysis = analyze(load("duffing_polarised"), analyses=steps)
+    assert dict(analysis.sections)["the flow"]
+    assert [line for line in analysis.skipped if "flow" in line] == []
 
 
-def lines_of(found, title):
-    return [line.text for name, lines in found.sections if name == title for line in lines]
+def lines_of(result, title):
+    return [line.text for name, lines in result.sections if name == title for line in lines]
 
 
 QUICK_STEPS = [
@@ -141,8 +141,8 @@ LOST = [
 
 @pytest.mark.parametrize(("eps", "expected"), [(None, KEPT), ("1/2", KEPT), ("1", LOST)])
 def test_what_is_said_of_hyperplanes_holds_at_the_eps_in_force(eps, expected):
-    found = analyze(load("lotka_volterra"), eps=eps, analyses=QUICK_STEPS)
-    assert [line for line in lines_of(found, "structure") if "invariant" in line] == expected
+    analysis = analyze(load("lotka_volterra"), eps=eps, analyses=QUICK_STEPS)
+    assert [line for line in lines_of(analysis, "structure") if "invariant" in line] == expected
 
 
 SAME = "flow and map have the same fixed points"
@@ -162,8 +162,8 @@ NONE = "at eps = 1 det(I - eps f'(x)) is 0 at all of them, where the map is not 
     ],
 )
 def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expected):
-    found = analyze(given, eps=eps, analyses=QUICK_STEPS)
-    assert lines_of(found, "vector field")[-1].startswith(expected)
+    analysis = analyze(given, eps=eps, analyses=QUICK_STEPS)
+    assert lines_of(analysis, "vector field")[-1].startswith(expected)
 
 
 NOWHERE = "at eps = 1 the map is defined nowhere: det(I - eps f'(x)) is identically 0"
@@ -180,28 +180,30 @@ SINGULAR = "at eps = 1 the map is not invertible: det(I + eps f'(x)) is 0 at all
     ],
 )
 def test_of_a_map_that_is_not_birational_symmetries_and_hyperplanes_are_those_of_the_flow(rhs, eps, defect):
-    found = analyze(system("x y", *rhs), eps=eps, analyses=QUICK_STEPS)
-    assert found.defect == defect
-    assert (f"these are symmetries of the vector field only: {defect}" in lines_of(found, "symmetry")) == bool(defect)
-    (planes,) = [line for line in lines_of(found, "structure") if line.startswith("the lines")]
+    analysis = analyze(system("x y", *rhs), eps=eps, analyses=QUICK_STEPS)
+    assert analysis.defect == defect
+    assert (f"these are symmetries of the vector field only: {defect}" in lines_of(analysis, "symmetry")) == bool(
+        defect
+    )
+    (planes,) = [line for line in lines_of(analysis, "structure") if line.startswith("the lines")]
     assert planes.endswith("are invariant for the flow" if defect else "are invariant, for flow and map")
-    algebra = [line for line in lines_of(found, "structure") if "over K" in line]
+    algebra = [line for line in lines_of(analysis, "structure") if "over K" in line]
     assert all(("Kahan map over K" in line) == (not defect) for line in algebra)
 
 
 @pytest.mark.parametrize(("eps", "kind"), [("1", "singular"), ("1/2", "linear"), (None, "linear")])
 def test_a_linear_system_has_a_linear_map_where_it_has_one(eps, kind):
-    found = analyze(system("x y", "x", "-y"), eps=eps, analyses=QUICK_STEPS)
-    assert found.conclusion.kind == kind
+    analysis = analyze(system("x y", "x", "-y"), eps=eps, analyses=QUICK_STEPS)
+    assert analysis.conclusion.kind == kind
 
 
 def test_where_an_iterate_is_constant():
-    found = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
-    assert found.conclusion.sentence == (
+    analysis = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
+    assert analysis.conclusion.sentence == (
         "An iterate of the map is a constant map (measured): orbits end in one point. "
         "All this holds at eps = 1/2; other eps may differ."
     )
-    assert (found.conclusion.kind, found.conclusion.growth) == ("linearisable", "zero")
+    assert (analysis.conclusion.kind, analysis.conclusion.growth) == ("linearisable", "zero")
     linear = analyze(system("x", "x"), eps=-1)
     assert linear.conclusion.sentence.startswith(
         "The system is linear, and so is its Kahan map; the integrals were not counted."
@@ -219,14 +221,14 @@ def test_where_an_iterate_is_constant():
     ],
 )
 def test_a_verdict_says_in_which_sense_and_on_what_ground(name, sense, ground):
-    found = analysis_of(name).conclusion
-    assert (found.sense, found.ground) == (sense, ground)
-    assert ground != "proved" or "proved" in found.sentence or sense == "linear"
+    result = analysis_of(name).conclusion
+    assert (result.sense, result.ground) == (sense, ground)
+    assert ground != "proved" or "proved" in result.sentence or sense == "linear"
 
 
 def test_what_is_proved_of_a_verdict_goes_with_its_proof():
-    found = analysis_of("lotka_volterra")
-    unproved = replace(found, degrees=replace(found.degrees, enclosure=None))
+    analysis = analysis_of("lotka_volterra")
+    unproved = replace(analysis, degrees=replace(analysis.degrees, enclosure=None))
     assert (unproved.conclusion.sense, unproved.conclusion.ground) == ("not integrable", "derived")
     underived = replace(unproved, degrees=replace(unproved.degrees, patterns=None))
     assert (underived.conclusion.kind, underived.conclusion.ground) == ("not integrable", "measured")
@@ -234,7 +236,7 @@ def test_what_is_proved_of_a_verdict_goes_with_its_proof():
     assert (estimated.conclusion.kind, estimated.conclusion.ground) == ("not integrable", "estimated")
     # A proof of entropy beside an integral is a contradiction, and no verdict.
     integrable = analysis_of("weierstrass")
-    both = replace(integrable, degrees=found.degrees)
+    both = replace(integrable, degrees=analysis.degrees)
     assert both.conclusion.kind == "undecided"
     assert "positive algebraic entropy is proved, which excludes an integral" in both.conclusion.sentence
 
@@ -294,11 +296,11 @@ SYSTEMS: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-def disagreements(found: dict[str, Any]) -> list[str]:
+def disagreements(result: dict[str, Any]) -> list[str]:
     """Which fields of the JSON of `analyze` contradict each other."""
-    verdict, degrees = found["verdict"], found["degrees"]
+    verdict, degrees = result["verdict"], result["degrees"]
     word, growth, exact = verdict["integrability"], verdict["growth"], verdict["integrals_exact"]
-    told = {line["status"] for line in found["statements"] if degrees and line["text"] == degrees["growth_text"]}
+    messages = {line["status"] for line in result["statements"] if degrees and line["text"] == degrees["growth_text"]}
     enclosed = bool(degrees and degrees["enclosure"])
     limits = {
         "a map that is not integrable grows exponentially": word != "not integrable" or growth == "exponential",
@@ -310,13 +312,13 @@ def disagreements(found: dict[str, Any]) -> list[str]:
         or (degrees["looks_exponential"] and growth == "exponential"),
         "a rate is of a recurrence": not degrees
         or (degrees["dynamical_degree"] is None or degrees["recurrence"] is not None),
-        "the status of the growth is its basis": not degrees or told <= {degrees["basis"].partition(":")[0]},
+        "the status of the growth is its basis": not degrees or messages <= {degrees["basis"].partition(":")[0]},
         "an undecided verdict has no ground, others have one": (verdict["ground"] == "") == (word == "undecided")
         or word == "singular",
         "superintegrable maps have dim - 1 integrals": verdict["sense"] != "superintegrable"
-        or verdict["integrals"] >= found["dim"] - 1,
+        or verdict["integrals"] >= result["dim"] - 1,
         "a number of integrals is exact on curves and points only": not exact
-        or verdict["integrals"] >= found["dim"] - 1,
+        or verdict["integrals"] >= result["dim"] - 1,
         "a lower bound is called so": exact
         or not verdict["integrals"]
         or "at least" in verdict["sentence"]
@@ -324,33 +326,33 @@ def disagreements(found: dict[str, Any]) -> list[str]:
         or word == "not integrable",
         "and nothing else is": not exact or "at least" not in verdict["sentence"] or enclosed,
         "periodic maps have as many integrals as coordinates, or more are possible": not exact
-        or verdict["integrals"] == found["dim"]
-        or found["integrals"]["relations"]["period"] is None,
+        or verdict["integrals"] == result["dim"]
+        or result["integrals"]["relations"]["period"] is None,
     }
     return [words for words, holds in limits.items() if not holds]
 
 
 @pytest.mark.parametrize(("system", "options"), SYSTEMS, ids=[f"{name} {more}" for name, more in SYSTEMS])
 def test_the_fields_of_an_analysis_agree(system, options):
-    found = km.analyze(system, **options) if options or system not in names() else analysis_of(system)
-    assert disagreements(found.to_json()) == []
+    result = km.analyze(system, **options) if options or system not in names() else analysis_of(system)
+    assert disagreements(result.to_json()) == []
 
 
 def test_fields_that_disagree_would_be_noticed():
-    found = analysis_of("lotka_volterra").to_json()
-    assert found["degrees"]["enclosure"]
-    found["verdict"]["growth"] = "unknown"
-    found["degrees"]["growth"] = "unknown"
-    found["verdict"]["ground"] = ""
-    assert len(disagreements(found)) == 3
+    result = analysis_of("lotka_volterra").to_json()
+    assert result["degrees"]["enclosure"]
+    result["verdict"]["growth"] = "unknown"
+    result["degrees"]["growth"] = "unknown"
+    result["verdict"]["ground"] = ""
+    assert len(disagreements(result)) == 3
 
 
 def test_growth_is_exponential_where_positive_entropy_is_proved_and_no_recurrence_confirmed():
     # Degrees 2^n of lotka_volterra, whose singularities the budget left out.
     degrees = tuple(2**n for n in range(9))
     bounds = bound_dynamical_degree(km.load("lotka_volterra").map, None)
-    found = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), (), enclosure=bounds)
-    assert (str(found.growth), found.recurrence) == ("exponential", None)
+    growth = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), (), enclosure=bounds)
+    assert (str(growth.growth), growth.recurrence) == ("exponential", None)
     control = DegreeGrowth(degrees[:3], None, "budget", "", 0, (), ())
     assert (str(control.growth), str(control.known)) == ("unknown", "undecided")
 
@@ -362,7 +364,7 @@ TURNING = "x' = a*y; y' = -a*x; z' = a*x*y"
 @pytest.mark.parametrize(("a", "is_exact"), [(0, False), (1, True)])
 @pytest.mark.parametrize("flow", [False, True])
 def test_a_number_of_integrals_is_a_lower_bound_where_orbits_close_at_the_values_of_the_file(a, is_exact, flow):
-    found = km.find_integrals(km.System(TURNING, a=a), symbols=["a"], flow=flow)
-    assert (found.codimension, found.is_exact) == (2, is_exact)
-    assert ("at least" in found.count_text) is not is_exact
-    assert ("at a = 0" in found.note) is not is_exact
+    search = km.find_integrals(km.System(TURNING, a=a), symbols=["a"], flow=flow)
+    assert (search.codimension, search.is_exact) == (2, is_exact)
+    assert ("at least" in search.count_text) is not is_exact
+    assert ("at a = 0" in search.note) is not is_exact

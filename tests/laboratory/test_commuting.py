@@ -61,19 +61,19 @@ def commute_exactly(f, g, tries=3, seed=0):
 @pytest.mark.parametrize("eigenvalues", [[1, -2], [2, 1, -1]])
 def test_the_associated_fields_of_the_paper_are_found_from_the_equations_alone(eigenvalues, shape):
     member = random_member_with_eigenvalues(eigenvalues, seed=7)
-    found = commuting_systems(member.chosen.system, shape)
+    result = commuting_systems(member.chosen.system, shape)
     m = len(eigenvalues)
-    assert (found.dimension, len(found.solutions), found.complete, str(found.verdict)) == (m, 3**m, True, "proved")
-    assert not found.families
-    assert not found.irrational
-    systems = [g.system for g in found.solutions]
+    assert (result.dimension, len(result.solutions), result.complete, str(result.verdict)) == (m, 3**m, True, "proved")
+    assert not result.families
+    assert not result.irrational
+    systems = [g.system for g in result.solutions]
     for associate in member.associated():
         assert systems.count(associate.system) == systems.count(associate.system.scaled(-1)) == 1
     if shape == "linear":
-        involutions = [str(g.B) for g in found.solutions if g.B * g.B == _identity(2 * m)]
-        wanted = [str(a.B.transpose() * fmpq(sign)) for a in member.associated() for sign in (1, -1)]
-        assert sorted(involutions) == sorted(wanted)
-        assert all(g.B * g.B * g.B == g.B for g in found.solutions)
+        involutions = [str(g.B) for g in result.solutions if g.B * g.B == _identity(2 * m)]
+        expected = [str(a.B.transpose() * fmpq(sign)) for a in member.associated() for sign in (1, -1)]
+        assert sorted(involutions) == sorted(expected)
+        assert all(g.B * g.B * g.B == g.B for g in result.solutions)
     assert all(commute_exactly(systems[0 if k < 3 else k], member.chosen.system, 1) for k in range(2, 3**m, 4))
 
 
@@ -82,17 +82,17 @@ def _identity(n):
 
 
 def test_where_chi_does_not_split_only_rational_fields_are_found_and_the_others_reported():
-    found = commuting_systems(load("paper_m3_irreducible", {}).system)
-    assert (found.dimension, [g.trivial for g in found.solutions], found.complete) == (3, TRIVIAL, True)
-    assert found.irrational
+    systems = commuting_systems(load("paper_m3_irreducible", {}).system)
+    assert (systems.dimension, [g.trivial for g in systems.solutions], systems.complete) == (3, TRIVIAL, True)
+    assert systems.irrational
 
 
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
 @pytest.mark.parametrize("name", ["henon_heiles", "lotka_volterra", "volterra_periodic_4"])
 def test_most_systems_commute_with_nothing(name, shape):
-    found = commuting_systems(load(name, {}).system, shape)
-    assert [g.trivial for g in found.solutions] == TRIVIAL
-    assert (found.families, found.complete, str(found.verdict)) == ([], True, "proved")
+    systems = commuting_systems(load(name, {}).system, shape)
+    assert [g.trivial for g in systems.solutions] == TRIVIAL
+    assert (systems.families, systems.complete, str(systems.verdict)) == ([], True, "proved")
 
 
 def test_moebius_maps_commute_by_their_lemma_where_the_fields_are_proportional():
@@ -121,11 +121,11 @@ def test_moebius_maps_commute_by_their_lemma_where_the_fields_are_proportional()
     ],
 )
 def test_whole_linear_families_commute(f, shape, directions, verdict):
-    found = commuting_systems(f, shape)
-    (family,) = found.families
+    systems = commuting_systems(f, shape)
+    (family,) = systems.families
     assert [texts(g) for g in family.directions] == directions
-    assert (family.base.trivial, str(family.finding.verdict), found.complete) == ("0", verdict, True)
-    assert [g.trivial for g in found.solutions] == TRIVIAL
+    assert (family.base.trivial, str(family.finding.verdict), systems.complete) == ("0", verdict, True)
+    assert [g.trivial for g in systems.solutions] == TRIVIAL
 
 
 def test_a_vanishing_bracket_is_not_enough():
@@ -134,10 +134,10 @@ def test_a_vanishing_bracket_is_not_enough():
     assert bracket_vanishes(f, g)
     assert not commute_exactly(f, g)
     assert str(certify_field(f, g, Settings()).verdict) == "refuted"
-    found = commuting_systems(f, "quadratic")
-    assert all(d.system.is_homogeneous is False for family in found.families for d in family.directions)
-    assert found.complete
-    assert found.dimension == 8
+    systems = commuting_systems(f, "quadratic")
+    assert all(d.system.is_homogeneous is False for family in systems.families for d in family.directions)
+    assert systems.complete
+    assert systems.dimension == 8
 
 
 def test_multiples_are_refuted_as_a_family():
@@ -150,11 +150,11 @@ def test_multiples_are_refuted_as_a_family():
 @given(st.lists(st.integers(-2, 2), min_size=12, max_size=12))
 def test_everything_found_commutes_exactly(numbers):
     f = system_of(("x", "y"), [[fmpq(n) for n in numbers[:6]], [fmpq(n) for n in numbers[6:]]])
-    found = commuting_systems(f, "quadratic", effort=-2)
+    systems = commuting_systems(f, "quadratic", effort=-2)
     rng = random.Random(str(numbers))
-    for solution in found.solutions:
+    for solution in systems.solutions:
         assert commute_exactly(f, solution.system, 2)
-    for family in found.families:
+    for family in systems.families:
         weights = [fmpq(1), *(fmpq(rng.randint(-5, 5), 3) for _ in family.directions)]
         fields = [family.base.system, *(d.system for d in family.directions)]
         assert commute_exactly(f, system_of(f.variables, combination(fields, weights, fmpq(0))), 2)
@@ -171,17 +171,17 @@ def test_the_zero_system(names):
 
 def test_no_budget_is_undecided_and_never_complete():
     member = random_member_with_eigenvalues([1, -2, 3], seed=7)
-    found = commuting_systems(member.chosen.system, effort=Budget(0))
-    assert not found.complete
-    assert [g.trivial for g in found.solutions[:3]] == TRIVIAL
+    systems = commuting_systems(member.chosen.system, effort=Budget(0))
+    assert not systems.complete
+    assert [g.trivial for g in systems.solutions[:3]] == TRIVIAL
 
 
 def test_curved_families_are_reported_as_equations():
     """x' = x^2, y' = x y: the solutions fill a quadric cone, of which only some planes are linear families."""
     f = system("x y", "x^2", "x*y")
-    found = commuting_systems(f, "quadratic")
-    assert (found.complete, str(found.verdict), found.dimension) == (False, "undecided", 4)
-    (sentence,) = found.undecided
+    systems = commuting_systems(f, "quadratic")
+    assert (systems.complete, str(systems.verdict), systems.dimension) == (False, "undecided", 4)
+    (sentence,) = systems.undecided
     assert sentence.endswith("b2*b3 - b1*b4 = 0")
     # The equation is right: a point of the cone in none of the families commutes, a point off it does not.
     on, off = ([fmpq(n) for n in weights] for weights in ((2, 3, 4, 6), (2, 3, 4, 7)))
@@ -207,19 +207,23 @@ def test_too_large_is_undecided_with_a_reason():
     n = 12
     names = [f"x{i}" for i in range(n)]
     free = QuadraticSystem.from_text(names, [f"{names[0]}^2", *["0"] * (n - 1)])
-    found = commuting_systems(free, "quadratic")
-    assert (found.complete, str(found.verdict), [g.trivial for g in found.solutions]) == (False, "undecided", TRIVIAL)
-    assert "unknown coefficients" in found.undecided[0]
-    found = commuting_systems(system("a b c d", "a^2", "0", "0", "0"), "quadratic")
-    assert (found.dimension, found.complete) == (31, False)
-    found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
-    assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)
+    systems = commuting_systems(free, "quadratic")
+    assert (systems.complete, str(systems.verdict), [g.trivial for g in systems.solutions]) == (
+        False,
+        "undecided",
+        TRIVIAL,
+    )
+    assert "unknown coefficients" in systems.undecided[0]
+    systems = commuting_systems(system("a b c d", "a^2", "0", "0", "0"), "quadratic")
+    assert (systems.dimension, systems.complete) == (31, False)
+    systems = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
+    assert (systems.dimension, len(systems.basis), systems.complete) == (None, 1, False)
 
 
 def test_where_little_work_does_not_find_all_quadratic_fields_the_linear_ones_are_given_and_it_is_said(monkeypatch):
     f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
     assert (commuting_systems(f).shape, commuting_systems(f).note) == ("quadratic", "")
     monkeypatch.setattr("kahanmaps.laboratory.symmetry.commuting.QUICK_UNITS", 1)
-    found = commuting_systems(f)
-    assert (found.shape, found.complete) == ("linear", True)
-    assert "were tried first" in found.note
+    systems = commuting_systems(f)
+    assert (systems.shape, systems.complete) == ("linear", True)
+    assert "were tried first" in systems.note

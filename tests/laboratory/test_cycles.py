@@ -92,23 +92,23 @@ MAPS = {
 def test_the_counts_are_those_of_a_walk_by_hand(name, prime, eps):
     map_ = MAPS[name]()
     prime = 5 if name == "euler_top" and prime == 11 else prime
-    found = cycle_census(map_, "1/6" if prime == 5 else eps, prime)
-    expected = census_by_hand(images_by_hand(map_, found.eps, prime))
-    assert counts_of(found) == expected
-    assert found.points == found.looked_at == (prime ** (found.dim + 1) - 1) // (prime - 1)
-    assert found.indeterminate + found.pre_indeterminate + found.preperiodic + found.periodic == found.points
-    assert found.cycles == sum(found.lengths.values())
+    census = cycle_census(map_, "1/6" if prime == 5 else eps, prime)
+    expected = census_by_hand(images_by_hand(map_, census.eps, prime))
+    assert counts_of(census) == expected
+    assert census.points == census.examined == (prime ** (census.dim + 1) - 1) // (prime - 1)
+    assert census.indeterminate + census.pre_indeterminate + census.preperiodic + census.periodic == census.points
+    assert census.cycles == sum(census.lengths.values())
 
 
 def test_more_points_than_one_portion_holds_are_those_of_random_walks():
     """P^2 over GF(257) has 66307 points, portions 65536: samples, which take another way, end in the same ways."""
-    whole = cycle_census(load("weierstrass").system, "1/7", 257)
+    complete = cycle_census(load("weierstrass").system, "1/7", 257)
     some = cycle_census(load("weierstrass").system, "1/7", 257, samples=2000, seed=3)
-    assert (whole.complete, some.complete, some.open) == (True, False, 0)
-    assert set(some.lengths) <= set(whole.lengths)
+    assert (complete.complete, some.complete, some.open) == (True, False, 0)
+    assert set(some.lengths) <= set(complete.lengths)
     # A share of 2000 samples has a standard deviation of at most 0.011.
-    assert some.periodic / 2000 == pytest.approx(whole.periodic / whole.points, abs=0.05)
-    assert some.pre_indeterminate / 2000 == pytest.approx(whole.pre_indeterminate / whole.points, abs=0.05)
+    assert some.periodic / 2000 == pytest.approx(complete.periodic / complete.points, abs=0.05)
+    assert some.pre_indeterminate / 2000 == pytest.approx(complete.pre_indeterminate / complete.points, abs=0.05)
     assert some == cycle_census(load("weierstrass").system, "1/7", 257, samples=2000, seed=3)
     assert some != cycle_census(load("weierstrass").system, "1/7", 257, samples=2000, seed=4)
 
@@ -123,14 +123,14 @@ EXCHANGES_LEVELS = ("(-2*x^4*y^2-x^4-2*x^2*y-y^2-2)/(x^5*y^2+x^5*y+x^5-x^3*y^2+x
 
 def test_cycles_of_an_integrable_map_are_longer_than_the_bound_of_hasse_and_weil():
     """The map sends the level I = c to I = -c, and a cycle goes through both."""
-    found = cycle_census(map_of(*EXCHANGES_LEVELS), 1, 47)
-    assert found.longest == 114 > 47 + 1 + math.isqrt(4 * 47)
+    census = cycle_census(map_of(*EXCHANGES_LEVELS), 1, 47)
+    assert census.longest == 114 > 47 + 1 + math.isqrt(4 * 47)
 
 
 def test_a_map_that_degenerates_modulo_the_prime_is_a_constant():
     """For x' = x^2 + x - 1 that is where 5 eps^2 = 1, as 2/11 modulo 101."""
-    found = cycle_census(load("riccati").system, "2/11", 101)
-    assert (found.lengths, found.preperiodic) == ({1: 1}, 101)
+    census = cycle_census(load("riccati").system, "2/11", 101)
+    assert (census.lengths, census.preperiodic) == ({1: 1}, 101)
 
 
 def test_a_time_limit_keeps_the_complete_steps_of_random_points():
@@ -139,9 +139,9 @@ def test_a_time_limit_keeps_the_complete_steps_of_random_points():
             raise TimeLimit
 
     system = load("lotka_volterra").system
-    found = cycle_census(system, "1/7", 997, samples=50, progress=stop)
-    whole = cycle_census(system, "1/7", 997, samples=50, steps=3)
-    assert found == replace(whole, stopped=True)
+    census = cycle_census(system, "1/7", 997, samples=50, progress=stop)
+    complete = cycle_census(system, "1/7", 997, samples=50, steps=3)
+    assert census == replace(complete, stopped=True)
 
 
 @pytest.mark.parametrize(

@@ -68,11 +68,11 @@ def is_common(map_, space):
 )
 def test_spaces_of_known_maps(name, degree, sizes):
     map_ = first_map(load(name))
-    found = darboux_spaces(map_, degree)
-    assert all(is_common(map_, space) for space in found)
+    spaces = darboux_spaces(map_, degree)
+    assert all(is_common(map_, space) for space in spaces)
     if sizes is not None:
-        assert sorted(len(space.basis) for space in found) == sizes
-    assert gradient_rank(map_, found) <= load(name).catalog["codimension"]
+        assert sorted(len(space.basis) for space in spaces) == sizes
+    assert gradient_rank(map_, spaces) <= load(name).catalog["codimension"]
 
 
 def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
@@ -80,8 +80,8 @@ def test_a_space_does_not_depend_on_the_basis_it_was_given_by():
     for size in (2, 3):
         vectors = [[rng.randrange(SMALL) for _ in range(comb(4, 2))] for _ in range(size)]
         weights = [[1, 5, 7][:size], [0, 1, 9][:size], [0, 0, 1]][:size]
-        one = DarbouxSpace.spanned_by(2, 2, vectors, SMALL)
-        assert one == DarbouxSpace.spanned_by(2, 2, combine(weights, vectors, SMALL), SMALL)
+        entry = DarbouxSpace.spanned_by(2, 2, vectors, SMALL)
+        assert entry == DarbouxSpace.spanned_by(2, 2, combine(weights, vectors, SMALL), SMALL)
 
 
 @given(st.randoms(use_true_random=False))
@@ -98,8 +98,8 @@ def test_no_members_of_a_pencil_are_sparser(rng):
     }
     by_size = sorted(supports, key=lambda places: (sum(exponents[places[-1]]), len(places), places))
     basis = DarbouxSpace.spanned_by(2, 2, [P, Q], p).basis
-    found = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
-    assert found == by_size[:2]
+    results = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
+    assert results == by_size[:2]
     assert rank([*basis, P, Q], p) == rank(basis, p) == 2
 
 
@@ -112,16 +112,16 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
     laboratory = Laboratory(load(name))
     map_ = laboratory.maps[0]
     D = determinant_polynomial(laboratory.map)
-    whole = Cofactor("D", 1, D)
+    complete = Cofactor("D", 1, D)
     for x, image in map_.pairs(3):
-        assert whole.sides(map_, x, image) == DETERMINANT.sides(map_, x, image)
+        assert complete.sides(map_, x, image) == DETERMINANT.sides(map_, x, image)
     context = D.context()
-    rest = D
-    for one in determinant_factors(laboratory.map):
-        assert one.polynomial.subs({"eps": 0}) == context.constant(1)
-        while not (rest % one.polynomial):
-            rest = rest // one.polynomial
-    assert all(not any(monomial[: map_.dim]) for monomial in rest.monoms())
+    others = D
+    for entry in determinant_factors(laboratory.map):
+        assert entry.polynomial.subs({"eps": 0}) == context.constant(1)
+        while not (others % entry.polynomial):
+            others = others // entry.polynomial
+    assert all(not any(monomial[: map_.dim]) for monomial in others.monoms())
 
 
 def test_polynomials_with_a_given_cofactor():
@@ -135,9 +135,9 @@ def test_polynomials_with_a_given_cofactor():
 
 def listed(name: str, degree: int, **options: Any) -> dict[str, list[str]]:
     """Cofactors and polynomials as text."""
-    found = darboux_polynomials(load(name), degree, **options)
-    assert not found.reason
-    return {space.cofactor: [format_polynomial(P) for P in space.polynomials] for space in found.spaces}
+    search = darboux_polynomials(load(name), degree, **options)
+    assert not search.reason
+    return {space.cofactor: [format_polynomial(P) for P in space.polynomials] for space in search.spaces}
 
 
 def test_the_coordinates_of_lotka_volterra_and_nothing_else() -> None:
@@ -147,9 +147,9 @@ def test_the_coordinates_of_lotka_volterra_and_nothing_else() -> None:
 
 def test_the_pencils_of_the_periodic_volterra_lattice() -> None:
     """Origin: petrera-pfadler-suris-2011, integrals x1 x3/(1 - eps^2 (x2 - x4)^2) and its shift."""
-    found = listed("volterra_periodic_4", 2)
-    assert found["C[x1]*C[x3]"] == ["x1*x3", "x2^2*eps^2 - 2*x2*x4*eps^2 + x4^2*eps^2 - 1"]
-    assert found["1"][0] == "x1 + x2 + x3 + x4"
+    result = listed("volterra_periodic_4", 2)
+    assert result["C[x1]*C[x3]"] == ["x1*x3", "x2^2*eps^2 - 2*x2*x4*eps^2 + x4^2*eps^2 - 1"]
+    assert result["1"][0] == "x1 + x2 + x3 + x4"
 
 
 @pytest.mark.parametrize("name", ["nahm_octahedral", "dressing_chain_3"])
@@ -173,18 +173,18 @@ def test_ratios_of_one_space_are_conserved_along_exact_orbits(name: str) -> None
 @pytest.mark.parametrize(("rhs", "eps"), [(["x", "y"], -1), (["x", "y"], 1)])
 def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynomials(rhs, eps):
     # At eps = -1 every point goes to x = 0, and all multiples of x would have the cofactor 0.
-    found = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)
-    assert found.spaces == ()
-    assert f"at eps = {eps} the map" in found.reason
+    search = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)
+    assert search.spaces == ()
+    assert f"at eps = {eps} the map" in search.reason
 
 
 @pytest.mark.parametrize(("symbols", "cofactor"), [((), "1/5*(y + 1)*1/(x)^2"), (("a",), "(1/a)*(y + 1)*1/(x)^2")])
 def test_a_cofactor_has_a_number_in_front(symbols, cofactor):
     """Lyness' map x_{n+1} x_{n-1} = a + x_n for a multiples of the x_n: factors of det dPhi are right up to numbers."""
     file = parse_system("variables = ['x', 'y']\nparameters.a = 5\n[map]\nimage = ['y', '(y + 1)/(a*x)']")
-    found = darboux_polynomials(file, 3, symbols=symbols)
-    [space] = found.spaces
-    assert (space.cofactor, space.verdict, found.reason) == (cofactor, Certainty.PROVED, "")
+    search = darboux_polynomials(file, 3, symbols=symbols)
+    [space] = search.spaces
+    assert (space.cofactor, space.verdict, search.reason) == (cofactor, Certainty.PROVED, "")
     assert [len(P) for P in space.polynomials] == [1, 7 if not symbols else 9]
     assert str(space.polynomials[0]) == "x*y"
 
@@ -192,7 +192,7 @@ def test_a_cofactor_has_a_number_in_front(symbols, cofactor):
 def test_polynomials_whose_cofactors_differ_by_a_number_come_apart():
     """x + y goes to itself, and x - y to its negative."""
     file = parse_system("variables = ['x', 'y', 'z']\n[map]\nimage = ['y', 'x', '3*z/(1 + z)']")
-    spaces = {one.cofactor: list(map(str, one.polynomials)) for one in darboux_polynomials(file, 1).spaces}
+    spaces = {entry.cofactor: list(map(str, entry.polynomials)) for entry in darboux_polynomials(file, 1).spaces}
     assert spaces["1"] == ["x + y"]
     assert spaces["-1"] == ["x - y"]
 
@@ -206,6 +206,6 @@ def test_a_wrong_number_in_front_is_refuted(monkeypatch):
         return [RationalFunction(c.numerator * 2, c.denominator)]
 
     monkeypatch.setattr(module, "constants_of", doubled)
-    found = darboux_polynomials(file, 3)
-    assert found.spaces == ()
-    assert "did not pass as an identity" in found.reason
+    search = darboux_polynomials(file, 3)
+    assert search.spaces == ()
+    assert "did not pass as an identity" in search.reason

@@ -36,9 +36,9 @@ for i, row in enumerate([[2, 1, 1, 1], [-1, 0, -1, -1], [-1, -1, 0, -1], [-1, -1
 
 @pytest.mark.parametrize("name", quick(POSITIVE, ["hietarinta_viallet"]))
 def test_the_bounds_enclose_the_dynamical_degree_that_is_derived(name):
-    found = degree_growth(load(name).map)
-    exact = float(found.dynamical_degree.digits)
-    assert 0.9 * exact < float(found.enclosure.lower) < exact <= float(found.enclosure.upper) < 3
+    growth = degree_growth(load(name).map)
+    exact = float(growth.dynamical_degree.digits)
+    assert 0.9 * exact < float(growth.enclosure.lower) < exact <= float(growth.enclosure.upper) < 3
 
 
 @pytest.mark.parametrize("name", quick(INTEGRABLE, ["harmonic", "nahm_tetrahedral", "mcmillan"]))
@@ -56,9 +56,9 @@ def test_the_bound_by_tangents_is_the_largest_degree_that_they_allow(largest, li
 
 def test_the_lower_bound_is_attained_on_the_axis():
     """T_n(3) = cosh(n log(3 + sqrt 8)): degrees of a translation along a line, of which nothing is lost."""
-    one = lower_bound(2 * 99**2 - 1, 99, 3)  # T_3(3) = 99, T_6 = 2 T_3^2 - 1
-    assert one.overlaps(3 + arb(8).sqrt())
-    assert one.rad() < 1e-30
+    entry = lower_bound(2 * 99**2 - 1, 99, 3)  # T_3(3) = 99, T_6 = 2 T_3^2 - 1
+    assert entry.overlaps(3 + arb(8).sqrt())
+    assert entry.rad() < 1e-30
 
 
 @given(st.integers(1, 10**6), st.integers(1, 10**4))

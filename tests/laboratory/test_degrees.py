@@ -27,8 +27,8 @@ OPEN = Patterns((), None, False, "not looked at")
 @pytest.mark.parametrize("name", quick(names(), DAILY))
 def test_the_degrees_of_the_catalogue(name):
     known = load(name).catalog["degrees"]
-    found = degree_growth(load(name).system, max_terms=len(known), seed=5)
-    assert (list(found.degrees), found.ended, found.notes) == ([1, *known], "terms", ())
+    growth = degree_growth(load(name).system, max_terms=len(known), seed=5)
+    assert (list(growth.degrees), growth.ended, growth.notes) == ([1, *known], "terms", ())
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -86,8 +86,8 @@ def test_the_largest_degree_is_reached_exactly_by_series_and_by_minors(largest, 
     monkeypatch.setattr(curves, "_MAX_MINORS_DIMENSION", largest)
     system = load("henon_heiles").system
     assert degree_growth(system, max_terms=3, max_degree=17, patterns=OPEN).degrees == (1, 3, 7, 17)
-    found = degree_growth(system, max_terms=3, max_degree=16, patterns=OPEN)
-    assert (found.degrees, found.ended) == ((1, 3, 7), "degree")
+    growth = degree_growth(system, max_terms=3, max_degree=16, patterns=OPEN)
+    assert (growth.degrees, growth.ended) == ((1, 3, 7), "degree")
 
 
 def test_a_single_eps_may_be_special():
@@ -109,26 +109,26 @@ def test_a_single_eps_may_be_special():
 )
 def test_degenerate_maps_are_values(rhs, eps, degrees, ended):
     system = QuadraticSystem.from_text(["x", "y"][: len(rhs)], rhs)
-    found = degree_growth(system, eps)
-    assert (found.degrees, found.ended) == (degrees, ended)
-    assert found.text
-    assert found.growth is {"constant": Growth.ZERO, "singular": Growth.UNKNOWN}.get(ended, Growth.BOUNDED)
+    growth = degree_growth(system, eps)
+    assert (growth.degrees, growth.ended) == (degrees, ended)
+    assert growth.text
+    assert growth.growth is {"constant": Growth.ZERO, "singular": Growth.UNKNOWN}.get(ended, Growth.BOUNDED)
 
 
 def test_the_budget_and_the_degree_are_limits():
     henon_heiles = load("henon_heiles").system
-    found = degree_growth(henon_heiles, effort=Budget(100_000))
-    assert (found.ended, found.degrees, found.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
-    assert found.message == "work limit reached at iterate 8; raise --effort"
+    growth = degree_growth(henon_heiles, effort=Budget(100_000))
+    assert (growth.ended, growth.degrees, growth.growth) == ("budget", (1, 3, 7, 17, 39, 93, 215, 495), Growth.UNKNOWN)
+    assert growth.message == "work limit reached at iterate 8; raise --effort"
     known = degree_growth(load("lotka_volterra").system).patterns
-    found = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
-    assert (found.ended, found.enclosure) == ("derived", None)
-    assert found.notes == ("work limit reached before bounds of the dynamical degree were proved; raise --effort",)
-    found = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
-    assert (found.ended, found.growth) == ("budget", Growth.BOUNDED)
-    found = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)
-    assert (found.ended, found.message) == ("degree", "the degree of iterate 5 is above 50")
-    assert found.degrees == (1, 3, 7, 17, 39)
+    growth = degree_growth(load("lotka_volterra").system, effort=Budget(10_000), patterns=known)
+    assert (growth.ended, growth.enclosure) == ("derived", None)
+    assert growth.notes == ("work limit reached before bounds of the dynamical degree were proved; raise --effort",)
+    growth = degree_growth(load("riccati").system, effort=Budget(2_000), max_terms=10_000)
+    assert (growth.ended, growth.growth) == ("budget", Growth.BOUNDED)
+    growth = degree_growth(henon_heiles, max_degree=50, patterns=OPEN)
+    assert (growth.ended, growth.message) == ("degree", "the degree of iterate 5 is above 50")
+    assert growth.degrees == (1, 3, 7, 17, 39)
 
 
 def test_a_time_limit_keeps_the_degrees_that_were_measured():
@@ -136,19 +136,19 @@ def test_a_time_limit_keeps_the_degrees_that_were_measured():
         if sentence.startswith("degrees: iterate 5"):
             raise TimeLimit("the time limit of 1 s is over")
 
-    found = degree_growth(load("henon_heiles").system, progress=stop)
-    assert (found.ended, found.degrees) == ("stopped", (1, 3, 7, 17, 39))
-    assert found.message == "the time limit of 1 s is over at iterate 5"
-    assert len(found.to_json()["lines"]) == 2
+    growth = degree_growth(load("henon_heiles").system, progress=stop)
+    assert (growth.ended, growth.degrees) == ("stopped", (1, 3, 7, 17, 39))
+    assert growth.message == "the time limit of 1 s is over at iterate 5"
+    assert len(growth.to_json()["lines"]) == 2
 
     def stop_later(sentence):
         if sentence.startswith("dynamical degree"):
             raise TimeLimit("the time limit of 1 s is over")
 
     short = {"max_terms": 6, "patterns": OPEN}
-    found = degree_growth(load("lotka_volterra").system, progress=stop_later, **short)
-    whole = degree_growth(load("lotka_volterra").system, **short)
-    assert found == replace(whole, enclosure=None, message=f"{whole.message}; the time limit of 1 s is over")
+    growth = degree_growth(load("lotka_volterra").system, progress=stop_later, **short)
+    complete = degree_growth(load("lotka_volterra").system, **short)
+    assert growth == replace(complete, enclosure=None, message=f"{complete.message}; the time limit of 1 s is over")
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         degree_growth(load("henon_heiles").system, effort=Budget(1e9), progress=stop)
 
@@ -158,6 +158,6 @@ def test_lines_in_special_position_are_replaced(monkeypatch):
     primes = iter([101, 101, 103, 107, 2**61 - 1, 2**61 - 1, 2**61 - 1, 2**61 - 1, 2**61 - 1])
     monkeypatch.setattr(curves, "random_prime", lambda _: next(primes))
     system = load("euler_top").system
-    found = degree_growth(system, max_terms=7, seed=1)
-    assert found.degrees == (1, 3, 9, 19, 33, 51, 73, 99)
-    assert any("was replaced by another" in note for note in found.notes)
+    growth = degree_growth(system, max_terms=7, seed=1)
+    assert growth.degrees == (1, 3, 9, 19, 33, 51, 73, 99)
+    assert any("was replaced by another" in note for note in growth.notes)

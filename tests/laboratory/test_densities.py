@@ -54,22 +54,22 @@ def holds_exactly(file, formula, eps, starts=2, **more):
 @pytest.mark.parametrize("name", quick(SMALL_ONES, SMALL_ONES[::3]))
 def test_densities_satisfy_the_definition_exactly(name):
     file = load(name)
-    found = searched(name)
-    assert found.densities
-    assert found.reason == found.note == ""
-    for one in found.densities:
-        assert one.verdict is Certainty.PROVED
-        assert all(holds_exactly(file, one.text, eps) for eps in ("1/10", "-2/3"))
+    result = searched(name)
+    assert result.densities
+    assert result.reason == result.note == ""
+    for density in result.densities:
+        assert density.verdict is Certainty.PROVED
+        assert all(holds_exactly(file, density.text, eps) for eps in ("1/10", "-2/3"))
 
 
 def test_of_hamiltonian_systems_the_determinant_is_taken():
-    found = find_densities(load("henon_heiles"))
-    assert [(one.text, one.evidence.method) for one in found.densities] == [
+    search = find_densities(load("henon_heiles"))
+    assert [(density.text, density.evidence.method) for density in search.densities] == [
         ("4*q1^2*eps^4 + 4*q2^2*eps^4 - eps^4 - 2*eps^2 - 1", "theorem")
     ]
-    assert found.degree == 2  # in the variables
+    assert search.degree == 2  # in the variables
     # a factor that depends on eps alone is left out
-    assert [one.text for one in find_densities(load("harmonic")).densities] == ["1"]
+    assert [density.text for density in find_densities(load("harmonic")).densities] == ["1"]
     # not where a smaller degree was asked for
     assert find_densities(load("nahm_tetrahedral"), max_degree=1).densities == ()
 
@@ -77,8 +77,8 @@ def test_of_hamiltonian_systems_the_determinant_is_taken():
 def test_maps_that_are_not_invertible_have_no_density():
     # all images are the origin: phi(x~) det(I - eps f') = phi det(I + eps f'(x~)) says 0 = 0 for phi = x
     file = system("x y", "-x", "-y")
-    found = find_densities(file, eps=1)
-    assert (found.densities, "not invertible" in found.reason) == ((), True)
+    search = find_densities(file, eps=1)
+    assert (search.densities, "not invertible" in search.reason) == ((), True)
     function = parse_rational_function("x", ["x", "y", "eps"])
     assert density_verdict(with_symbols(file), function, fmpq(1))[0] is Certainty.UNDECIDED
     assert "the map is defined nowhere" in find_densities(system("x y", "x", "3*y"), eps=1).reason
@@ -91,11 +91,11 @@ def test_the_check_by_definition_refutes_a_wrong_density():
 def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypatch):
     saddle = system("x y", "x", "-y")  # det(I - eps f') = 1 - eps^2
     assert module._theorem(Laboratory(saddle, (), fmpq(1))) is None
-    found = module._theorem(Laboratory(load("henon_heiles"), (), fmpq(1, 2)))
-    assert (found.verdict, found.function.denominator) == (Certainty.PROVED, 1)
+    result = module._theorem(Laboratory(load("henon_heiles"), (), fmpq(1, 2)))
+    assert (result.verdict, result.function.denominator) == (Certainty.PROVED, 1)
     point = (fmpq(3), fmpq(-2), fmpq(5), fmpq(7))
     determinants = [KahanMap(load("henon_heiles").system, "1/2").determinant(x) for x in (point, (fmpq(0),) * 4)]
-    values = [found.function.numerator(*x, fmpq(1, 2)) for x in (point, (fmpq(0),) * 4)]
+    values = [result.function.numerator(*x, fmpq(1, 2)) for x in (point, (fmpq(0),) * 4)]
     assert values[0] * determinants[1] == values[1] * determinants[0] != 0
     assert module._theorem(Laboratory(load("lorenz"), (), fmpq(1, 2))) is None
     monkeypatch.setattr(module, "determinant_polynomial", lambda _: None)
@@ -105,13 +105,13 @@ def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypa
 def test_factors_of_integrals_make_a_density_of_a_degree_that_is_not_searched(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.preserve.densities._MAX_DEGREE", 3)
     top = System("x' = y*z; y' = -3*x*z; z' = 2*x*y")
-    found = find_densities(top)
-    assert [(one.degree(3), one.verdict) for one in found.densities] == [(4, Certainty.PROVED)]
-    assert found.degree == 4
+    search = find_densities(top)
+    assert [(density.degree(3), density.verdict) for density in search.densities] == [(4, Certainty.PROVED)]
+    assert search.degree == 4
     assert find_densities(top, integrals=()).densities == ()
 
 
 def test_random_systems_have_none():
-    found = find_densities(random_system(2, 0), max_degree=5)
-    assert (found.densities, found.degree, found.toml_section()) == ((), 5, "")
-    assert found.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"
+    search = find_densities(random_system(2, 0), max_degree=5)
+    assert (search.densities, search.degree, search.toml_section()) == ((), 5, "")
+    assert search.reason == "no polynomial of degree at most 5, and no product of powers of known ones, is a density"

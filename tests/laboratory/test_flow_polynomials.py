@@ -64,9 +64,9 @@ def test_a_polynomial_that_does_not_divide_its_derivative_is_none(monkeypatch):
 
 def test_where_solutions_are_algebraic_one_point_is_not_enough():
     """18 of 35 quartics vanish along the solution from a point of P = 0; K = -4/3."""
-    found = flow_polynomials(lorenz("1/3", "2", "0").system, 4, seed=1)
+    polynomials = flow_polynomials(lorenz("1/3", "2", "0").system, 4, seed=1)
     known = ["9*x^4 - 12*x^2*z + 24*x^2 - 8*x*y - 4*y^2"]
-    assert ([format_polynomial(P) for P in found.functions], found.degree) == (known, 4)
+    assert ([format_polynomial(P) for P in polynomials.functions], polynomials.degree) == (known, 4)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -80,11 +80,11 @@ def test_what_a_field_was_made_to_keep_is_found(seed):
 
     P, a = drawn(1 + seed % 4), drawn(seed % 2)
     made = PolynomialField((P.derivative(1) * a + P * drawn(0), -P.derivative(0) * a + P * drawn(1)))
-    found = flow_polynomials(made, 4, seed=seed)
-    assert {format_polynomial(primitive_part(one)[1]) for one, _ in P.factor()[1]} <= set(
-        map(format_polynomial, found.functions)
+    polynomials = flow_polynomials(made, 4, seed=seed)
+    assert {format_polynomial(primitive_part(factor)[1]) for factor, _ in P.factor()[1]} <= set(
+        map(format_polynomial, polynomials.functions)
     )
-    assert found.degree == 4
+    assert polynomials.degree == 4
 
 
 def test_nothing_moves_on_a_common_factor():
@@ -97,21 +97,22 @@ def test_of_a_pencil_no_member_is_taken_for_a_rational_one():
     """x^2 + y^2 - 1 + c y for every c: that of c = 2 i is a product of lines, and 2 i is a residue modulo primes."""
     known = ["x^2 + y^2 + 2*x + 1", "x^2 + y^2 - 2*x + 1", "y"]  # z = x + i y has z' = z^2 - 1
     for seed in range(3):
-        found = flow_polynomials(field("x y", "x^2 - y^2 - 1", "2*x*y"), 3, seed=seed).functions
-        assert sorted(map(format_polynomial, found)) == known
+        result = flow_polynomials(field("x y", "x^2 - y^2 - 1", "2*x*y"), 3, seed=seed).functions
+        assert sorted(map(format_polynomial, result)) == known
 
 
 def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():
     file = lorenz("10", "28", "20")
-    found = find_integrals(file, flow=True, max_degree=2)
-    assert [(t.text, str(t.integral.verdict)) for t in found.time_dependent] == [("exp(20*t)*(x^2 - 20*z)", "proved")]
+    search = find_integrals(file, flow=True, max_degree=2)
+    assert [(t.text, str(t.integral.verdict)) for t in search.time_dependent] == [("exp(20*t)*(x^2 - 20*z)", "proved")]
     assert find_integrals(lorenz("10", "28", "19"), flow=True, max_degree=2).time_dependent == ()
     beside = flow_and_map(find_integrals(file, max_degree=2))
     assert ("proved", "Darboux polynomials of the flow, apart from affine ones: x^2 - 20*z") in beside.lines()
     assert ("proved", "T1 = exp(20*t)*(x^2 - 20*z) is a time-dependent integral of the flow") in beside.lines()
-    [told] = [text for _, text in beside.lines() if text.startswith("no other Darboux")]
+    [messages] = [text for _, text in beside.lines() if text.startswith("no other Darboux")]
     assert (
-        told == "no other Darboux polynomials of the flow of degree <= 3 were found except factors of known integrals"
+        messages
+        == "no other Darboux polynomials of the flow of degree <= 3 were found except factors of known integrals"
     )
 
 
@@ -126,9 +127,9 @@ def test_the_rate_of_what_depends_on_time_is_decided_by_multiplying_out(factor, 
 def test_long_coefficients_are_lifted(scale):
     """The Lorenz system with b = 2 s and z = scale w: x^2 - 20 scale w."""
     rhs = ["10*y - 10*x", f"28*x - y - {scale}*x*w", f"x*y/{scale} - 20*w"]
-    found = flow_polynomials(field("x y w", *rhs), 2)
-    assert [format_polynomial(P) for P in found.functions] == [f"x^2 - {20 * scale}*w"]
-    assert (found.degree, found.reason) == (2, "")
+    polynomials = flow_polynomials(field("x y w", *rhs), 2)
+    assert [format_polynomial(P) for P in polynomials.functions] == [f"x^2 - {20 * scale}*w"]
+    assert (polynomials.degree, polynomials.reason) == (2, "")
 
 
 def test_a_degree_is_not_settled_where_something_is_not_lifted(monkeypatch):
@@ -136,14 +137,14 @@ def test_a_degree_is_not_settled_where_something_is_not_lifted(monkeypatch):
     monkeypatch.setattr(searched, "_PRIMES", 2)
     monkeypatch.setattr(searched, "_PRECISION", 2)
     made = field("x y w", "10*y - 10*x", f"28*x - y - {10**80}*x*w", f"x*y/{10**80} - 20*w")
-    found = flow_polynomials(made, 2)
-    assert (found.functions, found.degree) == ((), 1)
-    assert found.reason == "1 polynomial of degree 2 modulo a prime not lifted to Q (limit: 2 primes)"
+    polynomials = flow_polynomials(made, 2)
+    assert (polynomials.functions, polynomials.degree) == ((), 1)
+    assert polynomials.reason == "1 polynomial of degree 2 modulo a prime not lifted to Q (limit: 2 primes)"
     text = f"variables = ['x', 'y', 'w']\n[system]\nrhs = {[str(f) for f in made.rhs]}"
     beside = flow_and_map(find_integrals(parse_system(text), max_degree=1))
     assert beside.polynomials_degree == 1
-    told = [text for known, text in beside.lines() if known == "undecided" and "Darboux" in text]
-    assert told == [f"Darboux polynomials of the flow of degree 2: {beside.polynomials_reason}"]
+    messages = [text for known, text in beside.lines() if known == "undecided" and "Darboux" in text]
+    assert messages == [f"Darboux polynomials of the flow of degree 2: {beside.polynomials_reason}"]
     assert "not lifted to Q (limit: 2 primes)" in beside.to_json()["polynomials_reason"]
 
 
@@ -153,7 +154,7 @@ def test_conjugate_lines_leave_no_degree_open():
     cubic = parse_polynomial("x^3 - 2*y^3", ["x", "y"])
     made = PolynomialField((cubic.derivative(1) - cubic, -cubic.derivative(0) - 3 * cubic))
     for seed in range(2):
-        found = flow_polynomials(made, 3, seed=seed)
-        assert ([format_polynomial(P) for P in found.functions], found.degree) == (["x^3 - 2*y^3"], 3)
-    found = flow_polynomials(load("paper_m3").system, 1)
-    assert ([format_polynomial(P) for P in found.functions], found.degree) == (["x1 - x5"], 1)
+        polynomials = flow_polynomials(made, 3, seed=seed)
+        assert ([format_polynomial(P) for P in polynomials.functions], polynomials.degree) == (["x^3 - 2*y^3"], 3)
+    polynomials = flow_polynomials(load("paper_m3").system, 1)
+    assert ([format_polynomial(P) for P in polynomials.functions], polynomials.degree) == (["x1 - x5"], 1)

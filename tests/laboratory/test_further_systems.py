@@ -100,13 +100,13 @@ def value_at(text, name, x, eps):
 def orbits(file, starts=4, steps=2):
     """(eps, points of an orbit), exact, with orbits that end at a pole left out."""
     for text in EPS:
-        eps, found = Fraction(text), 0
+        eps, result = Fraction(text), 0
         for start in islice(random_starts(file.system.dim, 8), 10 * starts):
             points = [tuple(fraction(entry) for entry in start)]
             while len(points) <= steps and points[-1] is not None:
                 points.append(kahan_step(file.system, eps, points[-1]))
-            if points[-1] is not None and found < starts:
-                found += 1
+            if points[-1] is not None and result < starts:
+                result += 1
                 yield eps, points
 
 
@@ -144,18 +144,18 @@ def test_the_answers_count_their_independent_integrals(name):
 
 @pytest.mark.parametrize("name", slow_unless([name for name in FURTHER if name not in BOUNDED], FAST))
 def test_the_analysis_gives_the_answer(name):
-    found = analysed(name)
-    assert differences(found, answer_for(name)) == set()
+    analysis = analysed(name)
+    assert differences(analysis, answer_for(name)) == set()
 
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_the_analysis_of_degenerate_systems_gives_the_answer(name):
-    found = analyze(file_of(name))
-    assert differences(found, replace(answer_for(name), verdict=None), 4) == set()
-    affine = all(int(p.total_degree()) <= 1 for p in found.file.system.rhs)
+    analysis = analyze(file_of(name))
+    assert differences(analysis, replace(answer_for(name), verdict=None), 4) == set()
+    affine = all(int(p.total_degree()) <= 1 for p in analysis.file.system.rhs)
     growth = KNOWN[name]["growth"]
-    assert found.conclusion.kind == ("linear" if affine else verdict_of(growth))
-    assert found.skipped == []
+    assert analysis.conclusion.kind == ("linear" if affine else verdict_of(growth))
+    assert analysis.skipped == []
 
 
 SPECIAL = [(name, eps) for name, known in DEGENERATE.items() for eps in known["at_special_eps"]]
@@ -164,37 +164,37 @@ SPECIAL = [(name, eps) for name, known in DEGENERATE.items() for eps in known["a
 @pytest.mark.parametrize(("name", "eps"), SPECIAL)
 def test_special_eps(name, eps):
     file, special = file_of(name), DEGENERATE[name]["at_special_eps"][eps]
-    found = analyze(file, eps=eps)
-    assert f"All this holds at eps = {eps}; other eps may differ." in found.conclusion.sentence
+    analysis = analyze(file, eps=eps)
+    assert f"All this holds at eps = {eps}; other eps may differ." in analysis.conclusion.sentence
     if "period" in special:
-        assert found.integrals.profile.period == special["period"]
-        is_proved = f"Phi^{special['period']} is the identity (proved)" in found.conclusion.sentence
-        assert is_proved or found.conclusion.kind == "linear"
-        assert found.conclusion.integrals == file.system.dim
+        assert analysis.integrals.profile.period == special["period"]
+        is_proved = f"Phi^{special['period']} is the identity (proved)" in analysis.conclusion.sentence
+        assert is_proved or analysis.conclusion.kind == "linear"
+        assert analysis.conclusion.integrals == file.system.dim
         return
-    assert found.integrals.integrals == found.densities.densities == ()
+    assert analysis.integrals.integrals == analysis.densities.densities == ()
     defect = {"no value": "is defined nowhere", "not invertible": "is not invertible"}[special["defect"]]
-    assert defect in found.integrals.reason
+    assert defect in analysis.integrals.reason
     if special["defect"] == "no value":
-        assert found.conclusion.kind == "singular"
+        assert analysis.conclusion.kind == "singular"
 
 
 @pytest.mark.parametrize("name", ["ishii", "zander_11m1_lines"])
 def test_a_wrong_answer_is_seen_to_be_different(name):
-    found, answer = analysed(name), answer_for(name)
-    one, last = function(found.file, "1"), function(found.file, found.file.variables[-1])
-    assert differences(found, answer) == set()
-    assert "count" in differences(found, replace(answer, integrals=answer.integrals + 1))
-    assert "count" in differences(found, replace(answer, integrals=answer.integrals - 1))
-    assert differences(found, replace(answer, degrees=(*answer.degrees[:4], answer.degrees[4] + 1))) == {"degrees"}
-    assert differences(found, replace(answer, growth="cubic")) == {"growth"}
-    assert differences(found, replace(answer, verdict="undecided")) == {"verdict"}
-    assert differences(found, replace(answer, dynamical_degree="x^2 - x - 1")) == {"dynamical degree"}
-    wrong = one if name != "ishii" else last  # where 1 is a density
-    assert differences(found, replace(answer, density=residues_of(wrong))) == {"density"}
-    assert differences(found, replace(answer, without_density=True)) == {"density"}
-    foreign = function(found.file, "+".join(f"{k + 2}*{v}^3" for k, v in enumerate(found.file.variables)))
-    assert differences(found, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"}
+    result, answer = analysed(name), answer_for(name)
+    entry, last = function(result.file, "1"), function(result.file, result.file.variables[-1])
+    assert differences(result, answer) == set()
+    assert "count" in differences(result, replace(answer, integrals=answer.integrals + 1))
+    assert "count" in differences(result, replace(answer, integrals=answer.integrals - 1))
+    assert differences(result, replace(answer, degrees=(*answer.degrees[:4], answer.degrees[4] + 1))) == {"degrees"}
+    assert differences(result, replace(answer, growth="cubic")) == {"growth"}
+    assert differences(result, replace(answer, verdict="undecided")) == {"verdict"}
+    assert differences(result, replace(answer, dynamical_degree="x^2 - x - 1")) == {"dynamical degree"}
+    wrong = entry if name != "ishii" else last  # where 1 is a density
+    assert differences(result, replace(answer, density=residues_of(wrong))) == {"density"}
+    assert differences(result, replace(answer, without_density=True)) == {"density"}
+    foreign = function(result.file, "+".join(f"{k + 2}*{v}^3" for k, v in enumerate(result.file.variables)))
+    assert differences(result, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"}
 
 
 FACTS = [name for name in names() if set(load(name).catalog) & {"degrees", "growth", "verdict", "codimension"}]
@@ -210,8 +210,8 @@ def blind(name):
     return analyze(SystemFile.from_system(load(name).system, "somebody"))
 
 
-def marked(found):
-    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in found]
+def marked(result):
+    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in result]
 
 
 def facts_of(name):
@@ -235,10 +235,10 @@ def facts_of(name):
 
 @pytest.mark.parametrize("name", marked(FACTS))
 def test_the_facts_of_the_file_are_found_blind(name):
-    found, answer = blind(name), facts_of(name)
-    assert differences(found, answer) == set()
-    nullities = found.integrals.profile.nullities
-    for known in relations(load(name).catalog, found.file.variables):
+    result, answer = blind(name), facts_of(name)
+    assert differences(result, answer) == set()
+    nullities = result.integrals.profile.nullities
+    for known in relations(load(name).catalog, result.file.variables):
         degree = _degree(known)
         if degree is not None and degree <= len(nullities):
             assert nullities[degree - 1] == known.dimension

@@ -39,11 +39,11 @@ OPEN = Patterns((), None, False, "not looked at")
 )
 def test_the_growth_of_monomial_maps_is_proved(variables, image, growth, rate, monkeypatch):
     map_ = by_formulas(variables, image)
-    found = degree_growth(map_)
-    assert (str(found.growth), found.dynamical_degree.text, found.known) == (growth, rate, Certainty.PROVED)
+    result = degree_growth(map_)
+    assert (str(result.growth), result.dynamical_degree.text, result.known) == (growth, rate, Certainty.PROVED)
     monkeypatch.setattr(degrees, "exponent_matrix", lambda map_, eps: None)
     measured = degree_growth(map_, max_terms=6, patterns=OPEN, enclosed=False)
-    assert (measured.degrees, bool(measured.primes)) == (found.degrees[:7], True)
+    assert (measured.degrees, bool(measured.primes)) == (result.degrees[:7], True)
 
 
 def test_a_jordan_block_multiplies_exponential_growth_by_a_power():
@@ -101,9 +101,9 @@ def test_a_map_that_is_monomial_at_one_eps_only():
     ],
 )
 def test_maps_of_finite_order_are_proved_periodic(image, period):
-    found = degree_growth(by_formulas("x,y", image), max_terms=12, patterns=OPEN)
-    assert (found.proof and found.proof.period) == period
-    assert period is None or (found.proof.is_identity and found.known is Certainty.PROVED)
+    growth = degree_growth(by_formulas("x,y", image), max_terms=12, patterns=OPEN)
+    assert (growth.proof and growth.proof.period) == period
+    assert period is None or (growth.proof.is_identity and growth.known is Certainty.PROVED)
 
 
 def test_a_wrong_period_is_not_proved(monkeypatch):
@@ -117,25 +117,25 @@ def test_a_wrong_period_is_not_proved(monkeypatch):
 def test_a_linear_map_of_finite_order_is_proved_periodic(rhs, eps, order):
     """The Kahan map of x' = a y, y' = -b x rotates by an angle whose half has the tangent eps sqrt(a b)."""
     system = QuadraticSystem.from_text(["x", "y"], rhs.split("; "))
-    found = degree_growth(system, eps=eps).proof
-    assert (found.period, found.is_identity, found.reason) == (order, True, f"Phi^{order} is the identity")
+    result = degree_growth(system, eps=eps).proof
+    assert (result.period, result.is_identity, result.reason) == (order, True, f"Phi^{order} is the identity")
     assert not degree_growth(system, eps="1/7").proof.is_identity
     assert not degree_growth(system).proof.is_identity
 
 
 def test_a_linear_iterate_need_not_be_the_identity():
-    found = degree_growth(by_formulas("x,y", "1 + 2/y; 3/(x - 1)"), max_terms=6, patterns=OPEN)
-    assert found.degrees == (1, 2, 1, 2, 1, 2, 1)
-    assert (found.proof.reason, found.growth) == ("iterate 2 is linear on projective space", Growth.BOUNDED)
+    growth = degree_growth(by_formulas("x,y", "1 + 2/y; 3/(x - 1)"), max_terms=6, patterns=OPEN)
+    assert growth.degrees == (1, 2, 1, 2, 1, 2, 1)
+    assert (growth.proof.reason, growth.growth) == ("iterate 2 is linear on projective space", Growth.BOUNDED)
     projective = linear_iterate(by_formulas("x,y", "(2*x + y)/(x - 1); y/(x - 1)"), None, 1)
     assert (projective.is_identity, projective.reason) == (False, "the map is linear on projective space")
 
 
 def test_a_recurrence_that_does_not_fit_the_proof_is_not_given():
-    found = degree_growth(by_formulas("x,y", "y; y^3/x"))
-    assert found.recurrence.text.startswith("a(n) = 3*a(n-1)-a(n-2)")
-    other = replace(found.proof, rate=replace(found.proof.rate, minimal_polynomial=fmpz_poly([-2, 1])))
-    assert replace(found, proof=other).recurrence is None
+    growth = degree_growth(by_formulas("x,y", "y; y^3/x"))
+    assert growth.recurrence.text.startswith("a(n) = 3*a(n-1)-a(n-2)")
+    other = replace(growth.proof, rate=replace(growth.proof.rate, minimal_polynomial=fmpz_poly([-2, 1])))
+    assert replace(growth, proof=other).recurrence is None
 
 
 DIMENSION_5 = "b; c; d; e; 3/(b*c*d*e) - a - b - c - d - e"
@@ -180,12 +180,12 @@ def test_the_hypersurfaces_of_a_map_of_dimension_5_are_written():
     ("variables", "image"), [("a,b,c,d", "b; c; d; 3/(b*c*d) - a - b - c - d"), ("a,b,c,d,e", DIMENSION_5)]
 )
 def test_published_maps_of_dimension_4_and_5_have_derived_quadratic_growth(variables, image):
-    found = degree_growth(by_formulas(variables, image), max_terms=20)
-    assert (str(found.growth), found.derived is not None) == ("quadratic", True)
+    growth = degree_growth(by_formulas(variables, image), max_terms=20)
+    assert (str(growth.growth), growth.derived is not None) == ("quadratic", True)
 
 
 @pytest.mark.parametrize(("k", "rate"), [(3, "3"), (5, "5"), (4, "t^2 - 4*t + 1"), (6, "t^2 - 6*t + 1")])
 def test_the_published_rates_of_a_planar_family(k, rate):
-    found = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), enclosed=False)
-    assert found.derived is not None
-    assert found.dynamical_degree.text.endswith(rate)
+    growth = degree_growth(by_formulas("x,y", f"y; -x + 1/y^{k}"), enclosed=False)
+    assert growth.derived is not None
+    assert growth.dynamical_degree.text.endswith(rate)

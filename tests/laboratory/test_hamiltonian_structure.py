@@ -32,30 +32,30 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 def checked(system: QuadraticSystem) -> ConstantStructures:
     """What is found, after checking every claim of it exactly."""
-    found = constant_structures(system)
-    for K, H in zip(found.forms, found.functions, strict=True):
+    structures = constant_structures(system)
+    for K, H in zip(structures.forms, structures.functions, strict=True):
         assert linear_combinations(K, system.rhs) == gradient(H)
-    if found.hamiltonian is None:
-        assert found.reason
-        assert found.casimirs == ()
-        return found
-    assert found.reason == ""
-    assert found.hamiltonian.system.rhs == system.rhs
-    J = found.hamiltonian.J
-    assert len(found.casimirs) == system.dim - rank(QQ, J)
-    for casimir in found.casimirs:
+    if structures.hamiltonian is None:
+        assert structures.reason
+        assert structures.casimirs == ()
+        return structures
+    assert structures.reason == ""
+    assert structures.hamiltonian.system.rhs == system.rhs
+    J = structures.hamiltonian.J
+    assert len(structures.casimirs) == system.dim - rank(QQ, J)
+    for casimir in structures.casimirs:
         slopes = fmpq_mat([[slope.leading_coefficient() for slope in gradient(casimir)]])
         assert all(entry == 0 for entry in (slopes * J).entries())
         assert linear_combinations(slopes, system.rhs)[0].is_zero()
-    return found
+    return structures
 
 
-def conserved(found: ConstantStructures, seed: int = 1) -> bool:
+def conserved(structures: ConstantStructures, seed: int = 1) -> bool:
     """Whether the Kahan map conserves the integral and the measure at one exact point."""
-    integral, density = ModifiedHamiltonian(found.hamiltonian), DeterminantDensity(found.system)
+    integral, density = ModifiedHamiltonian(structures.hamiltonian), DeterminantDensity(structures.system)
     eps = fmpq(1, 9)
-    phi = KahanMap(found.system, eps)
-    x = random_point(found.system.dim, seed)
+    phi = KahanMap(structures.system, eps)
+    x = random_point(structures.system.dim, seed)
     if phi.determinant(x) == 0 or phi.determinant(phi.step(x)) == 0:
         return True
     image = phi.step(x)
@@ -68,23 +68,23 @@ def test_the_hamiltonian_systems_of_the_catalogue(name: str) -> None:
     file = load(name)
     known = file.hamiltonian
     assert known is not None
-    found = checked(file.system)
-    assert found.hamiltonian is not None
-    assert found.hamiltonian.is_standard == known.is_standard
+    report = checked(file.system)
+    assert report.hamiltonian is not None
+    assert report.hamiltonian.is_standard == known.is_standard
     if known.is_standard:
-        assert (found.hamiltonian.H - known.H).is_constant()
-    assert found.casimirs == ()
-    assert conserved(found)
+        assert (report.hamiltonian.H - known.H).is_constant()
+    assert report.casimirs == ()
+    assert conserved(report)
 
 
 def test_degenerate_structures() -> None:
     for name in ("dressing_chain_3", "volterra_periodic_3"):
-        found = checked(load(name).system)
-        assert [str(casimir) for casimir in found.casimirs] == ["x1 + x2 + x3"]
-        assert conserved(found)
-    assert found.hamiltonian is not None
-    assert str(found.hamiltonian.H) == "-x1*x2*x3"
-    assert found.hamiltonian.J == fmpq_mat([[0, 1, -1], [-1, 0, 1], [1, -1, 0]])
+        report = checked(load(name).system)
+        assert [str(casimir) for casimir in report.casimirs] == ["x1 + x2 + x3"]
+        assert conserved(report)
+    assert report.hamiltonian is not None
+    assert str(report.hamiltonian.H) == "-x1*x2*x3"
+    assert report.hamiltonian.J == fmpq_mat([[0, 1, -1], [-1, 0, 1], [1, -1, 0]])
 
 
 @pytest.mark.parametrize(
@@ -97,9 +97,9 @@ def test_degenerate_structures() -> None:
     ],
 )
 def test_systems_without_a_constant_structure_say_why(system, proved, words) -> None:
-    found = checked(system)
-    assert (found.hamiltonian, found.proved) == (None, proved)
-    assert words in found.reason
+    report = checked(system)
+    assert (report.hamiltonian, report.proved) == (None, proved)
+    assert words in report.reason
 
 
 @st.composite
@@ -120,14 +120,14 @@ def hamiltonians(draw: st.DrawFn) -> CubicHamiltonian:
 @settings(max_examples=20)
 @given(hamiltonians(), st.integers(0, 50))
 def test_random_structures(hamiltonian: CubicHamiltonian, seed: int) -> None:
-    found = checked(hamiltonian.system)
+    report = checked(hamiltonian.system)
     if hamiltonian.J.det() != 0:
-        assert found.hamiltonian is not None
-        assert found.casimirs == ()
-    if found.hamiltonian is None:
-        assert not found.proved  # there is one, with a kernel that was not tried
+        assert report.hamiltonian is not None
+        assert report.casimirs == ()
+    if report.hamiltonian is None:
+        assert not report.proved  # there is one, with a kernel that was not tried
     else:
-        assert conserved(found, seed)
+        assert conserved(report, seed)
 
 
 def lotka_volterra(n: int, k: int) -> SystemFile:
@@ -160,21 +160,21 @@ CASES = [
 
 @pytest.mark.parametrize(("file", "affine", "modified"), CASES)
 def test_the_numbers_of_integrals_that_theorems_give(file, affine, modified):
-    found = inherited_integrals(file.system)
-    assert (len(found.quotient.integrals), len(found.forms)) == (affine, modified)
-    assert [found.count(map_) for map_ in Laboratory(file).maps] == [affine + modified] * 2
+    integrals = inherited_integrals(file.system)
+    assert (len(integrals.quotient.integrals), len(integrals.forms)) == (affine, modified)
+    assert [integrals.count(map_) for map_ in Laboratory(file).maps] == [affine + modified] * 2
 
 
 @pytest.mark.parametrize("file", [DRIVEN, DEGENERATE])
 def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singular_form(file):
-    found, rng = inherited_integrals(file.system), random.Random(3)
-    for k, form in enumerate(found.forms):
-        H, values = found.hamiltonian(k), []
+    result, rng = inherited_integrals(file.system), random.Random(3)
+    for k, form in enumerate(result.forms):
+        H, values = result.hamiltonian(k), []
         kahan = KahanMap(file.system, fmpq(1, 9))
         x = kahan.point([fmpq(rng.randint(-9, 9), rng.randint(2, 5)) for _ in range(file.system.dim)])
         energies = set()
         for _ in range(4):
-            values.append(found.modified(k, QQ, fmpq(1, 9), x))
+            values.append(result.modified(k, QQ, fmpq(1, 9), x))
             energies.add(H(*x))
             x = kahan.step(x)
         assert len(set(values)) == 1
@@ -184,9 +184,9 @@ def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singul
 
 @pytest.mark.parametrize("eps", [None, "1/9"])
 def test_what_a_theorem_gives_is_written_out_where_relations_show_nothing(eps):
-    (one,) = find_integrals(DRIVEN, eps=eps, max_degree=1).integrals
-    assert (one.origin, one.verdict) == ("modified Hamiltonian (cmoq-2013)", Certainty.PROVED)
-    values = values_on_orbits(DRIVEN, one.text, ["1/9"])
+    (entry,) = find_integrals(DRIVEN, eps=eps, max_degree=1).integrals
+    assert (entry.origin, entry.verdict) == ("modified Hamiltonian (cmoq-2013)", Certainty.PROVED)
+    values = values_on_orbits(DRIVEN, entry.text, ["1/9"])
     assert [len(each) for each in values] == [1, 1, 1]
     assert len(set().union(*values)) > 1
 
@@ -194,21 +194,21 @@ def test_what_a_theorem_gives_is_written_out_where_relations_show_nothing(eps):
 @pytest.mark.parametrize(("file", "products"), [(lotka_volterra(6, 3), 1)])
 def test_no_search_reports_fewer_integrals_than_theorems_give(file, products):
     """Relations of degree 1 show the affine integrals only; products of invariant hyperplanes are found beside them."""
-    found = find_integrals(file, max_degree=1)
-    assert found.codimension == found.by_theorems + products > found.profile.codimension
-    assert not found.is_exact
-    assert f"in all at least {found.codimension} independent ({found.by_theorems} by theorems" in found.count_text
-    as_json = found.to_json()
-    assert (as_json["codimension"], as_json["by_theorems"]) == (found.codimension, found.by_theorems)
+    search = find_integrals(file, max_degree=1)
+    assert search.codimension == search.by_theorems + products > search.profile.codimension
+    assert not search.is_exact
+    assert f"in all at least {search.codimension} independent ({search.by_theorems} by theorems" in search.count_text
+    as_json = search.to_json()
+    assert (as_json["codimension"], as_json["by_theorems"]) == (search.codimension, search.by_theorems)
     assert as_json["codimension_is_exact"] is False
 
 
 def test_with_symbols_theorems_are_asked_at_random_values():
     file = system("x y z", "y + a*x^2", "-2*a*x*y - x", "x*z + b", a="1", b="0")
-    found = find_integrals(file, symbols=["a", "b"], max_degree=1)
-    assert (found.by_theorems, found.codimension, found.integrals) == (1, 1, ())
-    assert "1 of the 1 independent integrals has no closed form" in found.reason
-    assert "1 by theorems: 1 modified Hamiltonian, at random values of a, b" in found.count_text
+    search = find_integrals(file, symbols=["a", "b"], max_degree=1)
+    assert (search.by_theorems, search.codimension, search.integrals) == (1, 1, ())
+    assert "1 of the 1 independent integrals has no closed form" in search.reason
+    assert "1 by theorems: 1 modified Hamiltonian, at random values of a, b" in search.count_text
     # x' has no y at a = 0: what holds there only is no theorem for every a
     special = system("x y", "x*y", "-x*y + a*x", a="0")
     assert find_integrals(special, symbols=["a"], max_degree=2).by_theorems == 0

@@ -45,9 +45,9 @@ def maps(file, eps=None, seed=0):
 def test_bases_have_the_dimensions_of_the_literature(name, k):
     file = load(name)
     known = relations(file.catalog, file.variables)[k]
-    labels = [str(one) for one in known.functions]
-    found = hirota_kimura_basis(maps(file), known.functions, labels)
-    assert (found.dimension, found.agree, found.period) == (known.dimension, True, None)
+    labels = [str(entry) for entry in known.functions]
+    basis = hirota_kimura_basis(maps(file), known.functions, labels)
+    assert (basis.dimension, basis.agree, basis.period) == (known.dimension, True, None)
     if known.text.startswith("degree <= "):
         degree = int(known.text.removeprefix("degree <= "))
         assert len(relations_on_orbit(maps(file)[0], degree).vectors) == known.dimension
@@ -78,13 +78,13 @@ def test_a_perturbed_system_loses_its_relations():
 def test_which_coefficients_are_integrals():
     file = load("volterra_periodic_3")
     texts = ["x1 + x2 + x3", "x1 + x2", "x3", "1"]
-    found = hirota_kimura_basis(maps(file), relation_functions(texts, file.variables), texts)
+    basis = hirota_kimura_basis(maps(file), relation_functions(texts, file.variables), texts)
     # the first is the sum of the next two on every orbit, and equal to a number that depends on the orbit
-    assert found.dimension == 2
-    assert sum(row.count(False) for row in found.constant) > 0
+    assert basis.dimension == 2
+    assert sum(row.count(False) for row in basis.constant) > 0
     independent = hirota_kimura_basis(maps(file), relation_functions(texts[1:3], file.variables), texts[1:3])
     assert (independent.dimension, independent.constant) == (0, ())
-    assert found.to_json()["integrals"] == [[not same for same in row] for row in found.constant]
+    assert basis.to_json()["integrals"] == [[not same for same in row] for row in basis.constant]
 
 
 FURTHER = Path(__file__).parent / "further_systems"

@@ -1,5 +1,5 @@
-"""Formulas that were found are put to the proof: what is expanded decides, and what has no value is undecided. Where
-the planes of a member separate, identities are short; they are the same ones.
+"""Formulas that were found are certified: an expansion decides, and an undefined formula is undecided. Where the
+planes of a member separate, identities are short; they are the same ones.
 """
 
 from functools import partial
@@ -70,12 +70,12 @@ def file_with(rhs: str, **values: str) -> SystemFile:
 
 def test_a_density_with_symbols_is_for_those_at_which_it_is_not_zero():
     lines = file_with('["(a*x + b*y + c)*x", "2*(a*x + b*y + c)*y"]', a="1", b="2", c="3")
-    (found,) = find_densities(lines, symbols=("a", "b", "c")).densities
-    assert found.evidence.summary.endswith("for every eps and every a, b, c where a, b, c are not all 0")
+    (result,) = find_densities(lines, symbols=("a", "b", "c")).densities
+    assert result.evidence.summary.endswith("for every eps and every a, b, c where a, b, c are not all 0")
     # The second line is c = a - 1, which is not 0 where the first, a, is.
     lines = file_with('["(a*x + b*y)*x", "2*(a*x + b*y)*y"]', a="1", b="2")
-    (found,) = find_densities(lines, symbols=("a",)).densities
-    assert found.evidence.summary.endswith("for every eps and every a")
+    (result,) = find_densities(lines, symbols=("a",)).densities
+    assert result.evidence.summary.endswith("for every eps and every a")
 
 
 def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_bound(monkeypatch):

@@ -34,11 +34,11 @@ def independent(functions, file, others=(), symbols=()):
 @pytest.mark.parametrize("name", quick(PLANE_AND_SPACE, [n for n in PLANE_AND_SPACE if n not in LONG][::2]))
 def test_the_integrals_of_the_literature_are_found(name):
     file = load(name)
-    found = integrals_of(name)
-    functions = [one.function for one in found.integrals]
-    assert len(functions) == found.codimension == FOUND[name]
-    assert all(one.verdict is Certainty.PROVED for one in found.integrals)
-    assert (found.is_complete, found.reason, found.note) == (True, "", "")
+    integrals = integrals_of(name)
+    functions = [integral.function for integral in integrals.integrals]
+    assert len(functions) == integrals.codimension == FOUND[name]
+    assert all(integral.verdict is Certainty.PROVED for integral in integrals.integrals)
+    assert (integrals.is_complete, integrals.reason, integrals.note) == (True, "", "")
     known = list(file.integrals.values())
     number, of_known, of_all = independent(functions, file, known)
     assert number == of_all == len(functions)  # the known ones are functions of those found
@@ -48,8 +48,8 @@ def test_the_integrals_of_the_literature_are_found(name):
 @pytest.mark.parametrize("name", ["euler_top", "nahm_octahedral", "volterra_periodic_4"])
 def test_formulas_are_constant_along_exact_orbits(name):
     file = load(name)
-    for one in integrals_of(name).integrals:
-        values = values_on_orbits(file, one.text, EPS)
+    for integral in integrals_of(name).integrals:
+        values = values_on_orbits(file, integral.text, EPS)
         assert [len(each) for each in values] == [1] * 9
         assert len(set().union(*values)) >= 3  # and not constants
 
@@ -62,22 +62,22 @@ def test_exact_orbits_refute_a_wrong_formula():
 def test_formulas_with_symbols_are_those_with_numbers(name, symbols):
     general = integrals_of(name, *symbols)
     assert (len(general.integrals), general.symbols) == (load(name).catalog["codimension"], tuple(symbols))
-    assert all(one.verdict is Certainty.PROVED for one in general.integrals)
+    assert all(integral.verdict is Certainty.PROVED for integral in general.integrals)
     rng = random.Random(name)
     chosen = {symbol: fmpq(rng.randint(1, 9), rng.randint(1, 9)) for symbol in symbols}
     file = load(name, chosen)
     special = find_integrals(file)
     # as functions of each other: the gradients span the same space
-    texts = [parse_rational_function(one.text, (*file.variables, "eps"), chosen) for one in general.integrals]
-    assert independent(texts, file, [one.function for one in special.integrals]) == (len(texts),) * 3
-    for one in general.integrals:
-        assert {len(each) for each in values_on_orbits(file, one.text, EPS, starts=1, **chosen)} == {1}
+    texts = [parse_rational_function(integral.text, (*file.variables, "eps"), chosen) for integral in general.integrals]
+    assert independent(texts, file, [integral.function for integral in special.integrals]) == (len(texts),) * 3
+    for entry in general.integrals:
+        assert {len(each) for each in values_on_orbits(file, entry.text, EPS, starts=1, **chosen)} == {1}
 
 
 @pytest.mark.parametrize(("dim", "seed"), [(2, 0), (3, 1)])
 def test_random_systems_have_none(dim, seed):
-    found = find_integrals(random_system(dim, seed), max_degree=4)
-    assert (found.integrals, found.codimension, found.reason, found.toml_section()) == ((), 0, "", "")
+    search = find_integrals(random_system(dim, seed), max_degree=4)
+    assert (search.integrals, search.codimension, search.reason, search.toml_section()) == ((), 0, "", "")
 
 
 @pytest.mark.parametrize(
@@ -91,38 +91,38 @@ def test_random_systems_have_none(dim, seed):
     ],
 )
 def test_simple_systems(file, texts, period):
-    found = find_integrals(file)
-    assert ([one.text for one in found.integrals], found.profile.period) == (texts, period)
-    assert found.is_complete
-    assert found.profile.complete
+    search = find_integrals(file)
+    assert ([integral.text for integral in search.integrals], search.profile.period) == (texts, period)
+    assert search.is_complete
+    assert search.profile.complete
 
 
 @pytest.mark.parametrize(
     ("file", "eps", "period"), [(system("x y", "y", "-x + x^2"), 1, 4), (system("x", "1 + x^2"), "1/2", 4)]
 )
 def test_maps_that_are_periodic_at_an_eps(file, eps, period):
-    found = find_integrals(file, eps=eps)
-    assert (found.profile.period, len(found.integrals)) == (period, file.system.dim)
-    assert found.note == closing_note(period, found.eps, file.map)
-    assert "nothing follows for other eps" in found.to_json()["note"]
-    for one in found.integrals:
-        assert one.evidence.summary.endswith(f"for eps = {eps}")
+    search = find_integrals(file, eps=eps)
+    assert (search.profile.period, len(search.integrals)) == (period, file.system.dim)
+    assert search.note == closing_note(period, search.eps, file.map)
+    assert "nothing follows for other eps" in search.to_json()["note"]
+    for entry in search.integrals:
+        assert entry.evidence.summary.endswith(f"for eps = {eps}")
         # constant at this eps; at another one they are not all
-        assert {len(each) for each in values_on_orbits(file, one.text, [eps])} == {1}
-    others = [len(each) for one in found.integrals for each in values_on_orbits(file, one.text, ["1/7"])]
+        assert {len(each) for each in values_on_orbits(file, entry.text, [eps])} == {1}
+    others = [len(each) for integral in search.integrals for each in values_on_orbits(file, integral.text, ["1/7"])]
     assert max(others) > 1
 
 
 @pytest.mark.parametrize("name", ["euler_top", "volterra_periodic_4", "lotka_volterra", "lyness"])
 def test_a_search_finds_all_or_says_that_its_budget_was_spent(name):
     file = load(name)
-    whole = find_integrals(file).to_json()
+    complete = find_integrals(file).to_json()
     ended = 0
     for units in (100, 3000, 10_000, 30_000, 100_000, 10_000_000):
-        found = find_integrals(file, effort=Budget(units))
-        told = "work limit reached" in found.reason
-        assert told or found.to_json() == whole
-        ended += told
+        search = find_integrals(file, effort=Budget(units))
+        messages = "work limit reached" in search.reason
+        assert messages or search.to_json() == complete
+        ended += messages
     assert 3 <= ended < 6
 
 
@@ -134,26 +134,26 @@ def test_hamiltonian_planes_always_have_one(coefficients):
     H = "+".join(f"({c})*{m}" for c, m in zip(coefficients, monomials, strict=True))
     polynomial = parse_rational_function(H, ["x", "y"]).numerator
     file = system("x y", str(polynomial.derivative(1)), str(-polynomial.derivative(0)))
-    found = find_integrals(file)
-    assert len(found.integrals) >= 1
-    assert found.is_complete
-    for one in found.integrals:
-        assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}
+    search = find_integrals(file)
+    assert len(search.integrals) >= 1
+    assert search.is_complete
+    for integral in search.integrals:
+        assert {len(each) for each in values_on_orbits(file, integral.text, ["1/9"], starts=1, steps=2)} == {1}
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_spaces_that_are_conjugate_over_an_extension_do_no_harm(seed):
     """At eps = 1, y + sqrt(-3) x and its conjugate have constant cofactors: spaces modulo one prime in two only."""
-    found = find_integrals(system("x y", "y", "-3*x"), eps=1, seed=seed)
-    assert [one.text for one in found.integrals] == ["3*x^2 + y^2", "x*(x^2 - y^2)"]
-    assert all(one.verdict is Certainty.PROVED for one in found.integrals)
+    search = find_integrals(system("x y", "y", "-3*x"), eps=1, seed=seed)
+    assert [integral.text for integral in search.integrals] == ["3*x^2 + y^2", "x*(x^2 - y^2)"]
+    assert all(integral.verdict is Certainty.PROVED for integral in search.integrals)
 
 
 def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.preserve.search.repeat_search", lambda *_: None)
-    found = find_integrals(load("euler_top"))
-    assert (found.integrals, found.codimension) == ((), 2)
-    assert found.reason == "the polynomials found at one eps do not exist at another"
+    search = find_integrals(load("euler_top"))
+    assert (search.integrals, search.codimension) == ((), 2)
+    assert search.reason == "the polynomials search at one eps do not exist at another"
 
 
 UP_TO_2 = "relations of degree up to 2 along orbits"
@@ -176,9 +176,9 @@ def test_integrals_are_counted_by_theorems_orbits_and_formulas(
     dim, codimensions, period, known, proved, formulas, properties, text
 ):
     profile = Profile(dim, codimensions, codimensions, period, True, True, known)
-    found = IntegralSearch(load("riccati"), (), None, 0, (), (None,) * formulas, profile, "", proved, "T")
-    assert (found.codimension, found.is_exact, found.is_complete) == properties
-    assert found.count_text == text
+    search = IntegralSearch(load("riccati"), (), None, 0, (), (None,) * formulas, profile, "", proved, "T")
+    assert (search.codimension, search.is_exact, search.is_complete) == properties
+    assert search.count_text == text
 
 
 def test_formulas_with_symbols_that_depend_at_the_values_of_the_file_say_so():
@@ -231,10 +231,10 @@ def image_of(names, last, scales, order):
 def test_all_integrals_of_recurrences_are_found(case, count, scales, order):
     names, last, known = case
     file = image_of(names, last, scales, order)
-    found = find_integrals(file)
-    assert (len(found.integrals), found.codimension, found.reason) == (count, count, "")
-    assert all(one.verdict is Certainty.PROVED for one in found.integrals)
+    search = find_integrals(file)
+    assert (len(search.integrals), search.codimension, search.reason) == (count, count, "")
+    assert all(integral.verdict is Certainty.PROVED for integral in search.integrals)
     texts = ["".join(f"({scales[names.index(c)]}*{c})" if c in names else c for c in text) for text in known]
     functions = [parse_rational_function(text, [*file.variables, "eps"]) for text in texts]
-    number, _, of_all = ranks([one.function for one in found.integrals], functions, Laboratory(file).maps[0])
+    number, _, of_all = ranks([integral.function for integral in search.integrals], functions, Laboratory(file).maps[0])
     assert number == of_all == count  # the known ones are functions of those found

@@ -28,13 +28,13 @@ rhs = [
 """
 
 
-def searched(file, wanted=6, symbols=()):
+def searched(file, count=6, symbols=()):
     """The laboratory, the integrals in x and those in iterates that do not depend on the affine ones."""
     laboratory = Laboratory(file, symbols)
     map_ = laboratory.maps[0]
     known = Independent(map_)
     known.rows = [[int(entry) % map_.prime for entry in v] for v in affine_integrals(laboratory.system)]
-    plain, ratios, _ = integrals_in_iterates(laboratory, wanted, known, Budget())
+    plain, ratios, _ = integrals_in_iterates(laboratory, count, known, Budget())
     return laboratory, len(known.rows), [function for function, *_ in plain], [ratio for ratio, _ in ratios]
 
 
@@ -79,7 +79,7 @@ def test_a_map_that_is_not_integrable_gains_nothing(name, numbers):
 
 def test_a_ratio_that_is_not_conserved_is_refuted():
     file = load("clebsch_first_flow")
-    laboratory, _, _, [ratio, *_] = searched(file, wanted=1)
+    laboratory, _, _, [ratio, *_] = searched(file, count=1)
     P, Q = ratio.functions
     wrong = replace(ratio, functions=(P + 1, Q))
     assert verdict_on_ratio(laboratory, wrong)[0] is Certainty.REFUTED

@@ -63,35 +63,35 @@ THREE_LINES = [((1, 3, 3), 8), ((1, 2, 6), 10), ((2, 5, 3), 3)]
 
 @pytest.mark.parametrize(("system", "eps", "growth", "closed_form", "steps"), SLOW_GROWTH)
 def test_where_growth_is_slow_the_law_holds_far_beyond_the_last_confinement(system, eps, growth, closed_form, steps):
-    found = degree_growth(system, eps)
-    assert (str(found.growth), found.recurrence.closed_form_text) == (growth, closed_form)
+    result = degree_growth(system, eps)
+    assert (str(result.growth), result.recurrence.closed_form_text) == (growth, closed_form)
     true = [1, *polynomial_degrees(system, steps, 5, eps)]
-    assert [found.recurrence.predict(n) for n in range(steps + 1)] == true
-    assert len(found.degrees) > 2 * max(found.patterns.lengths)
+    assert [result.recurrence.predict(n) for n in range(steps + 1)] == true
+    assert len(result.degrees) > 2 * max(result.patterns.lengths)
 
 
 @pytest.mark.parametrize(("exponents", "first"), THREE_LINES)
 def test_three_lines_of_late_confinement_have_no_dynamical_degree_2(exponents, first):
     system = three_lines(*exponents)
-    found = degree_growth(system, max_degree=3 * 2**first)
+    growth = degree_growth(system, max_degree=3 * 2**first)
     steps = first + 1
     true = polynomial_degrees(system, steps, 5)
     assert next(n for n, d in enumerate(true, 1) if d < 2**n) == first
-    assert list(found.degrees[1 : steps + 1]) == true[: len(found.degrees) - 1]
-    assert found.recurrence.predict(steps) == true[-1]
-    assert found.dynamical_degree is None or found.dynamical_degree.text != "2"
+    assert list(growth.degrees[1 : steps + 1]) == true[: len(growth.degrees) - 1]
+    assert growth.recurrence.predict(steps) == true[-1]
+    assert growth.dynamical_degree is None or growth.dynamical_degree.text != "2"
 
 
 def test_seven_degrees_are_derived_by_a_pattern_that_is_longer():
     """So few terms are all 2^n; the pattern that lowers those after them is seen by the singularities."""
     system = three_lines(1, 2, 6)
-    found = degree_growth(system, max_terms=7)
-    assert found.degrees == tuple(2**n for n in range(8))
-    assert [found.derived.predict(n) for n in range(1, 12)] == polynomial_degrees(system, 11, 5)
-    assert (found.basis, found.unconfirmed) == ("derived: no other confinement within 1000 steps", "")
+    growth = degree_growth(system, max_terms=7)
+    assert growth.degrees == tuple(2**n for n in range(8))
+    assert [growth.derived.predict(n) for n in range(1, 12)] == polynomial_degrees(system, 11, 5)
+    assert (growth.basis, growth.unconfirmed) == ("derived: no other confinement within 1000 steps", "")
     # Without what follows from the singularities there is an estimate only.
-    length = max(found.patterns.lengths)
-    measured = replace(found, patterns=replace(found.patterns, series=()))
+    length = max(growth.patterns.lengths)
+    measured = replace(growth, patterns=replace(growth.patterns, series=()))
     assert (measured.recurrence, measured.dynamical_degree) == (None, None)
     assert measured.growth == Growth.EXPONENTIAL  # proved by its bounds
     assert measured.growth_text == (
@@ -103,9 +103,9 @@ def test_seven_degrees_are_derived_by_a_pattern_that_is_longer():
 
 
 def test_degrees_that_contradict_the_singularities_are_no_result():
-    found = degree_growth(load("euler_top").system)
-    other = replace(found, degrees=(*found.degrees[:8], found.degrees[8] + 1, *found.degrees[9:]))
-    assert (found.disagreement, other.disagreement) == (None, 8)
+    growth = degree_growth(load("euler_top").system)
+    other = replace(growth, degrees=(*growth.degrees[:8], growth.degrees[8] + 1, *growth.degrees[9:]))
+    assert (growth.disagreement, other.disagreement) == (None, 8)
     assert (other.derived, other.recurrence, other.growth) == (None, None, Growth.UNKNOWN)
     assert "the measured degree of iterate 8 contradicts" in other.unconfirmed
 
@@ -137,9 +137,9 @@ def test_a_recurrence_needs_terms_beyond_all_patterns():
     assert growth_with(None, *linear).recurrence.closed_form == "n + 1"
     assert growth_with(Patterns((9,), None, True), *linear).recurrence.closed_form == "n + 1"
     for known in (Patterns((10,), None, True), Patterns((4, 6), 100, True), Patterns((), None, False, "no time")):
-        found = growth_with(known, *linear)
-        assert (found.recurrence, found.growth) == (None, Growth.UNKNOWN)
-        assert found.growth_text.startswith("13 terms fit linear growth, an estimate only: ")
+        growth = growth_with(known, *linear)
+        assert (growth.recurrence, growth.growth) == (None, Growth.UNKNOWN)
+        assert growth.growth_text.startswith("13 terms fit linear growth, an estimate only: ")
     # 13 terms, no hypersurface that could lower a degree, and yet the degrees are not 2^n
     assert "degrees drop although" in growth_with(Patterns((), 100, False), *linear).unconfirmed
     assert growth_with(Patterns((), 100, False), *(2**n for n in range(8))).dynamical_degree.text == "2"
@@ -153,33 +153,33 @@ LATE = [
 
 @pytest.mark.parametrize(("given", "kind", "growth"), quick(LATE, LATE[:1]))
 def test_the_parts_of_a_report_do_not_contradict_each_other(given, kind, growth):
-    found = analyze(file_from(*given))
-    assert (found.conclusion.kind, found.conclusion.growth) == (kind, growth)
-    assert contradictions(found) == []
-    true = polynomial_degrees(found.file.system, 14 if growth == "exponential" else 20, 3)
-    law = found.degrees.recurrence
+    analysis = analyze(file_from(*given))
+    assert (analysis.conclusion.kind, analysis.conclusion.growth) == (kind, growth)
+    assert contradictions(analysis) == []
+    true = polynomial_degrees(analysis.file.system, 14 if growth == "exponential" else 20, 3)
+    law = analysis.degrees.recurrence
     assert law is None or [law.predict(n) for n in range(1, len(true) + 1)] == true
-    assert "estimated" in found.conclusion.sentence or law is not None
-    assert found.degrees.patterns == patterns_of(found.singularities)
-    lines = [line for _, section in found.sections for line in section]
-    last = max(h.confined_at or 0 for run in found.singularities for h in run.hypersurfaces)
+    assert "estimated" in analysis.conclusion.sentence or law is not None
+    assert analysis.degrees.patterns == patterns_of(analysis.singularities)
+    lines = [line for _, section in analysis.sections for line in section]
+    last = max(h.confined_at or 0 for run in analysis.singularities for h in run.hypersurfaces)
     assert f"the longest confined pattern has {last} steps" in [line.text for line in lines]
-    assert last < len(found.degrees.degrees) - 1
+    assert last < len(analysis.degrees.degrees) - 1
 
 
 def test_what_excludes_each_other_is_undecided():
-    found = analysis_of("weierstrass")
-    exponential = replace(found.degrees, degrees=tuple(2**n for n in range(12)), patterns=None)
-    both = replace(found, degrees=exponential)
+    analysis = analysis_of("weierstrass")
+    exponential = replace(analysis.degrees, degrees=tuple(2**n for n in range(12)), patterns=None)
+    both = replace(analysis, degrees=exponential)
     assert (both.conclusion.kind, contradictions(both)) == (
         "undecided",
         ["the degrees seem to grow exponentially, which they cannot if integrals confine orbits to curves"],
     )
     # An estimate gives way to what is proved.
-    estimate = replace(found, degrees=replace(exponential, patterns=Patterns((30,), None, True)))
+    estimate = replace(analysis, degrees=replace(exponential, patterns=Patterns((30,), None, True)))
     assert estimate.conclusion.kind == "integrable"
-    closed = replace(found.integrals, profile=replace(found.integrals.profile, period=4))
-    assert contradictions(replace(found, integrals=closed)) == [
+    closed = replace(analysis.integrals, profile=replace(analysis.integrals.profile, period=4))
+    assert contradictions(replace(analysis, integrals=closed)) == [
         "orbits close after 4 steps, but the degrees seem to grow"
     ]
 
@@ -205,8 +205,8 @@ def test_heights_and_degrees_that_disagree_are_reported():
     assert beside(quadratic, quadratic, (4, 11)) == late
     assert beside(quadratic, Growth.BOUNDED, (4, 11)) == f"the degrees are bounded: {late}"
     assert beside(Growth.UNDECIDED, quadratic, (4, 11)) == beside(quadratic, quadratic, None, (2,)) == ""
-    found = analysis_of("weierstrass")
-    other = replace(found, degrees=replace(found.degrees, degrees=(20,) * 30, patterns=None))
+    analysis = analysis_of("weierstrass")
+    other = replace(analysis, degrees=replace(analysis.degrees, degrees=(20,) * 30, patterns=None))
     (line,) = [line for line in dict(other.sections)["growth"] if line.text.startswith("bit lengths")]
     assert (line.status, "are bounded" in line.text) == ("undecided", True)
 
@@ -217,12 +217,12 @@ def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others()
     form = HypersurfaceForm(x**2 - 2 * z**2, False, None)
     for seed, units in enumerate((1e6, 1e6, 1e6, 1e6, 0)):
         limits = Range(4, 4, 4, Budget(units), 4)
-        found = outcome_of(load("lorenz").map, fmpq(1, 7), form, "?", random.Random(seed), limits)
+        outcome = outcome_of(load("lorenz").map, fmpq(1, 7), form, "?", random.Random(seed), limits)
         if units == 0:
-            assert (found.status, found.note) == (UNDECIDED, BUDGET_SPENT)
+            assert (outcome.status, outcome.note) == (UNDECIDED, BUDGET_SPENT)
             continue
-        assert (found.status, found.degree, len(set(found.primes))) == (NOT_CONTRACTED, 2, 2)
-        assert [(step.common, step.rank) for step in found.steps] == [(0, 2)] * 4
+        assert (outcome.status, outcome.degree, len(set(outcome.primes))) == (NOT_CONTRACTED, 2, 2)
+        assert [(step.common, step.rank) for step in outcome.steps] == [(0, 2)] * 4
 
 
 def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():

@@ -1,4 +1,4 @@
-"""What a map makes of the integrals of its differential equation: keeps, deforms, loses."""
+"""What a map makes of the integrals of its differential equation: conserves, deforms, loses."""
 
 from dataclasses import replace
 from functools import cache
@@ -50,12 +50,12 @@ def with_integrals(search, *texts):
     ],
 )
 def test_integrals_of_the_map_tend_to_integrals_of_the_flow(name, leading, kept):
-    found = beside(name)
-    assert [format_rational_function(one.leading) for one in found.limits] == leading
-    assert [one.kept.holds for one in found.limits] == kept
-    assert (found.others, found.lost, found.without_limit) == ((), 0, 0)
+    result = beside(name)
+    assert [format_rational_function(limit.leading) for limit in result.limits] == leading
+    assert [limit.conserved.holds for limit in result.limits] == kept
+    assert (result.other_integrals, result.lost, result.without_limit) == ((), 0, 0)
     system = load(name).system
-    assert all(is_kept_by_flow(system, one.leading) for one in found.limits)
+    assert all(is_kept_by_flow(system, limit.leading) for limit in result.limits)
 
 
 @pytest.mark.parametrize("name", ["euler_top", "weierstrass"])
@@ -64,45 +64,47 @@ def test_the_combination_has_the_reported_series(name):
     search = integrals_of(name)
     names = [*search.file.variables, "eps"]
     field = FunctionField(names, reduces=True)
-    for one in flow_and_map(search).limits:
-        formula = parse_rational_function(one.combination, [*(each.name for each in search.integrals), "eps"])
+    for limit in flow_and_map(search).limits:
+        formula = parse_rational_function(limit.combination, [*(each.name for each in search.integrals), "eps"])
         values = [each.function.value(field, field.variables) for each in search.integrals]
-        above, below = (
+        numerator, denominator = (
             evaluate(part, field, [*values, field.variables[-1]]) for part in (formula.numerator, formula.denominator)
         )
-        rest = above / below - one.leading.value(field, field.variables[: len(names) - 1])
-        if one.second is None:
-            assert field.is_zero(rest)
+        remainder = numerator / denominator - limit.leading.value(field, field.variables[: len(names) - 1])
+        if limit.second is None:
+            assert field.is_zero(remainder)
             continue
-        assert order_in_eps(rest) == one.order
-        rest = rest - field.variables[-1] ** one.order * one.second.value(field, field.variables[: len(names) - 1])
-        assert field.is_zero(rest) or order_in_eps(rest) > one.order
+        assert order_in_eps(remainder) == limit.order
+        remainder = remainder - field.variables[-1] ** limit.order * limit.second.value(
+            field, field.variables[: len(names) - 1]
+        )
+        assert field.is_zero(remainder) or order_in_eps(remainder) > limit.order
 
 
 def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured():
     for search, formula in ((find_integrals(THREE_LINES), "x*y^3*(x + 2*y)^3"), (integrals_of("zander_120"), "x*y^2")):
-        found = flow_and_map(search)
-        assert [one.text for one in found.others] == [formula]
-        assert found.lost == 1
-        assert ("measured", "F1 is lost up to degree 14: the map shows no integral") in found.lines()
+        comparison = flow_and_map(search)
+        assert [integral.text for integral in comparison.other_integrals] == [formula]
+        assert comparison.lost == 1
+        assert ("measured", "F1 is lost up to degree 14: the map shows no integral") in comparison.lines()
 
 
 def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
     search = integrals_of("euler_top")
     known = flow_and_map(replace(search, integrals=search.integrals[:1]))
-    assert (len(known.limits), len(known.others), known.without_limit, known.lost) == (1, 1, 1, 0)
+    assert (len(known.limits), len(known.other_integrals), known.without_limit, known.lost) == (1, 1, 1, 0)
     assert ("undecided", "what the map makes of F2: the limits of 1 integral are not known") in known.lines()
     uncounted = replace(search.profile, nullities=(), codimensions=(), with_known=0)
     uncounted = flow_and_map(replace(search, integrals=(), profile=uncounted, by_theorems=0))
-    assert (len(uncounted.others), uncounted.lost) == (2, 0)
+    assert (len(uncounted.other_integrals), uncounted.lost) == (2, 0)
     assert ("undecided", "what the map makes of F1, F2: its integrals were not counted") in uncounted.lines()
 
 
 def test_a_transcendental_integral_is_neither_seen_nor_lost():
-    found = beside("lotka_volterra")
-    assert (found.limits, found.others, found.lost) == ((), (), 0)
-    assert not any("lost" in text for _, text in found.lines())
-    assert found.lines()[0] == (
+    result = beside("lotka_volterra")
+    assert (result.limits, result.other_integrals, result.lost) == ((), (), 0)
+    assert not any("lost" in text for _, text in result.lines())
+    assert result.lines()[0] == (
         "measured",
         "no rational integral of the flow shows in relations along solutions up to degree 10",
     )
@@ -113,16 +115,16 @@ def test_a_transcendental_integral_is_neither_seen_nor_lost():
 )
 def test_leading_terms_that_depend_on_each_other_are_combined(second):
     search = with_integrals(integrals_of("volterra_periodic_3"), f"1 + eps*{SUM}", second)
-    found = flow_and_map(search)
-    assert format_rational_function(found.limits[0].leading) == "x1 + x2 + x3"
-    assert (len(found.limits), found.others, found.without_limit) == (2, (), 0)
+    comparison = flow_and_map(search)
+    assert format_rational_function(comparison.limits[0].leading) == "x1 + x2 + x3"
+    assert (len(comparison.limits), comparison.other_integrals, comparison.without_limit) == (2, (), 0)
 
 
 def test_a_function_that_is_no_integral_has_no_limit_among_those_of_the_flow():
     search = with_integrals(integrals_of("harmonic"), "x + eps*y")
-    found = flow_and_map(search)
-    assert found.limits == ()
-    assert found.without_limit == 1
+    comparison = flow_and_map(search)
+    assert comparison.limits == ()
+    assert comparison.without_limit == 1
 
 
 DENSITIES = [("zander_120", ["x*y*(x + 2*y)"]), ("euler_top", ["1"]), ("lotka_volterra", ["x*y"]), ("lorenz", [])]
@@ -136,8 +138,8 @@ def test_the_density_of_the_map_tends_to_one_of_the_flow(name, phi):
 
 def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():
     file = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["y + eps^2*x*y", "-x + eps^2*x^2"]')
-    [one] = find_integrals(file, flow=True).integrals
-    assert one.text == "x^2 + y^2"
+    [entry] = find_integrals(file, flow=True).integrals
+    assert entry.text == "x^2 + y^2"
     assert flow_and_map(find_integrals(file)).lost == 1
 
 
@@ -157,17 +159,17 @@ def integrals_of_duffing():
 
 def test_a_polarised_map_deforms_the_energy_of_a_cubic_field():
     """Its integral depends on two points, and tends to the energy where they are those of a solution (cmoq-2015)."""
-    found = flow_and_map(integrals_of_duffing())
-    [one] = found.limits
-    assert (format_rational_function(one.leading), one.kept.holds) == ("x^4 + 2*y^2", False)
-    assert one.text.endswith("the map deforms: I1/3 tends to L1 at successive points of one solution")
-    assert (found.others, found.lost, found.density.text) == ((), 0, "1")
+    comparison = flow_and_map(integrals_of_duffing())
+    [entry] = comparison.limits
+    assert (format_rational_function(entry.leading), entry.conserved.holds) == ("x^4 + 2*y^2", False)
+    assert entry.text.endswith("the map deforms: I1/3 tends to L1 at successive points of one solution")
+    assert (comparison.other_integrals, comparison.lost, comparison.density.text) == ((), 0, "1")
 
 
 def test_a_polarised_map_may_lose_an_integral():
     """x y^2 (x + y)^3/(x - y + 1), a product of lines that the field keeps zero."""
-    found = flow_and_map(find_integrals(polarised(*FOUR_LINES)))
-    assert [one.text for one in found.others] == ["x*y^2*(x + y)^3/(x - y + 1)"]
-    assert (found.limits, found.lost) == ((), 1)
-    assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, found.others[0].function)
-    assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, found.others[0].function)
+    comparison = flow_and_map(find_integrals(polarised(*FOUR_LINES)))
+    assert [integral.text for integral in comparison.other_integrals] == ["x*y^2*(x + y)^3/(x - y + 1)"]
+    assert (comparison.limits, comparison.lost) == ((), 1)
+    assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, comparison.other_integrals[0].function)
+    assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, comparison.other_integrals[0].function)

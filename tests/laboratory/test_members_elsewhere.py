@@ -54,17 +54,17 @@ def moved_member(name: str):
     return system, analysed(system, ANALYSES)
 
 
-def proved(found) -> list[str]:
-    return [line.text for _, lines in found.sections for line in lines if line.status == "proved"]
+def proved(result) -> list[str]:
+    return [line.text for _, lines in result.sections for line in lines if line.status == "proved"]
 
 
 @over_members
 def test_a_member_in_other_coordinates_is_recognised_with_what_follows(name):
     member = MEMBERS[name]
-    system, found = moved_member(name)
+    system, result = moved_member(name)
     assert find_family_structure_of(system) is None  # not as long as these coordinates are kept
     m = member.m
-    lines = proved(found)
+    lines = proved(result)
     (line,) = (line for line in lines if line.startswith("belongs to the commuting family: a recognised member"))
     assert line.endswith(" + T y")
     assert f"{m} independent integrals, as a member of the commuting family" in lines
@@ -73,24 +73,24 @@ def test_a_member_in_other_coordinates_is_recognised_with_what_follows(name):
     split = all(factor.degree == 1 for factor in member.factors)
     associated = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
     assert associated + ("" if split else " over the splitting field of chi") in lines
-    assert found.integral_count >= m
-    assert found.conclusion.kind == "integrable"
-    assert "It is Liouville integrable, as a member of the commuting family (proved)." in found.conclusion.sentence
+    assert result.integral_count >= m
+    assert result.conclusion.kind == "integrable"
+    assert "It is Liouville integrable, as a member of the commuting family (proved)." in result.conclusion.sentence
 
 
 @over_members
 def test_the_matrices_that_are_given_are_those_of_the_system(name):
-    system, found = moved_member(name)
-    record = found.to_json()
+    system, result = moved_member(name)
+    record = result.to_json()
     hamiltonian = constant_structures(system).hamiltonian
-    A, T, J = found.normal_form.A, found.normal_form.T, hamiltonian.J
+    A, T, J = result.normal_form.A, result.normal_form.T, hamiltonian.J
     assert J == T * standard_structure(system.dim) * T.transpose()
     assert A.transpose() * J == J * A
-    about = hamiltonian.about(found.centre)
+    about = hamiltonian.about(result.centre)
     assert belongs(A, about.H)
     assert not belongs(A + A.transpose(), about.H)
     assert record["member"]["A"] == [[str(entry) for entry in row] for row in A.tolist()]
-    assert record["member"]["centre"] == [str(c) for c in found.centre]
+    assert record["member"]["centre"] == [str(c) for c in result.centre]
     assert (record["member"]["integrals_in_involution"], record["member"]["associated_maps"]) == (
         system.dim // 2,
         2 ** (system.dim // 2 - 1),
@@ -99,28 +99,28 @@ def test_the_matrices_that_are_given_are_those_of_the_system(name):
 
 def test_a_cubic_that_is_no_member_is_not_taken_for_one():
     text = "x1^3 + 2*x2^3 + 3*x3^3 + 4*x4^3 + x1*x2*x3 + x1^2*x4"
-    found = analysed(elsewhere(parse_polynomial(text, default_variables(4)), 1))
-    assert found.normal_form.reason.startswith("only the multiples of I satisfy")
-    assert found.to_json()["member"] is found.to_json()["family"] is None
-    assert not any("commuting family" in line for line in proved(found))
-    assert "Liouville" not in found.conclusion.sentence
+    analysis = analysed(elsewhere(parse_polynomial(text, default_variables(4)), 1))
+    assert analysis.normal_form.reason.startswith("only the multiples of I satisfy")
+    assert analysis.to_json()["member"] is analysis.to_json()["family"] is None
+    assert not any("commuting family" in line for line in proved(analysis))
+    assert "Liouville" not in analysis.conclusion.sentence
 
 
 def test_a_member_with_a_repeated_root_is_said_to_be_one_and_no_more():
-    found = analysed(elsewhere(parse_polynomial("x1^2*x2", default_variables(4)), 3))
-    lines = [line for line in proved(found) if "commuting family" in line]
+    analysis = analysed(elsewhere(parse_polynomial("x1^2*x2", default_variables(4)), 3))
+    lines = [line for line in proved(analysis) if "commuting family" in line]
     assert [line.split(", in coordinates")[0] for line in lines] == [
         "belongs to the commuting family: a recognised member of the family, chi = (t - 1)^2"
     ]
-    assert found.to_json()["member"] is None
+    assert analysis.to_json()["member"] is None
 
 
 def test_degrees_that_seem_exponential_do_not_go_with_a_member():
     _, known = moved_member("m = 2, split")
     doubling = degree_growth(load("lotka_volterra").system, max_terms=12)
-    found = replace(known, degrees=doubling)
-    assert contradictions(found) == [
+    result = replace(known, degrees=doubling)
+    assert contradictions(result) == [
         "the degrees seem to grow exponentially, which they cannot for a member of the commuting family"
     ]
-    assert found.conclusion.kind == "undecided"
-    assert contradictions(replace(found, normal_form=None)) == []
+    assert result.conclusion.kind == "undecided"
+    assert contradictions(replace(result, normal_form=None)) == []

@@ -76,8 +76,8 @@ def test_the_echelon_form_depends_on_the_span_alone(rows, rng):
 
 def test_an_orbit_that_closes_has_each_of_its_points_once():
     # a quarter of a turn
-    found = orbit_from((1, 2), modular(system("x y", "y", "-x"), eps=1), 20)
-    assert found == [(1, 2), (2, PRIME - 1), (PRIME - 1, PRIME - 2), (PRIME - 2, 1)]
+    result = orbit_from((1, 2), modular(system("x y", "y", "-x"), eps=1), 20)
+    assert result == [(1, 2), (2, PRIME - 1), (PRIME - 1, PRIME - 2), (PRIME - 2, 1)]
     assert len(modular(system("x y", "0", "0")).orbit(20)) == 1
     assert len(modular(load("lorenz")).orbit(20)) == 20
 

@@ -20,7 +20,7 @@ CUBIC = "root of t^3 - t - 1"
 def test_integrals_and_densities_are_found_and_proved_over_the_number_field(equations, a, count):
     file = km.System(equations, a=a)
     integrals, densities = km.find_integrals(file), km.find_density(file)
-    assert [str(one.verdict) for one in integrals.integrals] == ["proved"] * count
+    assert [str(integral.verdict) for integral in integrals.integrals] == ["proved"] * count
     assert integrals.codimension == count
     assert densities.densities[0].verdict is Certainty.PROVED
     # What is printed is read back, and checked by another way.
@@ -29,9 +29,9 @@ def test_integrals_and_densities_are_found_and_proved_over_the_number_field(equa
 
 
 def test_what_was_found_for_one_number_is_refuted_for_others():
-    found = km.find_integrals(km.System(TOP, a="root of t^2 - 2")).toml_section()
+    result = km.find_integrals(km.System(TOP, a="root of t^2 - 2")).toml_section()
     for other, expected in (("root of t^2 - 2", Certainty.PROVED), ("root of t^2 - 3", Certainty.REFUTED)):
-        file = km.parse_system(km.System(TOP, a=other).to_toml() + found)
+        file = km.parse_system(km.System(TOP, a=other).to_toml() + result)
         assert km.check_integrals(file).verdict is expected
 
 
@@ -42,13 +42,13 @@ def test_coefficients_are_reconstructed_from_all_roots():
         t, eps = point
         return [(1 + 3 * t * t * eps) * pow(1 - t * eps, -1, p), 7]
 
-    found = reconstruct_at(root, box, ["a", "eps"]).functions
+    result = reconstruct_at(root, box, ["a", "eps"]).functions
     field = GF(2**61 - 1)
     with pytest.raises(BadPrime):
         parse_root("root of t^2 + 1").over(GF(2**61 - 1))  # so that this is no accident of the prime
     t, eps = root.over(field), field.convert(5)
-    assert found[0].value(field, (t, eps)) == (1 + 3 * t * t * eps) / (1 - t * eps)
-    assert found[1].value(field, (t, eps)) == 7
+    assert result[0].value(field, (t, eps)) == (1 + 3 * t * t * eps) / (1 - t * eps)
+    assert result[1].value(field, (t, eps)) == 7
 
     # Another value at one of the roots only is no function of the root.
     def wrong(p, point):
@@ -59,10 +59,10 @@ def test_coefficients_are_reconstructed_from_all_roots():
 
 
 def test_commuting_systems_over_a_number_field_are_found_and_commute():
-    def found(equations: str, a: str, **options) -> km.CommutingSystems:
+    def solved(equations: str, a: str, **options) -> km.CommutingSystems:
         return km.find_commuting(km.System(equations, a=a), **options)
 
-    squares = found("x' = a*x^2; y' = y^2", "root of t^2 - 2")
+    squares = solved("x' = a*x^2; y' = y^2", "root of t^2 - 2")
     assert squares.complete
     assert squares.dimension == 2
     (family,) = squares.families
@@ -70,11 +70,11 @@ def test_commuting_systems_over_a_number_field_are_found_and_commute():
     f = km.System("x' = a*x^2; y' = y^2", a="root of t^2 - 2")
     for g in family.directions:
         assert km.check_commute(f, km.System(dict(zip("xy", g.rhs, strict=True)), a="root of t^2 - 2")).holds
-    assert [g.trivial for g in found(TOP, CUBIC).solutions] == ["0", "f", "-f"]
+    assert [g.trivial for g in solved(TOP, CUBIC).solutions] == ["0", "f", "-f"]
     # x' = a^2 x, y' = 2 y: for a^2 = 2 the matrix of f is a multiple of 1, and every linear field commutes with it.
-    assert found("x' = a^2*x; y' = 2*y", "root of t^2 - 2").dimension == 4
-    assert found("x' = a^2*x; y' = 2*y", "root of t^2 - 3").dimension == 2
+    assert solved("x' = a^2*x; y' = 2*y", "root of t^2 - 2").dimension == 4
+    assert solved("x' = a^2*x; y' = 2*y", "root of t^2 - 3").dimension == 2
     with pytest.raises(InputError, match="found a variable t"):
-        found("t' = a*t^2", "root of t^2 - 2")
+        solved("t' = a*t^2", "root of t^2 - 2")
     with pytest.raises(InputError, match="expected a quadratic vector field without eps"):
         km.find_commuting("lyness")

@@ -20,15 +20,15 @@ def integral(text: str) -> RationalFunction:
 
 
 def curves(text: str, eps: fmpq | None = None) -> Pencil:
-    found = pencil_of("I", integral(text), eps)
-    assert found is not None
-    return found
+    pencil = pencil_of("I", integral(text), eps)
+    assert pencil is not None
+    return pencil
 
 
-def summary(found: Pencil) -> tuple[int, int, int, dict[int, tuple[int, int]]]:
+def summary(pencil: Pencil) -> tuple[int, int, int, dict[int, tuple[int, int]]]:
     """Components, degree, genus, and by multiplicity how many base points, and how many of them infinitely near."""
-    points = {one.multiplicity: (one.count, one.infinitely_near) for one in found.base_points}
-    return found.components, found.degree, found.genus, points
+    points = {point.multiplicity: (point.count, point.infinitely_near) for point in pencil.base_points}
+    return pencil.components, pencil.degree, pencil.genus, points
 
 
 KNOWN = [  # by hand
@@ -98,11 +98,11 @@ def test_nothing_is_said_where_a_base_point_is_missed(monkeypatch):
 
 @pytest.mark.parametrize("name", ["nahm_tetrahedral", "qrt_symmetric"])
 def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
-    found = analysis_of(name)
-    assert found.pencil is not None
-    assert (found.pencil.genus, found.degrees.growth) == (1, Growth.QUADRATIC)
-    assert "the map is a translation" in found.to_json()["invariant_curves"]["motion"]
-    assert not contradictions(found)
+    analysis = analysis_of(name)
+    assert analysis.pencil is not None
+    assert (analysis.pencil.genus, analysis.degrees.growth) == (1, Growth.QUADRATIC)
+    assert "the map is a translation" in analysis.to_json()["invariant_curves"]["motion"]
+    assert not contradictions(analysis)
 
 
 @pytest.mark.parametrize(
@@ -114,14 +114,14 @@ def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
     ],
 )
 def test_the_genus_allows_one_kind_of_growth(genus, possible, impossible):
-    found = replace(curves("x*y"), genus=genus)
-    assert [found.contradiction(growth) for growth in possible] == [""] * len(possible)
-    assert all(found.contradiction(growth) for growth in impossible)
+    result = replace(curves("x*y"), genus=genus)
+    assert [result.contradiction(growth) for growth in possible] == [""] * len(possible)
+    assert all(result.contradiction(growth) for growth in impossible)
 
 
 def test_a_genus_that_the_degrees_exclude_is_no_finding():
-    found = analysis_of("weierstrass")
-    wrong = replace(found, pencil=replace(found.pencil, genus=0))
+    analysis = analysis_of("weierstrass")
+    wrong = replace(analysis, pencil=replace(analysis.pencil, genus=0))
     assert wrong.conclusion.kind == "undecided"
     assert "quadratic growth is impossible where the generic curve has genus 0" in wrong.conclusion.sentence
     assert [line.status for _, lines in wrong.sections for line in lines if "has genus 0" in line.text] == ["undecided"]

@@ -38,17 +38,17 @@ def nested(n):
     return system(" ".join(names), *rhs)
 
 
-def brackets(found):
-    return [one.text for one in found.tensors]
+def brackets(result):
+    return [tensor.text for tensor in result.tensors]
 
 
-def holds_exactly(file, one, eps):
+def holds_exactly(file, first, eps):
     """dPhi P dPhi^T = P(x~) at rational points, computed here."""
     kahan = file.map.at(eps)
     for seed in (1, 2):
         x = random_point(file.dim, seed)
         slope, image = kahan.jacobian(x), kahan.step(x)
-        here, there = (one.tensor.value(QQ, kahan.eps, point) for point in (x, image))
+        here, there = (first.tensor.value(QQ, kahan.eps, point) for point in (x, image))
         if slope * here * slope.transpose() != there:
             return False
     return True
@@ -64,7 +64,7 @@ def holds_exactly(file, one, eps):
     ],
 )
 def test_log_canonical_brackets_of_the_literature(file, rank, log_canonical):
-    found = find_poisson(file, integrals=())
+    search = find_poisson(file, integrals=())
     names = file.variables
     terms = [
         f"{{{p},{q}}} = {'' if log_canonical[i][j] == 1 else f'{log_canonical[i][j]}*'}{p}*{q}"
@@ -72,21 +72,23 @@ def test_log_canonical_brackets_of_the_literature(file, rank, log_canonical):
         for j, q in enumerate(names)
         if i < j
     ]
-    assert ", ".join(terms) in brackets(found)
-    one = found.tensors[brackets(found).index(", ".join(terms))]
-    assert (one.verdict, one.jacobi, one.rank) == (PROVED, PROVED, rank)
-    assert holds_exactly(file, one, "1/10")
+    assert ", ".join(terms) in brackets(search)
+    entry = search.tensors[brackets(search).index(", ".join(terms))]
+    assert (entry.verdict, entry.jacobi, entry.rank) == (PROVED, PROVED, rank)
+    assert holds_exactly(file, entry, "1/10")
 
 
 def test_integrals_and_casimirs_of_the_euler_top():
     # rank 2 in dimension 3: each tensor has one Casimir, a function of the two integrals
-    found = find_poisson(load("euler_top"), 3)
-    assert [(one.rank, one.verdict, one.jacobi, one.involution) for one in found.tensors] == [(2, *[PROVED] * 3)] * 3
-    assert [one.casimirs for one in found.tensors] == [("I1",), ("I2",), ("(I1 - 2*I2)/(2*I2*eps^2 - 1)",)]
-    assert all(one.is_liouville_integrable for one in found.tensors)
-    assert found.pencil is PROVED  # tri-Hamiltonian
-    assert found.note == "they are compatible: every combination of them is a Poisson tensor (proved)"
-    assert all(holds_exactly(load("euler_top"), one, "-2/3") for one in found.tensors)
+    search = find_poisson(load("euler_top"), 3)
+    assert [(tensor.rank, tensor.verdict, tensor.jacobi, tensor.involution) for tensor in search.tensors] == [
+        (2, *[PROVED] * 3)
+    ] * 3
+    assert [tensor.casimirs for tensor in search.tensors] == [("I1",), ("I2",), ("(I1 - 2*I2)/(2*I2*eps^2 - 1)",)]
+    assert all(tensor.is_liouville_integrable for tensor in search.tensors)
+    assert search.pencil is PROVED  # tri-Hamiltonian
+    assert search.note == "they are compatible: every combination of them is a Poisson tensor (proved)"
+    assert all(holds_exactly(load("euler_top"), tensor, "-2/3") for tensor in search.tensors)
 
 
 ROTATION = system("x y z", "2*z - 3*y", "3*x - z", "y - 2*x")  # about w = (1, 2, 3)
@@ -103,7 +105,9 @@ def casimirs_of_lie_poisson(*texts):
     [model, *_] = integrals_of_rotation()
     names = ["x", "y", "z", "eps"]
     known = [replace(model, name=f"I{k}", function=parse_rational_function(t, names)) for k, t in enumerate(texts, 1)]
-    return next(one for one in find_poisson(ROTATION, 1, integrals=known).tensors if "{x,y} = z" in one.text).casimirs
+    return next(
+        tensor for tensor in find_poisson(ROTATION, 1, integrals=known).tensors if "{x,y} = z" in tensor.text
+    ).casimirs
 
 
 @pytest.mark.parametrize(
@@ -132,11 +136,11 @@ def test_a_function_that_is_said_to_be_a_casimir_is_put_to_the_proof(monkeypatch
 def test_the_factors_of_a_density_are_tried_as_a_denominator():
     # both integrals of x_{n+3} x_n = 3 + x_{n+1} + x_{n+2} are N/(x y z), its measure |dx dy dz/(x y z)|
     todd = a_map("x y z", ["y", "z", "(3 + y + z)/x"], ["(3 + x + y)/z", "x", "y"])
-    found = find_poisson(todd, 3)
-    assert (len(found.tensors), found.pencil, found.reason) == (2, PROVED, "")
-    assert str(found.denominator.numerator) == "x*y*z"
-    assert all(one.is_liouville_integrable and holds_exactly(todd, one, 1) for one in found.tensors)
-    none = find_poisson(todd, 2, integrals=found.integrals)
+    search = find_poisson(todd, 3)
+    assert (len(search.tensors), search.pencil, search.reason) == (2, PROVED, "")
+    assert str(search.denominator.numerator) == "x*y*z"
+    assert all(tensor.is_liouville_integrable and holds_exactly(todd, tensor, 1) for tensor in search.tensors)
+    none = find_poisson(todd, 2, integrals=search.integrals)
     assert (none.tensors, none.denominator) == ((), None)
     assert none.reason.endswith(", and none of degree at most 5 over x*y*z")
 
@@ -150,6 +154,6 @@ def test_the_factors_of_a_density_are_tried_as_a_denominator():
     ],
 )
 def test_maps_without_structure_have_none(file, degree):
-    found = find_poisson(file, degree)
-    assert (found.tensors, found.degree, found.toml_section()) == ((), degree, "")
-    assert found.reason.startswith(f"no tensor of degree at most {degree} is preserved (measured modulo a prime)")
+    search = find_poisson(file, degree)
+    assert (search.tensors, search.degree, search.toml_section()) == ((), degree, "")
+    assert search.reason.startswith(f"no tensor of degree at most {degree} is preserved (measured modulo a prime)")

@@ -78,33 +78,33 @@ def is_density(file, phi, eps):
     ],
 )
 def test_the_measures_of_lotka_volterra_systems(file, phi):
-    one = found_in(file).density
-    assert phi is None or one.text == phi
-    assert is_density(file, one.text, "1/10")
-    assert is_density(file, one.text, "-3/7")
-    assert verdict_on(file.map, one.function, None, is_density=True)[0].holds
+    entry = found_in(file).density
+    assert phi is None or entry.text == phi
+    assert is_density(file, entry.text, "1/10")
+    assert is_density(file, entry.text, "-3/7")
+    assert verdict_on(file.map, entry.function, None, is_density=True)[0].holds
 
 
 def test_numbers_other_than_1_make_integrals_that_depend_on_time():
     file = system("x y z", "x", "-y", "-2*z")
-    found = find_integrals(file)
-    assert [one.text for one in found.integrals] == ["x*y"]
-    assert [t.text for t in found.time_dependent] == ["((-eps - 1)/(eps - 1))^-n*x", "((-2*eps + 1)/(2*eps + 1))^-n*z"]
-    assert {one.integral.verdict for one in found.time_dependent} == {Certainty.PROVED}
+    search = find_integrals(file)
+    assert [integral.text for integral in search.integrals] == ["x*y"]
+    assert [t.text for t in search.time_dependent] == ["((-eps - 1)/(eps - 1))^-n*x", "((-2*eps + 1)/(2*eps + 1))^-n*z"]
+    assert {integral.integral.verdict for integral in search.time_dependent} == {Certainty.PROVED}
     kahan = file.map.at("1/5")
     x = kahan.point([3, 1, 7])
     assert kahan.step(x)[2] == fmpq(1 - fmpq(2, 5)) / (1 + fmpq(2, 5)) * x[2]
     wrong = parse_rational_function("2", ["x", "y", "z", "eps"])
-    I = found.time_dependent[0].integral.function
+    I = search.time_dependent[0].integral.function
     assert verdict_on(file.map, I, None, is_density=False, factor=wrong)[0] is Certainty.REFUTED
 
 
 def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
     # x_{n+3} x_n = 3 + x_{n+1} + x_{n+2}: det dPhi = -(3 + y + z)/x^2, while xyz is multiplied by (3 + y + z)/x^2
     todd = a_map("x y z", ["y", "z", "(3 + y + z)/x"], ["(3 + x + y)/z", "x", "y"])
-    found = find_densities(todd)
-    assert (found.anti_invariant.text, found.anti_invariant.verdict) == ("x*y*z", Certainty.PROVED)
-    assert found.note == "|dx/phi| is invariant for phi = x*y*z: phi(x~) = -det dPhi(x) phi(x) (proved)"
+    search = find_densities(todd)
+    assert (search.anti_invariant.text, search.anti_invariant.verdict) == ("x*y*z", Certainty.PROVED)
+    assert search.note == "|dx/phi| is invariant for phi = x*y*z: phi(x~) = -det dPhi(x) phi(x) (proved)"
     kahan = todd.map.at(1)
     x = kahan.point([1, 2, 5])
     assert reduce(lambda a, b: a * b, kahan.step(x)) == -kahan.jacobian(x).det() * 10
@@ -113,9 +113,9 @@ def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
 
 @pytest.mark.parametrize("file", [random_system(2, 0), load("henon_heiles")])
 def test_maps_without_structure_have_no_products(file):
-    found = found_in(file)
-    assert (found.integrals, found.time_dependent) == ((), ())
-    assert found.density is None or file.name == "henon_heiles"  # whose density is det(I - eps f')
+    result = found_in(file)
+    assert (result.integrals, result.time_dependent) == ((), ())
+    assert result.density is None or file.name == "henon_heiles"  # whose density is det(I - eps f')
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -123,20 +123,20 @@ def test_relations_are_all_relations(seed):
     assert relations([]) == []
     rng = random.Random(seed)
     rows = [[rng.randint(-3, 3) for _ in range(3)] for _ in range(6)]
-    found = relations(rows)
-    assert len(found) == 6 - fmpz_mat(rows).rank()
-    for k in found:
+    result = relations(rows)
+    assert len(result) == 6 - fmpz_mat(rows).rank()
+    for k in result:
         assert [sum(a * row[j] for a, row in zip(k, rows, strict=True)) for j in range(3)] == [0] * 3
     # and they span all integer vectors in their span: the elementary divisors are 1
-    diagonal = fmpz_mat(found).snf()
-    assert all(diagonal[i, i] == 1 for i in range(len(found)))
+    diagonal = fmpz_mat(result).snf()
+    assert all(diagonal[i, i] == 1 for i in range(len(result)))
 
 
 def test_numbers_that_are_products_of_each_other():
     functions = [parse_rational_function(text, ["a"]) for text in ("12", "18", "2/3", "a/5", "-a", "25")]
-    found = multiplicative_relations(functions)
-    assert len(found) == 6 - 4  # 2, 3, 5, a
-    for k in found:
+    relations = multiplicative_relations(functions)
+    assert len(relations) == 6 - 4  # 2, 3, 5, a
+    for k in relations:
         values = [f.value(QQ, [fmpq(7)]) ** e for f, e in zip(functions, k, strict=True)]
         assert reduce(lambda a, b: a * b, values) == 1
 
@@ -150,11 +150,11 @@ def test_a_coprime_base_makes_the_polynomials_again(seed):
     for i, a in enumerate(base):
         assert a.degree() > 0
         assert all(a.gcd(b).degree() == 0 for b in base[:i])
-    for one in given:
+    for entry in given:
         for b in base:
             while True:
-                quotient, rest = divmod(one, b)
-                if not rest.is_zero():
+                quotient, others = divmod(entry, b)
+                if not others.is_zero():
                     break
-                one = quotient
-        assert one.degree() == 0
+                entry = quotient
+        assert entry.degree() == 0

@@ -32,28 +32,28 @@ def terms(below: list[int], start: list[int], length: int) -> list[int]:
     ],
 )
 def test_known_sequences(values, order, growth, closed_form):
-    found = find_recurrence(values)
-    assert (found.order, str(found.growth)) == (order, growth)
-    assert found.checked == len(values) - 2 * order >= needed_checks(order)
+    recurrence = find_recurrence(values)
+    assert (recurrence.order, str(recurrence.growth)) == (order, growth)
+    assert recurrence.checked == len(values) - 2 * order >= needed_checks(order)
     if closed_form is not None:
-        assert found.closed_form == closed_form
+        assert recurrence.closed_form == closed_form
 
 
 def test_the_growth_rate_is_an_algebraic_number_with_certain_digits():
     # 1 + sqrt 2: 3, 9, 23, 57, 139, 337, 815, 1969 are the degrees of zhukovski_volterra_2
-    found = find_recurrence([1, 3, 9, 23, 57, 139, 337, 815, 1969, 4755])
-    assert found.growth is Growth.EXPONENTIAL
-    assert found.rate.minimal_polynomial == fmpz_poly([-1, -2, 1])
-    assert found.rate.digits.startswith("2.41421356237309504880")
-    assert found.rate.enclosure.startswith("[2.41421356237309504880168872420969807")
-    assert found.to_json()["rate"]["minimal_polynomial"] == ["-1", "-2", "1"]
+    recurrence = find_recurrence([1, 3, 9, 23, 57, 139, 337, 815, 1969, 4755])
+    assert recurrence.growth is Growth.EXPONENTIAL
+    assert recurrence.rate.minimal_polynomial == fmpz_poly([-1, -2, 1])
+    assert recurrence.rate.digits.startswith("2.41421356237309504880")
+    assert recurrence.rate.enclosure.startswith("[2.41421356237309504880168872420969807")
+    assert recurrence.to_json()["rate"]["minimal_polynomial"] == ["-1", "-2", "1"]
 
 
 def test_first_terms_may_be_exempt():
-    found = find_recurrence([7, 5, *(2**n for n in range(10))])
-    assert (found.preperiod, found.order, found.rate.text) == (2, 3, "2")
-    found = find_recurrence([9, *([4] * 8)])
-    assert (found.preperiod, str(found.growth), found.closed_form) == (1, "bounded", "4")
+    recurrence = find_recurrence([7, 5, *(2**n for n in range(10))])
+    assert (recurrence.preperiod, recurrence.order, recurrence.rate.text) == (2, 3, "2")
+    recurrence = find_recurrence([9, *([4] * 8)])
+    assert (recurrence.preperiod, str(recurrence.growth), recurrence.closed_form) == (1, "bounded", "4")
 
 
 @pytest.mark.parametrize("values", [[], [1, 2, 4], PRIMES, [1, 2, 4, 8, 15]])
@@ -72,10 +72,10 @@ def test_the_recurrence_found_continues_the_sequence(below, data):
     start = data.draw(st.lists(st.integers(-9, 9), min_size=len(below), max_size=len(below)))
     size = 2 * len(below) + needed_checks(len(below))
     values = terms(below, start, size + 10)
-    found = find_recurrence(values[:size])
-    assert found is not None
-    assert found.order <= len(below)
-    assert [found.predict(n) for n in range(size + 10)] == values
+    recurrence = find_recurrence(values[:size])
+    assert recurrence is not None
+    assert recurrence.order <= len(below)
+    assert [recurrence.predict(n) for n in range(size + 10)] == values
 
 
 @pytest.mark.parametrize(
@@ -100,5 +100,5 @@ def test_the_recurrence_found_continues_the_sequence(below, data):
     ids=lambda value: None if isinstance(value, tuple) else str(value)[:12],
 )
 def test_closed_forms_powers_and_rates(values, expected):
-    found = find_recurrence(values)
-    assert (found.closed_form_text, found.power, found.rate and found.rate.text) == expected
+    recurrence = find_recurrence(values)
+    assert (recurrence.closed_form_text, recurrence.power, recurrence.rate and recurrence.rate.text) == expected

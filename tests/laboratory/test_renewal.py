@@ -27,8 +27,8 @@ from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
-def settled(*rows, returns=None):
-    return OrbitData(rows, (), 100, True, returns)
+def settled(*rows, continues_as=None):
+    return OrbitData(rows, (), 100, True, continues_as)
 
 
 @cache
@@ -54,22 +54,22 @@ OF_ONE_FORM = {
 
 @pytest.mark.parametrize("name", quick(WRITTEN, DAILY))
 def test_the_degrees_of_the_catalogue_are_derived(name):
-    found = degree_growth(load(name).map, max_degree=500)
-    if found.degrees[1] > 1 and found.proof is None:
-        assert found.derived is not None
-        assert tuple(coefficients(found.patterns.fraction, len(found.degrees))) == found.degrees
-        assert found.derived.characteristic == (found.fitted or found.derived).characteristic
+    growth = degree_growth(load(name).map, max_degree=500)
+    if growth.degrees[1] > 1 and growth.proof is None:
+        assert growth.derived is not None
+        assert tuple(coefficients(growth.patterns.fraction, len(growth.degrees))) == growth.degrees
+        assert growth.derived.characteristic == (growth.fitted or growth.derived).characteristic
 
 
 @pytest.mark.parametrize("name", quick(list(OF_ONE_FORM), ["kirchhoff_case", "three_wave"]))
 def test_hypersurfaces_of_one_form_are_told_apart_and_derive_degrees(name):
-    found = patterns(load(name).map, fmpq(2, 7))
-    sizes = [h.degree for h in found.contracted]
+    result = patterns(load(name).map, fmpq(2, 7))
+    sizes = [h.degree for h in result.exceptional]
     assert sorted(sizes) == OF_ONE_FORM[name]
-    measured = degree_growth(load(name).map, max_terms=6, patterns=found)
+    measured = degree_growth(load(name).map, max_terms=6, patterns=result)
     assert measured.derived is not None
     # Each degree counts: with another one in its place the degrees of the map are other ones.
-    every = [h.orders for h in found.contracted]
+    every = [h.orbit_data for h in result.exceptional]
     for k in range(len(sizes)):
         wrong = [(size + (j == k), orders) for j, (size, orders) in enumerate(zip(sizes, every, strict=True))]
         costs = any(row[0] for row in every[k].rows)
@@ -80,10 +80,10 @@ def test_a_hypersurface_with_points_modulo_some_primes_only_is_met():
     """One form of degree 15: three conjugate hypersurfaces of degree 3, which cost nothing, and two others."""
     rhs = ["-x3*x4", "-x3*x1", "3*x2*x1", "2*x2*x3", "-x1*x2"]
     system = QuadraticSystem.from_text(["x1", "x2", "x3", "x4", "x5"], rhs)
-    found = patterns(system, default_eps(system, 0)[0], steps=12)
-    assert sorted(h.degree for h in found.contracted) == [1, 4, 6, 9]
+    result = patterns(system, default_eps(system, 0)[0], steps=12)
+    assert sorted(h.degree for h in result.exceptional) == [1, 4, 6, 9]
     measured = degree_growth(system, max_terms=5).degrees
-    assert tuple(coefficients(found.fraction, 6)) == measured == (1, 5, 17, 59, 209, 743)
+    assert tuple(coefficients(result.fraction, 6)) == measured == (1, 5, 17, 59, 209, 743)
 
 
 @pytest.mark.parametrize(
@@ -105,9 +105,9 @@ def test_the_degrees_of_the_family_are_those_of_m_planes(m, name):
 
 def test_orders_that_are_wrong_derive_nothing():
     """Each number in the orders of a map counts: changed, the degrees are not those measured."""
-    found = derived("euler_top")
-    sizes = [h.degree for h in found.contracted]
-    every = [h.orders for h in found.contracted]
+    patterns = derived("euler_top")
+    sizes = [h.degree for h in patterns.exceptional]
+    every = [h.orbit_data for h in patterns.exceptional]
     true = degree_growth(load("euler_top").map, max_terms=8).degrees
     assert tuple(coefficients(degree_series([3], list(zip(sizes, every, strict=True))), 9)) == true
     for k, orders in enumerate(every):
@@ -115,7 +115,7 @@ def test_orders_that_are_wrong_derive_nothing():
             for column, value in enumerate(row):
                 wrong = (*row[:column], value + 1, *row[column + 1 :])
                 other = replace(orders, rows=(*orders.rows[:t], wrong, *orders.rows[t + 1 :]))
-                changed = [other if j == k else one for j, one in enumerate(every)]
+                changed = [other if j == k else pattern for j, pattern in enumerate(every)]
                 assert tuple(coefficients(degree_series([3], list(zip(sizes, changed, strict=True))), 9)) != true
 
 
@@ -123,13 +123,13 @@ def test_a_hypersurface_that_returns_goes_on_as_the_other():
     """The same pattern three ways: as a return to itself, by recurrences, and written out."""
     rows = ((0, 1), (1, 0))
     laws = (fmpz_poly([-1, 0, 1]), fmpz_poly([-1, 0, 1]))
-    returning = settled(*rows, returns=(2, 0))
+    returning = settled(*rows, continues_as=(2, 0))
     recurring = OrbitData(rows, laws, 100, True)
     written = settled(*(rows * 10))
-    one, two, three = (
+    entry, two, three = (
         coefficients(degree_series([2], [(1, orders)]), 20) for orders in (returning, recurring, written)
     )
-    assert one == two == three
+    assert entry == two == three
 
 
 @given(st.integers(2, 5), st.integers(1, 4), st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), max_size=5))
@@ -146,11 +146,11 @@ def test_the_fraction_is_what_the_two_equations_give_step_by_step(degree, size, 
 
 def test_a_superattracting_point_lowers_no_degree():
     """A Henon map: infinity goes to a fixed point on it, with orders 2, 4, 8, ...; the degrees are 2^n."""
-    found = degree_growth(explicit("y", "x + y^2"), max_degree=500)
-    assert found.patterns.series == ((1,), (1, -2))
-    (infinity,) = found.patterns.contracted
-    assert [row[1] for row in infinity.orders.rows] == [2**t for t in range(1, len(infinity.orders.rows) + 1)]
-    assert found.dynamical_degree.text == "2"
+    growth = degree_growth(explicit("y", "x + y^2"), max_degree=500)
+    assert growth.patterns.series == ((1,), (1, -2))
+    (infinity,) = growth.patterns.exceptional
+    assert [row[1] for row in infinity.orbit_data.rows] == [2**t for t in range(1, len(infinity.orbit_data.rows) + 1)]
+    assert growth.dynamical_degree.text == "2"
 
 
 def explicit(*image):
@@ -161,16 +161,16 @@ def explicit(*image):
 def test_unknown_orders_that_are_needed_derive_nothing():
     costly, attracted = settled((1, 0, 0)), settled((0, 1, 2))
     assert needed([costly, attracted]) == [0, 1]
-    assert needed([costly, replace(attracted, beyond=(1,))]) is None
-    assert needed([costly, replace(attracted, beyond=(0,))]) is None
-    assert needed([costly, replace(attracted, rows=((0, 0, 2),), beyond=(1,))]) == [0]
+    assert needed([costly, replace(attracted, eventually_in=(1,))]) is None
+    assert needed([costly, replace(attracted, eventually_in=(0,))]) is None
+    assert needed([costly, replace(attracted, rows=((0, 0, 2),), eventually_in=(1,))]) == [0]
     # Through a return as well: the first becomes the third, which costs and is met by the second.
-    returning = replace(settled((0, 0, 0, 0), (0, 0, 0, 1)), returns=(2, 2))
+    returning = replace(settled((0, 0, 0, 0), (0, 0, 0, 1)), continues_as=(2, 2))
     chain = [returning, settled((0, 0, 0, 1)), settled((1, 0, 0, 0))]
     assert needed(chain) == [0, 1, 2]
-    assert needed([*chain[:2], replace(chain[2], beyond=(0,))]) is None
+    assert needed([*chain[:2], replace(chain[2], eventually_in=(0,))]) is None
     with pytest.raises(ValueError, match="expected known multiplicities"):
-        degree_series([2], [(1, costly), (1, replace(attracted, beyond=(0,)))])
+        degree_series([2], [(1, costly), (1, replace(attracted, eventually_in=(0,)))])
     # What is not needed does not count.
     assert degree_series([2], [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))]) == degree_series(
         [2], [(1, settled((1, 0)))]
@@ -192,10 +192,10 @@ def word(*letters, power=1):
 def followed(map_, terms, eps=None):
     """The word of a composition, and its degrees as its maps give them, followed one by one."""
     limits = Range(12, 60, 40, Budget(), 40)
-    found, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
-    pairs = [(h.degree, h.orders) for h in hypersurfaces]
-    series = degree_series(found.degrees, pairs, [h.stage for h in hypersurfaces])
-    return found, coefficients(every_nth(series, found.length), terms + 1)
+    result, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
+    pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
+    series = degree_series(result.degrees, pairs, [h.stage for h in hypersurfaces])
+    return result, coefficients(every_nth(series, result.length), terms + 1)
 
 
 @pytest.mark.parametrize(
@@ -223,10 +223,10 @@ def test_a_hypersurface_of_another_map_gives_other_degrees():
     """Negative control: with the maps in the other order the same hypersurfaces stand for another composition."""
     map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
     limits = Range(12, 60, 40, Budget(), 40)
-    found, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
-    pairs = [(h.degree, h.orders) for h in hypersurfaces]
+    result, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
+    pairs = [(h.degree, h.orbit_data) for h in hypersurfaces]
     right, wrong = (
-        coefficients(every_nth(degree_series(found.degrees, pairs, stages), 2), 6)
+        coefficients(every_nth(degree_series(result.degrees, pairs, stages), 2), 6)
         for stages in ([h.stage for h in hypersurfaces], [1 - h.stage for h in hypersurfaces])
     )
     assert right == [1, 4, 13, 43, 141, 463]
@@ -235,10 +235,10 @@ def test_a_hypersurface_of_another_map_gives_other_degrees():
 
 @pytest.mark.parametrize(("name", "k", "square"), [("mcmillan", 7, 2), ("euler_top", 2, 2)])
 def test_powers_have_every_kth_degree(name, k, square):
-    found = degree_growth(word(name, power=k))
-    assert (found.ended, found.derived.closed_form) == ("derived", f"{square * k * k}*n^2 + 1")
-    assert found.patterns.word == Word((3,), k)
-    assert f"{k} maps make one iterate" in found.text
+    growth = degree_growth(word(name, power=k))
+    assert (growth.ended, growth.derived.closed_form) == ("derived", f"{square * k * k}*n^2 + 1")
+    assert growth.patterns.word == Word((3,), k)
+    assert f"{k} maps make one iterate" in growth.text
 
 
 def test_every_nth_coefficient_of_a_fraction():

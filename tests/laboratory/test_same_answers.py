@@ -104,11 +104,11 @@ def asked(map_):
 
 @pytest.mark.parametrize("name", quick(["weierstrass", "lorenz", "paper_m2", "kirchhoff_case"], ["weierstrass"]))
 def test_what_was_asked_before_does_not_change_the_work_that_is_counted(name):
-    map_, marks, found = load(name).map, [counted()], []
+    map_, marks, result = load(name).map, [counted()], []
     for _ in range(2):
-        found.append([one.to_json() for one in asked(map_)])
+        result.append([entry.to_json() for entry in asked(map_)])
         marks.append(counted())
-    assert found[0] == found[1]
+    assert result[0] == result[1]
     assert marks[1] - marks[0] == marks[2] - marks[1] > 0
 
 
@@ -116,11 +116,11 @@ def test_work_that_is_not_the_search_is_not_charged_to_it():
     """Negative control: what is counted elsewhere before is not spent, but what is counted meanwhile is."""
     map_ = load("henon_heiles").map
     budget = Budget(100_000)
-    whole = degree_growth(map_, effort=budget)
+    complete = degree_growth(map_, effort=budget)
     count(1_000_000)
-    assert degree_growth(map_, effort=Budget(100_000)).degrees == whole.degrees
+    assert degree_growth(map_, effort=Budget(100_000)).degrees == complete.degrees
     less = degree_growth(map_, effort=Budget(100_000), progress=lambda _: count(20_000))
-    assert len(less.degrees) < len(whole.degrees)
+    assert len(less.degrees) < len(complete.degrees)
 
 
 ALONE: list[tuple[str, Callable[[str], Any], Callable[[Any], list[str]]]] = [
@@ -152,6 +152,6 @@ def test_what_analyze_finds_the_command_finds(
 
 
 def test_the_three_tensors_of_the_euler_top_are_found_without_a_degree() -> None:
-    found = find_poisson(load("euler_top"), integrals=())
-    assert (found.degree, len(found.tensors)) == (3, 3)
+    search = find_poisson(load("euler_top"), integrals=())
+    assert (search.degree, len(search.tensors)) == (3, 3)
     assert find_poisson(load("euler_top"), 2, integrals=()).tensors == ()

@@ -115,23 +115,23 @@ def cases(*names):
 
 @pytest.mark.parametrize(("name", "how"), cases("lorenz", "euler", "conjugate", "double", "weighted"))
 def test_darboux_polynomials_of_flows(name, how):
-    found, image, moved = both(darboux_polynomials, name, how, 2, flow=True)
-    assert (found.reason, moved.reason) == ("", "")
-    wanted = {primitive(P) for space in found.spaces for P in space.polynomials}
-    assert {primitive(image.back(P).numerator) for space in moved.spaces for P in space.polynomials} == wanted
+    result, image, moved = both(darboux_polynomials, name, how, 2, flow=True)
+    assert (result.reason, moved.reason) == ("", "")
+    expected = {primitive(P) for space in result.spaces for P in space.polynomials}
+    assert {primitive(image.back(P).numerator) for space in moved.spaces for P in space.polynomials} == expected
     if name != "weighted":  # and with a wrong scale they are no others
         wrong = Image(image.file, [*image.scale[:-1], image.scale[-1] * 2], image.place, image.speed)
-        assert {primitive(wrong.back(P).numerator) for one in moved.spaces for P in one.polynomials} != wanted
+        assert {primitive(wrong.back(P).numerator) for entry in moved.spaces for P in entry.polynomials} != expected
 
 
 @pytest.mark.parametrize(("name", "how"), cases("euler", "volterra", "lyness", "todd", "fibonacci"))
 def test_darboux_polynomials_of_maps(name, how):
-    found, image, moved = both(darboux_polynomials, name, how, 3)
-    assert (found.reason, moved.reason) == ("", "")
-    assert found.spaces
-    wanted = sorted(span(space.polynomials) for space in found.spaces)
+    result, image, moved = both(darboux_polynomials, name, how, 3)
+    assert (result.reason, moved.reason) == ("", "")
+    assert result.spaces
+    expected = sorted(span(space.polynomials) for space in result.spaces)
     back = [[image.back(P).numerator for P in space.polynomials] for space in moved.spaces]
-    assert sorted(map(span, back)) == wanted
+    assert sorted(map(span, back)) == expected
     assert all(space.verdict.holds for space in moved.spaces)
 
 
@@ -144,47 +144,47 @@ INTEGRALS = ["euler", "lorenz", "volterra", "conjugate", "lyness", "todd"]
 )
 def test_integrals(name, how, flow):
     """As many as there, and moved back they are integrals there: all is proved."""
-    found, image, moved = both(find_integrals, name, how, flow=flow, max_degree=4)
-    assert (len(found.integrals), found.reason) == (len(moved.integrals), moved.reason)
-    assert len(found.time_dependent) == len(moved.time_dependent)
-    laboratory = Laboratory(found.file, flow=flow)
-    assert all(laboratory.verdict_on(image.back(one.function))[0].holds for one in moved.integrals)
-    for one in moved.time_dependent:
-        back, speed = image.back(one.integral.function), fmpq(image.speed.numerator, image.speed.denominator)
-        factor = RationalFunction(one.factor.numerator / speed, one.factor.denominator)
+    result, image, moved = both(find_integrals, name, how, flow=flow, max_degree=4)
+    assert (len(result.integrals), result.reason) == (len(moved.integrals), moved.reason)
+    assert len(result.time_dependent) == len(moved.time_dependent)
+    laboratory = Laboratory(result.file, flow=flow)
+    assert all(laboratory.verdict_on(image.back(integral.function))[0].holds for integral in moved.integrals)
+    for item in moved.time_dependent:
+        back, speed = image.back(item.integral.function), fmpq(image.speed.numerator, image.speed.denominator)
+        factor = RationalFunction(item.factor.numerator / speed, item.factor.denominator)
         assert laboratory.verdict_on(back, factor=factor)[0].holds
     if how == "scaled" and moved.integrals and not flow:  # what is not moved back is none
-        refuted = [laboratory.verdict_on(one.function)[0].holds for one in moved.integrals]
+        refuted = [laboratory.verdict_on(integral.function)[0].holds for integral in moved.integrals]
         assert not all(refuted)
 
 
 @pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "double", "predators", "lyness", "todd"))
 def test_densities(name, how):
-    found, image, moved = both(find_densities, name, how)
-    assert found.densities
-    wanted = sorted(primitive(one.function.numerator) for one in found.densities)
-    assert sorted(primitive(image.back(one.function).numerator) for one in moved.densities) == wanted
+    result, image, moved = both(find_densities, name, how)
+    assert result.densities
+    expected = sorted(primitive(entry.function.numerator) for entry in result.densities)
+    assert sorted(primitive(image.back(entry.function).numerator) for entry in moved.densities) == expected
 
 
 @pytest.mark.parametrize(("name", "how"), cases("predators", "volterra", "conjugate", "lyness"))
 def test_poisson_tensors(name, how):
     """{y_i, y_j} is scale_i scale_j {x_i, x_j}: all tensors together span the same space."""
     spaces = []
-    for one, tensors in (found_for(find_poisson, name, which, 3) for which in ("same", how)):
-        n, entries = len(one.place), []
+    for item, tensors in (found_for(find_poisson, name, which, 3) for which in ("same", how)):
+        n, entries = len(item.place), []
         context = ring([*"xyzw"[:n], "eps", *(f"d{i}" for i in range(n))])
         d = context.gens()[n + 1 :]
-        for found in tensors.tensors:
-            rows, total = found.tensor.rows, context.constant(0)
+        for tensor in tensors.tensors:
+            rows, total = tensor.tensor.rows, context.constant(0)
             for i in range(n):
                 for j in range(i):
-                    back = one.back(rows[one.place[i]][one.place[j]])
+                    back = item.back(rows[item.place[i]][item.place[j]])
                     assert back.denominator.is_constant()
-                    c = one.scale[i] * one.scale[j]
+                    c = item.scale[i] * item.scale[j]
                     moved = back.numerator.compose(*context.gens()[: n + 1], ctx=context) * d[i] * d[j]
                     total += moved / fmpq(c.numerator, c.denominator) / back.denominator.leading_coefficient()
             entries.append(primitive_part(total)[1])
-        spaces.append(sorted(str(one if one.leading_coefficient() > 0 else -one) for one in entries))
+        spaces.append(sorted(str(entry if entry.leading_coefficient() > 0 else -entry) for entry in entries))
     assert spaces[0]
     assert spaces[0] == spaces[1]
 
@@ -196,13 +196,13 @@ def symmetries_of(file):
 @pytest.mark.parametrize(("name", "how"), cases("predators", "euler", "volterra", "periodic", "weighted"))
 def test_symmetries(name, how):
     """Matrix and all: S for y is M S M^-1; in dimension 4 only permutations of scaled variables are sought."""
-    found, image, moved = both(symmetries_of, name, how)
-    assert (found.order, found.reversing_order) == (moved.order, moved.reversing_order)
-    assert len(found.infinitesimal) == len(moved.infinitesimal)
+    result, image, moved = both(symmetries_of, name, how)
+    assert (result.order, result.reversing_order) == (moved.order, moved.reversing_order)
+    assert len(result.infinitesimal) == len(moved.infinitesimal)
     M = image.matrix
-    wanted = {(str(M * t.S * M.inv()), t.reversing) for t in (*found.signed, *found.others)}
-    assert {(str(t.S), t.reversing) for t in (*moved.signed, *moved.others)} == wanted
-    assert len(wanted) > 1
+    expected = {(str(M * t.S * M.inv()), t.reversing) for t in (*result.signed, *result.others)}
+    assert {(str(t.S), t.reversing) for t in (*moved.signed, *moved.others)} == expected
+    assert len(expected) > 1
 
 
 def quadratic_fields_of(file):
@@ -212,14 +212,14 @@ def quadratic_fields_of(file):
 @pytest.mark.parametrize(("name", "how"), cases("euler", "conjugate", "predators", "double"))
 def test_commuting_fields(name, how):
     """g for y is M g(M^-1 y), and runs faster as f does."""
-    found, image, moved = both(quadratic_fields_of, name, how)
-    assert found.complete
+    result, image, moved = both(quadratic_fields_of, name, how)
+    assert result.complete
     assert moved.complete
-    assert len(found.families) == len(moved.families)
-    assert found.dimension == moved.dimension
+    assert len(result.families) == len(moved.families)
+    assert result.dimension == moved.dimension
     inverse, speed = image.matrix.inv(), fmpq(image.speed.numerator, image.speed.denominator)
     back = {
         str(g.system.composed(image.matrix, [fmpq(0)] * len(image.place)).transformed(inverse).scaled(1 / speed))
         for g in moved.solutions
     }
-    assert back == {str(g.system) for g in found.solutions}
+    assert back == {str(g.system) for g in result.solutions}

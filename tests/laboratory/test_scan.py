@@ -38,12 +38,12 @@ parameters = { A = 1, B = 1, C = 1 }
 rhs = ["x*(C*y + z)", "y*(x + A*z)", "z*(B*x + y)"]"""
 
 
-def slow(found, *kinds):
+def slow(result, *kinds):
     """The texts of the components whose growth is of these kinds."""
     return {
-        one.text
-        for degrees, some in found.classes
-        for one in some
+        entry.text
+        for degrees, some in result.classes
+        for entry in some
         if any(o.growth is not None and o.growth.growth in kinds for o in some)
     }
 
@@ -66,7 +66,7 @@ def test_the_classification_of_three_lines_is_found(three_lines):
 
 
 def test_everything_is_confirmed_and_nothing_is_left(three_lines):
-    assert all(one.is_confirmed and one.tried == 3 for one in three_lines.components)
+    assert all(component.is_confirmed and component.tried == 3 for component in three_lines.components)
     assert not any(three_lines.unassigned)
     # all permutations of the exponents (g1 : g2 : 1), which exchanges and one cycle generate
     assert three_lines.symmetric == (("g2", "g1"), ("g1/g2", "1/g2"))
@@ -80,13 +80,13 @@ def test_a_wrong_condition_is_not_confirmed():
     g1, g2 = ring(["g1", "g2"]).gens()
     good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
     wrong = replace(good, equations=(g1 + g2 - 7,))
-    found = [_confirm(one, family, [], random.Random(1)) for one in (good, wrong)]
-    assert [(one.confirmed, one.tried, one.is_confirmed) for one in found] == [(3, 3, True), (0, 3, False)]
+    results = [_confirm(entry, family, [], random.Random(1)) for entry in (good, wrong)]
+    assert [(entry.confirmed, entry.tried, entry.is_confirmed) for entry in results] == [(3, 3, True), (0, 3, False)]
     # One member speaks for others only as long as their degrees agree.
     member, _ = family.member({"g1": fmpq(2), "g2": fmpq(3)})
     known = degree_growth(member.map, enclosed=False)
     points = [Component((g1 - a, g2 - b), 0, known.degrees[1:8], ()) for a, b in ((3, 2), (1, 2))]
-    assert [_continues_as(one, known, family) for one in points] == [True, False]
+    assert [_continues_as(point, known, family) for point in points] == [True, False]
 
 
 def test_a_curve_in_a_plane_of_parameters_is_found_beside_the_surface_through_it():
@@ -96,20 +96,20 @@ parameters = {a = 1, b = 1, c = 0}
 image = ["y", "x + (c - 1)*y^2 + (a*b + 1)*y^3"]
 inverse = ["y - (c - 1)*x^2 - (a*b + 1)*x^3", "x"]
 """
-    found = scan(parse_system(text), ["a", "b", "c"], primes=(11, 13, 17), terms=2)
-    assert {c.text: c.degrees for c in found.components} == {"a*b + 1 = 0": (2, 4), "a*b + 1 = 0, c - 1 = 0": (1, 1)}
-    assert not any(found.unassigned)
+    scanned = scan(parse_system(text), ["a", "b", "c"], primes=(11, 13, 17), terms=2)
+    assert {c.text: c.degrees for c in scanned.components} == {"a*b + 1 = 0": (2, 4), "a*b + 1 = 0, c - 1 = 0": (1, 1)}
+    assert not any(scanned.unassigned)
 
 
 def test_the_conditions_of_lotka_volterra_in_space_are_found():
-    found = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
-    conditions = {one.text: one for one in found.components}
+    scanned = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
+    conditions = {component.text: component for component in scanned.components}
     assert conditions["A*B*C + 1 = 0"].degrees == (3, 7, 15)
     # the curves in it on which the map is integrable
-    for one in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
-        assert conditions[one].growth.growth is Growth.QUADRATIC
-        assert conditions[one].dimension == 1
-    assert not any(found.unassigned)
+    for entry in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
+        assert conditions[entry].growth.growth is Growth.QUADRATIC
+        assert conditions[entry].dimension == 1
+    assert not any(scanned.unassigned)
 
 
 def planar(first, second, *names):
@@ -127,10 +127,10 @@ def planar(first, second, *names):
     ],
 )
 def test_what_splits_over_a_number_field_is_found_as_one(second, names, text, dimension):
-    found = scan(planar("y", second, *names), [*names], terms=4)
-    one = next(one for one in found.components if one.text == text)
-    assert (one.dimension, one.is_confirmed, one.growth.growth) == (dimension, True, Growth.QUADRATIC)
-    assert not any(found.unassigned)
+    scanned = scan(planar("y", second, *names), [*names], terms=4)
+    entry = next(component for component in scanned.components if component.text == text)
+    assert (entry.dimension, entry.is_confirmed, entry.growth.growth) == (dimension, True, Growth.QUADRATIC)
+    assert not any(scanned.unassigned)
 
 
 REPAIRED = """variables = ["x", "y"]
@@ -140,34 +140,34 @@ rhs = ["2*x*y", "A*y^2 - 4*x^2 - 6*x - 6"]"""
 
 
 def test_a_condition_with_eps_is_found_where_eps_varies_too():
-    found = scan(parse_system(REPAIRED), ["eps", "A"], primes=(43, 47, 53), terms=5)
-    assert found.over == ("A", "eps")
+    scanned = scan(parse_system(REPAIRED), ["eps", "A"], primes=(43, 47, 53), terms=5)
+    assert scanned.over == ("A", "eps")
     # the catalogue's repaired_octahedral
-    one = next(one for one in found.components if one.text == "24*eps^2 + A + 2 = 0")
-    assert one.is_confirmed
-    assert one.growth.growth is Growth.QUADRATIC
-    assert one.values["A"] == -2 - 24 * one.values["eps"] ** 2
+    entry = next(component for component in scanned.components if component.text == "24*eps^2 + A + 2 = 0")
+    assert entry.is_confirmed
+    assert entry.growth.growth is Growth.QUADRATIC
+    assert entry.values["A"] == -2 - 24 * entry.values["eps"] ** 2
     without = scan(parse_system(REPAIRED), ["A"], primes=(43, 47, 53), terms=5)
-    assert [one.text for one in without.components] == ["-1"]  # the one that holds for every eps
+    assert [component.text for component in without.components] == ["-1"]  # the one that holds for every eps
 
 
 def test_four_parameters_give_what_has_codimension_2_as_well():
     text = LOTKA_VOLTERRA.replace("C = 1", "C = 1, D = 1").replace("x + A*z", "D*x + A*z")
-    found = scan(parse_system(text), ["A", "B", "C", "D"], terms=3)
-    conditions = {one.text: one for one in found.components}
+    scanned = scan(parse_system(text), ["A", "B", "C", "D"], terms=3)
+    conditions = {component.text: component for component in scanned.components}
     assert conditions["A*B*C + D = 0"].dimension == 3
     # at D = 1 these are the curves that are known
-    for one in ("A*B + D = 0, C - 1 = 0", "B*C + D = 0, A - 1 = 0", "A*C + 1 = 0, B - D = 0"):
-        assert (conditions[one].dimension, conditions[one].is_confirmed) == (2, True)
-        assert conditions[one].growth.growth is Growth.QUADRATIC
-    assert "24 random planes of parameter space modulo 19, 23, 29, 31" in found.coverage
-    assert "codimension 2" in found.coverage
+    for entry in ("A*B + D = 0, C - 1 = 0", "B*C + D = 0, A - 1 = 0", "A*C + 1 = 0, B - D = 0"):
+        assert (conditions[entry].dimension, conditions[entry].is_confirmed) == (2, True)
+        assert conditions[entry].growth.growth is Growth.QUADRATIC
+    assert "24 random planes of parameter space modulo 19, 23, 29, 31" in scanned.coverage
+    assert "codimension 2" in scanned.coverage
 
 
 def test_the_budget_may_be_spent_before_anything_is_known():
-    found = scan(load("henon_heiles"), ["c"], effort=Budget(1))
-    assert (found.ended, found.components, found.height) == ("budget", (), 0)
-    assert "not done\tmembers modulo 10" in found.text
+    scanned = scan(load("henon_heiles"), ["c"], effort=Budget(1))
+    assert (scanned.ended, scanned.components, scanned.height) == ("budget", (), 0)
+    assert "not done\tmembers modulo 10" in scanned.text
 
     def over():
         raise TimeOver
@@ -178,9 +178,9 @@ def test_the_budget_may_be_spent_before_anything_is_known():
 
 def test_a_curve_that_is_missed_is_said_to_be_one():
     # over a cubic field: modulo 1/3 of the primes all three lines are there, modulo 1/2 one of them
-    found = scan(planar("y", "x^2 + b*x + (a^3 - 2)*y", "a", "b"), ["a", "b"], terms=4)
-    assert found.components == ()
-    assert "as many as a curve has, so one may have been missed" in found.text
+    scanned = scan(planar("y", "x^2 + b*x + (a^3 - 2)*y", "a", "b"), ["a", "b"], terms=4)
+    assert scanned.components == ()
+    assert "as many as a curve has, so one may have been missed" in scanned.text
 
 
 @pytest.mark.parametrize("stage", ["_confirm", "_measure_growth", "symmetries", "conditions"])
@@ -189,7 +189,7 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
         raise TimeLimit
 
     monkeypatch.setattr(scan_module, stage, stop)
-    found = scan(parse_system(THREE_LINES), ["g1"], primes=(17, 19, 23), terms=3)
+    scanned = scan(parse_system(THREE_LINES), ["g1"], primes=(17, 19, 23), terms=3)
     left_out = {
         "conditions": "all conditions for",
         "_confirm": "the confirmation of",
@@ -197,10 +197,10 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
         "symmetries": "changes of parameters",
     }
     known = list(left_out)
-    assert found.ended == "interrupted"
-    assert found.omitted[0].startswith(left_out[stage])
-    assert bool(found.components) is (stage != "conditions")
-    assert any(one.tried for one in found.components) is (known.index(stage) > 1)
+    assert scanned.ended == "interrupted"
+    assert scanned.omitted[0].startswith(left_out[stage])
+    assert bool(scanned.components) is (stage != "conditions")
+    assert any(component.tried for component in scanned.components) is (known.index(stage) > 1)
 
 
 @pytest.mark.parametrize(
@@ -251,33 +251,33 @@ def found_in(points, p, count, seed=0):
 
 def test_two_lines_and_points_beside_them_are_told_apart():
     points = points_where(lambda a, b: (a - 3 * b) * (a + b - 1), 31, 2)
-    found = found_in([*points, (5, 0), (7, 1)], 31, 2)
-    assert set(found.linear[1]) == {((1, 28, 0),), ((1, 1, 30),)}
-    assert set(found.linear[0]) == {((1, 0, 26), (0, 1, 0)), ((1, 0, 24), (0, 1, 30))}
-    assert not found.hypersurfaces
+    result = found_in([*points, (5, 0), (7, 1)], 31, 2)
+    assert set(result.linear[1]) == {((1, 28, 0),), ((1, 1, 30),)}
+    assert set(result.linear[0]) == {((1, 0, 26), (0, 1, 0)), ((1, 0, 24), (0, 1, 30))}
+    assert not result.hypersurfaces
 
 
 def test_a_curve_is_found_among_points_by_chance():
     rng = random.Random(1)
     noise = [(rng.randrange(31), rng.randrange(31)) for _ in range(4)]
     points = points_where(lambda a, b: a * a + b * b - 1, 31, 2)
-    found = found_in([*points, *noise], 31, 2)
-    assert len(found.hypersurfaces[()]) == 1
-    assert len(found.linear[0]) == len(set(noise) - set(points))
+    result = found_in([*points, *noise], 31, 2)
+    assert len(result.hypersurfaces[()]) == 1
+    assert len(result.linear[0]) == len(set(noise) - set(points))
 
 
 def test_a_curve_in_a_plane_of_space_is_found():
     points = [x for x in product(range(31), repeat=3) if x[0] == 1 and (x[1] * x[2] + 1) % 31 == 0]
-    found = found_in(points, 31, 3)
-    assert list(found.hypersurfaces) == [((1, 0, 0, 30),)]
-    assert not found.linear.get(0)
+    result = found_in(points, 31, 3)
+    assert list(result.hypersurfaces) == [((1, 0, 0, 30),)]
+    assert not result.linear.get(0)
 
 
 def test_three_hyperplanes_of_a_space_of_dimension_6_are_told_apart():
     rng = random.Random(3)
     points = [tuple(0 if i == k else rng.randrange(1, 79) for i in range(6)) for k in range(3) for _ in range(60)]
-    found = find_components(points, 79, 79 * 60, 5, random.Random(0))
-    assert sorted(found.linear[5]) == [(tuple(int(i == k) for i in range(7)),) for k in (2, 1, 0)]
+    components = find_components(points, 79, 79 * 60, 5, random.Random(0))
+    assert sorted(components.linear[5]) == [(tuple(int(i == k) for i in range(7)),) for k in (2, 1, 0)]
 
 
 def test_what_is_not_there_modulo_the_third_prime_is_not_lifted():
@@ -306,15 +306,15 @@ def zeros(condition, *others):
     ],
 )
 def test_points_over_number_fields_have_an_equation_for_each_parameter(condition, others, names, expected):
-    found = lift_conjugate_points(zeros(condition, *others), names, random.Random(1))
-    assert [[*map(str, equations)] for equations, _ in found] == [expected]
+    points = lift_conjugate_points(zeros(condition, *others), names, random.Random(1))
+    assert [[*map(str, equations)] for equations, _ in points] == [expected]
 
 
 def test_points_over_number_fields_have_to_be_there_modulo_all_primes_but_one():
-    found = zeros(lambda a: a**2 - 5)
-    there = [p for p in FIELD_PRIMES if found[p]]
-    assert lift_conjugate_points({**found, there[0]: []}, "a", random.Random(1))  # one is let off
-    assert not lift_conjugate_points({**found, there[0]: [], there[1]: []}, "a", random.Random(1))
+    result = zeros(lambda a: a**2 - 5)
+    there = [p for p in FIELD_PRIMES if result[p]]
+    assert lift_conjugate_points({**result, there[0]: []}, "a", random.Random(1))  # one is let off
+    assert not lift_conjugate_points({**result, there[0]: [], there[1]: []}, "a", random.Random(1))
 
 
 @pytest.mark.parametrize("spoilt", [False, True])
@@ -324,8 +324,8 @@ def test_a_product_is_factored_and_has_to_agree_modulo_the_last_prime(spoilt):
     for p in PRIMES:
         both = [[-3 % p, 0, 0, 1, 0, 2], [-2 % p, 0, 0, 0, 1, 0]]
         hypersurfaces[p] = [[-4 % p, 0, 0, 1, 0, 2], both[1]] if spoilt and p == 41 else both
-    found = {str(form) for form, _ in lift_hypersurfaces(hypersurfaces, ["a", "b"])}
-    assert found == ({"a*b - 2"} if spoilt else expected)
+    results = {str(form) for form, _ in lift_hypersurfaces(hypersurfaces, ["a", "b"])}
+    assert results == ({"a*b - 2"} if spoilt else expected)
 
 
 LYNESS = """variables = ["x", "y"]
@@ -350,20 +350,22 @@ def members(count: int, prime: int, size: int = 40) -> np.ndarray:
 @pytest.mark.parametrize(("text", "names", "terms", "prime"), CASES)
 def test_the_compiled_loop_and_flint_give_the_same_degrees_on_the_same_lines(text, names, terms, prime):
     pytest.importorskip("numba")
-    one = family(text, names, prime)
+    entry = family(text, names, prime)
     points = members(len(names), prime)
-    found = [one.degrees(points, None, terms, 400, random.Random(3), kernel=kernel) for kernel in ("numba", "numpy")]
-    assert (found[0] == found[1]).all()
-    assert len({tuple(row) for row in found[0].tolist()}) > 1  # members are told from each other
+    results = [
+        entry.degrees(points, None, terms, 400, random.Random(3), kernel=kernel) for kernel in ("numba", "numpy")
+    ]
+    assert (results[0] == results[1]).all()
+    assert len({tuple(row) for row in results[0].tolist()}) > 1  # members are told from each other
 
 
 def test_special_members_have_smaller_degrees():
     points = np.array([[1, 1], [1, 2], [2, 3], [5, 6], [3, 12]])
-    found = np.max(
+    result = np.max(
         [family(THREE_LINES, ["g1", "g2"], 8179).degrees(points, None, 7, 300, random.Random(k)) for k in (1, 2)],
         axis=0,
     )
-    assert found.tolist() == [
+    assert result.tolist() == [
         [2, 4, 8, 13, 20, 28, 38],  # zander-2021
         [2, 4, 7, 12, 18, 25, 34],
         [2, 4, 7, 11, 16, 23, 31],
@@ -377,5 +379,5 @@ def test_an_iterate_defined_nowhere_is_reported(kernel):
     if kernel == "numba":
         pytest.importorskip("numba")
     vanishing = 'variables = ["x"]\nparameters.a = 1\n[bilinear]\nequations = ["a*(X - x) = eps*a*x*X"]'
-    found = family(vanishing, ["a"], 13).degrees(np.array([[2], [0]]), None, 2, 99, random.Random(1), kernel=kernel)
-    assert found.tolist() == [[1, 1], [NOWHERE, NOWHERE]]
+    result = family(vanishing, ["a"], 13).degrees(np.array([[2], [0]]), None, 2, 99, random.Random(1), kernel=kernel)
+    assert result.tolist() == [[1, 1], [NOWHERE, NOWHERE]]

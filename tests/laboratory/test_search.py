@@ -45,15 +45,15 @@ def searched(file, eps=None):
     ],
 )
 def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
-    laboratory, found = searched(load(name))
-    assert [step.kind for step in found.steps] == kinds
-    assert gradient_rank(laboratory.maps[0], found.all_spaces) == independent
-    assert not may_be_conjugate(found)
+    laboratory, result = searched(load(name))
+    assert [step.kind for step in result.steps] == kinds
+    assert gradient_rank(laboratory.maps[0], result.all_spaces) == independent
+    assert not may_be_conjugate(result)
     reference, second = laboratory.primes[0], laboratory.maps[1]
-    again = repeat_search(found, second, reference)
+    again = repeat_search(result, second, reference)
     assert again is not None
     assert [[len(space.basis) for space in group] for group in again.spaces] == [
-        [len(space.basis) for space in group] for group in found.spaces
+        [len(space.basis) for space in group] for group in result.spaces
     ]
     assert gradient_rank(second, again.all_spaces) == independent
 
@@ -76,9 +76,9 @@ def test_laurent_polynomials_are_found_without_the_span_of_the_relations(monkeyp
     profile, dim = orbit_profile(laboratory.maps), laboratory.map.dim
     assert profile.codimension == len(origins)
     over = denominators_among(candidates(laboratory, known, Budget()), dim)
-    found = search_spaces(laboratory.maps[0], profile, known, over, budget=Budget())
-    assert [step.text for step in found.steps] == origins
-    assert gradient_rank(laboratory.maps[0], found.all_spaces) == len(origins)
+    spaces = search_spaces(laboratory.maps[0], profile, known, over, budget=Budget())
+    assert [step.text for step in spaces.steps] == origins
+    assert gradient_rank(laboratory.maps[0], spaces.all_spaces) == len(origins)
     # Without the variables for denominators only the polynomial is found.
     with pytest.raises(pytest.fail.Exception):
         search_spaces(laboratory.maps[0], profile, known, budget=Budget())
@@ -106,9 +106,9 @@ def closed_forms(model, spaces_at, variables, symbols, eps_enters, budget):
 
 
 def test_coefficients_are_interpolated():
-    found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
-    assert [format_polynomial(P) for P in found.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
-    assert found.reason == ""
+    formulas = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", budget=Budget())
+    assert [format_polynomial(P) for P in formulas.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
+    assert formulas.reason == ""
 
 
 # f = grad H x grad K with quadratic H(x, y) and K(y, z). By exchanging H and K each of the two pencils becomes the
@@ -121,8 +121,12 @@ FAMILY = system("x y z", f"{DY}*{KZ}", f"-{DX}*{KZ}", f"{DX}*{KY}", **VALUES)
 
 @cache
 def found_with(symbols, seed):
-    found = find_integrals(FAMILY, symbols=symbols.split(), seed=seed)
-    return [one.text for one in found.integrals], {one.verdict for one in found.integrals}, found.reason
+    search = find_integrals(FAMILY, symbols=symbols.split(), seed=seed)
+    return (
+        [integral.text for integral in search.integrals],
+        {integral.verdict for integral in search.integrals},
+        search.reason,
+    )
 
 
 @pytest.mark.parametrize("seed", quick([1, 2, 3], [1]))
@@ -137,9 +141,9 @@ def test_two_alike_pencils_give_the_same_formulas_for_every_seed(seed):
 
 def spaces(prime, values, numbers, order):
     """Spaces 1, x + c y of degree 1 in the plane with these c, shuffled."""
-    found = [DarbouxSpace(2, 1, [[1, 0, 0], [0, c(prime, *values) % prime, 1]]) for c in numbers]
-    random.Random(f"{order} {prime} {values}").shuffle(found)
-    return found
+    results = [DarbouxSpace(2, 1, [[1, 0, 0], [0, c(prime, *values) % prime, 1]]) for c in numbers]
+    random.Random(f"{order} {prime} {values}").shuffle(results)
+    return results
 
 
 def root_of(n, prime):
@@ -169,8 +173,8 @@ def test_shuffled_spaces_are_put_in_order_on_every_map(order):
     assert ordered[0] == ordered[1]
     which = [
         [
-            next(k for k, c in enumerate(numbers) if c(m.prime, *m.values, m.eps) % m.prime == one.basis[1][1])
-            for one in g
+            next(k for k, c in enumerate(numbers) if c(m.prime, *m.values, m.eps) % m.prime == entry.basis[1][1])
+            for entry in g
         ]
         for m, g in zip((first, second), ordered[1:], strict=True)
     ]

@@ -35,8 +35,8 @@ def step(name, run=where, *, is_independent=True):
 
 def test_independent_steps_run_elsewhere_in_their_order_and_the_others_here():
     steps = [step("first"), step("second", lambda c, **_: c.result["first"]), step("third", is_independent=False)]
-    found = analyze(load("harmonic"), analyses=steps, processes=2)
-    assert found["first"] == found["second"] != found["third"] == HERE
+    analysis = analyze(load("harmonic"), analyses=steps, processes=2)
+    assert analysis["first"] == analysis["second"] != analysis["third"] == HERE
     assert analyze(load("harmonic"), analyses=steps)["first"] == HERE  # with one process
 
 
@@ -46,9 +46,9 @@ def test_what_a_killed_process_did_not_do_is_done_here():
             os.kill(os.getpid(), signal.SIGKILL)
         return os.getpid()
 
-    found = analyze(load("harmonic"), analyses=[step("first"), step("second", killed), step("third")], processes=2)
-    assert found["first"] != found["second"] == found["third"] == HERE
-    assert found.skipped == []
+    analysis = analyze(load("harmonic"), analyses=[step("first"), step("second", killed), step("third")], processes=2)
+    assert analysis["first"] != analysis["second"] == analysis["third"] == HERE
+    assert analysis.skipped == []
 
 
 def test_a_failed_step_of_the_second_process_is_reported_and_a_mistake_is_raised():

@@ -19,7 +19,7 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.singular import outcomes
-from kahanmaps.laboratory.singular.contracted import components
+from kahanmaps.laboratory.singular.exceptional import components
 from kahanmaps.laboratory.singular.jets import image_of, images_of_curve
 from kahanmaps.laboratory.singular.outcomes import BUDGET_SPENT, NOT_CONFINED, critical_points
 from kahanmaps.laboratory.singular.singularities import default_eps, singularities
@@ -42,14 +42,14 @@ INTEGRABLE = ["weierstrass", "planar_cubic_hamiltonian", "volterra_periodic_4", 
 @pytest.mark.parametrize("name", INTEGRABLE)
 def test_singularities_of_integrable_maps_are_confined(name):
     """zander-2021 for the planar systems; the others have integrals, and degrees that grow polynomially."""
-    found = runs(name)
-    assert [run.verdict for run in found] == ["confined", "confined"]
-    assert found[0].shape == found[1].shape
+    result = runs(name)
+    assert [run.verdict for run in result] == ["confined", "confined"]
+    assert result[0].shape == result[1].shape
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "lorenz"])
 def test_nothing_is_confined_where_degrees_are_the_largest_possible(name):
-    """The degrees 2^n and 3^n say that no contracted hypersurface ever meets a point without a value."""
+    """The degrees 2^n and 3^n say that no contracted hypersurface ever meets an indeterminacy point."""
     for run in runs(name, steps=60):
         assert run.verdict == "not confined"
         assert {h.status for h in run.hypersurfaces} == {NOT_CONFINED}
@@ -77,36 +77,36 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
         return {
             (h.multiplicity, h.status, h.contracted_at, h.confined_at, tuple(step.rank for step in h.steps))
             for h in run.hypersurfaces
-            if not h.is_pole and h.polynomial != "Z"
+            if not h.divides_denominator and h.polynomial != "Z"
         }
 
     assert outcomes(unwritten) == outcomes(written)
-    assert {h.polynomial for h in unwritten.hypersurfaces if h.is_pole} == {
-        h.polynomial for h in written.hypersurfaces if h.is_pole
+    assert {h.polynomial for h in unwritten.hypersurfaces if h.divides_denominator} == {
+        h.polynomial for h in written.hypersurfaces if h.divides_denominator
     }
     degrees = sum(h.degree for h in unwritten.hypersurfaces if h.polynomial == "?")
-    assert degrees == sum(h.degree for h in written.hypersurfaces if not h.is_pole and h.polynomial != "Z")
+    assert degrees == sum(h.degree for h in written.hypersurfaces if not h.divides_denominator and h.polynomial != "Z")
 
 
 def test_a_budget_that_is_spent_stops_it():
     top, before = load("euler_top").system, counted()
-    whole = singularities(top, "1/7")
+    complete = singularities(top, "1/7")
     run = singularities(top, "1/7", effort=Budget((counted() - before) / 2))
     assert run.stopped
     assert run.verdict == "undecided"
-    assert run.hypersurfaces[0] == whole.hypersurfaces[0]
+    assert run.hypersurfaces[0] == complete.hypersurfaces[0]
     assert run.hypersurfaces[-1].note == BUDGET_SPENT
 
 
 def test_a_time_limit_keeps_the_hypersurfaces_that_were_followed():
-    top, whole = load("euler_top").system, singularities(load("euler_top").system, "1/7")
+    top, complete = load("euler_top").system, singularities(load("euler_top").system, "1/7")
 
     def stop(sentence):
-        if sentence == f"following {whole.hypersurfaces[1].polynomial[:40]}":
+        if sentence == f"following {complete.hypersurfaces[1].polynomial[:40]}":
             raise TimeLimit("the time limit of 1 s is over")
 
     run = singularities(top, "1/7", progress=stop)
-    assert (run.stopped, run.hypersurfaces) == (True, whole.hypersurfaces[:1])
+    assert (run.stopped, run.hypersurfaces) == (True, complete.hypersurfaces[:1])
     with pytest.raises(TimeLimit):  # a stage of something else, which ends as well
         singularities(top, "1/7", effort=Budget(1e9), progress=stop)
 
@@ -171,12 +171,12 @@ def test_steps_by_elimination_are_those_by_minors(name, monkeypatch):
         tangents = outcomes._tangents(critical.point, critical.gradient, field)
         direction = [rng.randrange(PRIME) for _ in critical.point]
         for moved in (tangents, ()):
-            told = []
+            messages = []
             for dimension in (1, 100):
                 monkeypatch.setattr("kahanmaps.laboratory.singular.jets._MIN_ELIMINATION_DIMENSION", dimension)
                 steps = islice(images_of_curve(here.equations, critical.point, direction, 30, moved), 6)
-                told.append([(step.common, step.pole, step.denominator, step.rank) for step in steps])
-            assert told[0] == told[1]
+                messages.append([(step.common, step.pole, step.denominator, step.rank) for step in steps])
+            assert messages[0] == messages[1]
 
 
 @pytest.mark.parametrize("name", ["riccati", "lorenz", "volterra_periodic_5"])
@@ -192,7 +192,7 @@ X1, X2, X3, Z = fmpq_mpoly_ctx.get(NAMES, Ordering.degrevlex).gens()
 DIRECTION = (31, 41, 59, 26)
 
 
-def found(form, p, curve, direction=DIRECTION, at_image=False):
+def components_on(form, p, curve, direction=DIRECTION, at_image=False):
     equation = load("euler_top").map.at(1, GF(p)).equations[0]
     return components(equation, [(form, at_image)], [nmod_poly(list(entry), p) for entry in curve], direction)
 
@@ -200,36 +200,39 @@ def found(form, p, curve, direction=DIRECTION, at_image=False):
 @pytest.mark.parametrize(("p", "degrees"), [(1000033, [1, 1, 2]), (1000003, [2, 2])])
 def test_a_form_splits_modulo_primes_with_a_root_of_minus_one(p, degrees):
     curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
-    some = found((X1**2 + X2**2) * (X1 * X3 + Z**2) ** 3, p, curve)
-    assert sorted(one.degree for one in some) == degrees
-    assert sorted(one.exponents for one in some if one.degree == 1) == [(1,)] * degrees.count(1)
-    assert (3,) in [one.exponents for one in some]
-    assert all(one.order == 0 for one in some)
+    some = components_on((X1**2 + X2**2) * (X1 * X3 + Z**2) ** 3, p, curve)
+    assert sorted(entry.degree for entry in some) == degrees
+    assert sorted(entry.exponents for entry in some if entry.degree == 1) == [(1,)] * degrees.count(1)
+    assert (3,) in [entry.exponents for entry in some]
+    assert all(entry.order == 0 for entry in some)
 
 
 def test_orders_along_a_curve_are_those_of_each_component():
     """X1 = X2 t^0 + t^3 has the order 3 on X1 = X2, 1 on X1 + X2 - 2 Z, and 0 on X3."""
     curve = [(1, 1, 0, 1), (1, 1), (5,), (1,)]
-    orders = {one.order for one in found((X1**2 - X2**2) * (X1 + X2 - 2 * Z) * X3, 1000033, curve)}
+    orders = {entry.order for entry in components_on((X1**2 - X2**2) * (X1 + X2 - 2 * Z) * X3, 1000033, curve)}
     assert orders == {0, 1, 3}
-    assert [one.order for one in found(X1 - X2, 1000033, [(1, 1), (1, 1), (5,), (1,)])] == [None]  # it lies there
+    assert [entry.order for entry in components_on(X1 - X2, 1000033, [(1, 1), (1, 1), (5,), (1,)])] == [
+        None
+    ]  # it lies there
 
 
 def test_roots_are_points_of_the_component():
     p = 1000033
     curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
-    for one in found((X1**2 + X2**2) * X3, p, curve):
+    for item in components_on((X1**2 + X2**2) * X3, p, curve):
         for t in range(5):
-            for u in one.roots(t):
+            for u in item.roots(t):
                 x1, x2, x3, _ = ((a + b * t + u * w) % p for (a, b), w in zip(curve, DIRECTION, strict=True))
                 assert (x1**2 + x2**2) * x3 % p == 0
-    assert not any(one.roots(t) for one in found(X1**2 + X2**2, 1000003, curve) for t in range(5))
+    assert not any(entry.roots(t) for entry in components_on(X1**2 + X2**2, 1000003, curve) for t in range(5))
 
 
 def conics(*signs):
     """What the map of the Euler top contracts, with these signs; that of its inverse at -eps."""
     return {
-        f"2*x1^2*eps^2 + x2^2*eps^2 {one} 4*x1*x3*eps^2 + 2*x3^2*eps^2 {other} 2*x2*eps + 1" for one, other in signs
+        f"2*x1^2*eps^2 + x2^2*eps^2 {first} 4*x1*x3*eps^2 + 2*x3^2*eps^2 {second} 2*x2*eps + 1"
+        for first, second in signs
     }
 
 
@@ -240,11 +243,11 @@ def contracted(map_, eps):
 def test_names_by_hand():
     """Weierstrass: 1 - 12 eps^2 x is det(I - eps f'); the two conics of the Euler top go over into each other."""
     weierstrass = load("weierstrass").map
-    (pole,) = (h for h in with_eps(weierstrass, fmpq(1, 7), contracted(weierstrass, "1/7")) if h.is_pole)
+    (pole,) = (h for h in with_eps(weierstrass, fmpq(1, 7), contracted(weierstrass, "1/7")) if h.divides_denominator)
     assert pole.generic == "12*x*eps^2 - 1"
-    found = degree_growth(load("euler_top").map)
-    assert {h.generic for h in found.patterns.contracted} == conics("-+", "+-")
-    assert not any("at eps" in told for told in found.patterns.sentences)
+    growth = degree_growth(load("euler_top").map)
+    assert {h.generic for h in growth.patterns.exceptional} == conics("-+", "+-")
+    assert not any("at eps" in sentence for sentence in growth.patterns.sentences)
 
 
 @pytest.mark.parametrize("name", ["zhukovski_volterra_2", "volterra_periodic_4"])
@@ -255,8 +258,8 @@ def test_at_the_eps_they_are_what_was_followed(name):
             assert h.generic == ""
             continue
         value = parse_polynomial(h.generic, (*map_.variables, "eps")).subs({"eps": eps})
-        wanted = parse_polynomial(h.polynomial, (*map_.variables, "eps"))
-        assert value * wanted.leading_coefficient() == wanted * value.leading_coefficient()
+        expected = parse_polynomial(h.polynomial, (*map_.variables, "eps"))
+        assert value * expected.leading_coefficient() == expected * value.leading_coefficient()
 
 
 def test_at_another_eps_nothing_is_named():
@@ -267,4 +270,4 @@ def test_at_another_eps_nothing_is_named():
 
 def test_of_a_composition_of_powers_those_of_its_maps_are_named():
     map_ = parse_system('[composition]\nof = [{ system = "euler_top", power = 2, inverse = true }]').map
-    assert {h.generic for h in degree_growth(map_, max_terms=1).patterns.contracted} == conics("--", "++")
+    assert {h.generic for h in degree_growth(map_, max_terms=1).patterns.exceptional} == conics("--", "++")

@@ -54,9 +54,9 @@ def holds_for_the_map(f, S, r, target, seed=0):
 )
 def test_groups_of_the_catalogue_and_the_map_obeys_them(name, order):
     f = load(name, {}).system
-    found = linear_symmetries(f)
-    assert (found.order, len(found.signed), found.complete) == (order, order, True)
-    for t in (*found.generators, *found.others):
+    symmetries = linear_symmetries(f)
+    assert (symmetries.order, len(symmetries.signed), symmetries.complete) == (order, order, True)
+    for t in (*symmetries.generators, *symmetries.others):
         sign = -1 if t.reversing else 1
         assert holds_for_the_map(f, t.S, t.r, lambda eps, sign=sign: sign * eps)
 
@@ -70,16 +70,16 @@ def test_signed_permutations_agree_with_brute_force(seed):
     texts = ["*".join(term) for term in terms]
     rhs = ["0" + "".join(f" + {rng.choice((-1, 1))}*{t}" for t in rng.sample(texts, 2)) for _ in range(n)]
     f = QuadraticSystem.from_text(names, rhs)
-    wanted = set()
+    expected = set()
     for order, signs in itertools.product(itertools.permutations(range(n)), itertools.product((1, -1), repeat=n)):
         S = fmpq_mat(n, n)
         for i, (place, s) in enumerate(zip(order, signs, strict=True)):
             S[place, i] = fmpq(s)
-        wanted |= {(str(S), sign < 0) for sign in (1, -1) if is_symmetry(f, S, [fmpq(0)] * n, sign)}
-    found = linear_symmetries(f, effort=2)
-    unscaled = [t for t in found.signed if all(abs(e) in (0, 1) for e in t.S.entries())]
-    assert {(str(t.S), t.reversing) for t in unscaled if not any(e != 0 for e in t.r)} == wanted
-    for t in found.symmetries + found.reversing:
+        expected |= {(str(S), sign < 0) for sign in (1, -1) if is_symmetry(f, S, [fmpq(0)] * n, sign)}
+    symmetries = linear_symmetries(f, effort=2)
+    unscaled = [t for t in symmetries.signed if all(abs(e) in (0, 1) for e in t.S.entries())]
+    assert {(str(t.S), t.reversing) for t in unscaled if not any(e != 0 for e in t.r)} == expected
+    for t in symmetries.symmetries + symmetries.reversing:
         assert is_symmetry(f, t.S, t.r, -1 if t.reversing else 1)
 
 
@@ -89,10 +89,10 @@ def test_a_translation_is_found_where_it_is_needed():
     (_, t) = linear_symmetries(f).signed
     assert (t.text, t.reversing, t.is_trivial) == ("(x) -> (-x - 1)", True, False)
     assert holds_for_the_map(f, t.S, t.r, lambda eps: -eps)
-    found = linear_symmetries(system("x y", "x^2 + x", "y^2 - 3*y"))
-    assert [t.text for t in found.reversing] == ["(x, y) -> (-x - 1, -y + 3)"]
-    found = linear_symmetries(system("x y", "x*(x + 3*(y - 1))", "(y - 1)*(y - 1 + 3*x)"))
-    assert [t.text for t in found.symmetries] == ["(x, y) -> (x, y)", "(x, y) -> (y - 1, x + 1)"]
+    symmetries = linear_symmetries(system("x y", "x^2 + x", "y^2 - 3*y"))
+    assert [t.text for t in symmetries.reversing] == ["(x, y) -> (-x - 1, -y + 3)"]
+    symmetries = linear_symmetries(system("x y", "x*(x + 3*(y - 1))", "(y - 1)*(y - 1 + 3*x)"))
+    assert [t.text for t in symmetries.symmetries] == ["(x, y) -> (x, y)", "(x, y) -> (y - 1, x + 1)"]
 
 
 @pytest.mark.parametrize(
@@ -107,17 +107,21 @@ def test_a_translation_is_found_where_it_is_needed():
 )
 def test_permutations_of_scaled_variables(rhs, actions):
     """With and without a rational scale; the last one is spoiled by a linear term."""
-    found = linear_symmetries(system("x y", *rhs))
-    assert {t.text for t in found.signed if not t.reversing} == set(actions)
+    symmetries = linear_symmetries(system("x y", *rhs))
+    assert {t.text for t in symmetries.signed if not t.reversing} == set(actions)
 
 
 def test_matrices_that_are_no_signed_permutations():
     """Conjugate a system with the group of order 12 of the triangle by a shear: the matrices are still found."""
     f = load("zander_111", {}).system
-    found = linear_symmetries(f)
-    assert (len(found.signed), len(found.others), found.complete) == (4, 8, True)  # 2 are of scaled variables
-    assert (found.group_text, len(found.generators)) == ("12 rational matrices, 6 of them reversing", 2)
-    for t in found.others:
+    symmetries = linear_symmetries(f)
+    assert (len(symmetries.signed), len(symmetries.others), symmetries.complete) == (
+        4,
+        8,
+        True,
+    )  # 2 are of scaled variables
+    assert (symmetries.group_text, len(symmetries.generators)) == ("12 rational matrices, 6 of them reversing", 2)
+    for t in symmetries.others:
         sign = -1 if t.reversing else 1
         assert holds_for_the_map(f, t.S, t.r, lambda eps, sign=sign: sign * eps)
 
@@ -125,8 +129,8 @@ def test_matrices_that_are_no_signed_permutations():
 def test_infinitesimal_symmetries_are_those_of_the_three_wave_system():
     """Two independent phase rotations, whose phases add up to nothing (petrera-pfadler-suris-2011)."""
     f = load("three_wave", {}).system
-    found = linear_symmetries(f)
-    assert [x.rhs for x in found.infinitesimal] == [
+    symmetries = linear_symmetries(f)
+    assert [x.rhs for x in symmetries.infinitesimal] == [
         ["v1", "-v2", "0", "-u1", "u2", "0"],
         ["v1", "0", "-v3", "-u1", "0", "u3"],
     ]
@@ -181,4 +185,4 @@ def test_equations_with_long_coefficients_are_not_set_up_and_nothing_is_called_c
     assert symmetries.undecided == ["other matrices are searched for coefficients of up to 2000 digits only"]
     assert commuting.undecided == ["other g are searched for coefficients of up to 2000 digits only"]
     assert (symmetries.complete, commuting.complete, darboux.complete) == (False, False, False)
-    assert [one.trivial for one in commuting.solutions] == ["0", "f", "-f"]
+    assert [solution.trivial for solution in commuting.solutions] == ["0", "f", "-f"]

@@ -39,10 +39,10 @@ def system(names, *rhs):
 )
 def test_fixed_points_and_eigenvalues(f, texts):
     search = fixed_points(f)
-    told = [one.text.replace(", eigenvalues of f'", "") for one in search.found]
-    assert (len(told), search.undecided) == (len(texts), "")
-    for text, wanted in zip(told, texts, strict=True):
-        assert wanted in text
+    messages = [entry.text.replace(", eigenvalues of f'", "") for entry in search.found]
+    assert (len(messages), search.undecided) == (len(texts), "")
+    for text, expected in zip(messages, texts, strict=True):
+        assert expected in text
 
 
 # An equilibrium with the eigenvalue 1/eps is no fixed point of the map at eps.
@@ -67,12 +67,12 @@ def test_fixed_points_and_eigenvalues(f, texts):
 )
 def test_where_an_equilibrium_is_a_fixed_point_of_the_map(f, eps, expected):
     eps = None if eps is None else fmpq(*map(int, eps.split("/")))
-    found = fixed_points(f).found
-    assert [one.are_fixed_by_map(eps) for one in found] == expected
-    for one, is_fixed in zip(found, expected, strict=True):
-        if eps is None or one.equations or one.dimension:
+    result = fixed_points(f).found
+    assert [entry.are_fixed_by_map(eps) for entry in result] == expected
+    for item, is_fixed in zip(result, expected, strict=True):
+        if eps is None or item.equations or item.dimension:
             continue
-        x = [value.leading_coefficient() if value else fmpq(0) for value in one.coordinates]
+        x = [value.leading_coefficient() if value else fmpq(0) for value in item.coordinates]
         if is_fixed:
             assert list(KahanMap(f, eps).step(x)) == x
         else:
@@ -85,19 +85,20 @@ def elsewhere(name, P, q, c):
     return SystemFile.from_system(load(name).system.composed(P, q).transformed(P.inv()).scaled(c), "elsewhere")
 
 
-def holds(file, found):
+def holds(file, result):
     """g(P x + q) = c P f(x), and the same for the maps at a point: T Phi_f(x, eps) = Phi_g(T x, eps/c)."""
-    g = load(found.name, found.parameters).system
+    g = load(result.name, result.parameters).system
     x, eps = [fmpq(k + 2, 7) for k in range(file.dim)], fmpq(1, 11)
 
     def moved(point):
-        column = found.P * fmpq_mat(file.dim, 1, list(point))
-        return [a + b for a, b in zip(column.entries(), found.q, strict=True)]
+        column = result.P * fmpq_mat(file.dim, 1, list(point))
+        return [a + b for a, b in zip(column.entries(), result.q, strict=True)]
 
     same = (
-        g.renamed(file.variables).composed(found.P, found.q).rhs == file.system.transformed(found.P).scaled(found.c).rhs
+        g.renamed(file.variables).composed(result.P, result.q).rhs
+        == file.system.transformed(result.P).scaled(result.c).rhs
     )
-    there = KahanMap(g, eps / found.c).step(moved(x))
+    there = KahanMap(g, eps / result.c).step(moved(x))
     return same and list(there) == moved(KahanMap(file.system, eps).step(x))
 
 
@@ -108,19 +109,19 @@ def test_a_system_is_known_again_after_any_affine_change(name):
     n = load(name).dim
     P = fmpq_mat(n, n, [rng.randint(-2, 2) + 5 * (i % (n + 1) == 0) for i in range(n * n)])
     file = elsewhere(name, P, [fmpq(rng.randint(-2, 2)) for _ in range(n)], 3)
-    found = equivalent_system(file, effort=3)
-    assert found is not None
-    assert found.name == name
-    assert holds(file, found)
+    equivalence = equivalent_system(file, effort=3)
+    assert equivalence is not None
+    assert equivalence.name == name
+    assert holds(file, equivalence)
 
 
 def test_lines_of_fixed_points_are_a_frame():
     """An Euler top with its axes turned: three lines of fixed points lead back to them."""
     P = fmpq_mat([[1, 1, 0], [0, 1, 1], [1, 0, 3]])
     file = elsewhere("euler_top", P, [fmpq(0)] * 3, 1)
-    found = equivalent_system(file, effort=3)
-    assert found is not None
-    assert (found.name, holds(file, found)) == ("euler_top", True)
+    equivalence = equivalent_system(file, effort=3)
+    assert equivalence is not None
+    assert (equivalence.name, holds(file, equivalence)) == ("euler_top", True)
     assert equivalent_system(file, FixedPointSearch((), ""), 3) is None  # without them it is not seen
 
 
@@ -140,11 +141,11 @@ def test_other_systems_are_not_taken_for_one(equations):
 def test_a_near_miss_is_no_equivalence():
     """The verification by itself: an Euler top with one term more of degree 1."""
     good, bad = System("x' = 3*y*z; y' = x*z; z' = -x*y"), System("x' = 3*y*z; y' = x*z; z' = -x*y + x/1000")
-    found = equivalent_system(good)
-    assert found is not None
-    assert found.text == "equivalent to euler_top at a1 = 3, a2 = 1, a3 = -1 with its variables called x, y, z"
-    assert holds(good, found)
-    assert not holds(bad, found)
+    equivalence = equivalent_system(good)
+    assert equivalence is not None
+    assert equivalence.text == "equivalent to euler_top at a1 = 3, a2 = 1, a3 = -1 with its variables called x, y, z"
+    assert holds(good, equivalence)
+    assert not holds(bad, equivalence)
 
 
 GENERIC = [random_system(3, 1), read_system(Path(__file__).parent / "further_systems" / "hamiltonian_6_generic.toml")]
@@ -152,7 +153,7 @@ GENERIC = [random_system(3, 1), read_system(Path(__file__).parent / "further_sys
 
 @pytest.mark.parametrize("file", [GENERIC[0], pytest.param(GENERIC[1], marks=THOROUGH)], ids=["3", "6"])
 def test_the_conjugate_fixed_points_of_a_generic_system_are_counted(file):
-    found = fixed_points(file)
-    assert (found.undecided, [(one.dimension, one.count) for one in found.found]) == ("", [(0, 2**file.dim)])
+    points = fixed_points(file)
+    assert (points.undecided, [(entry.dimension, entry.count) for entry in points.found]) == ("", [(0, 2**file.dim)])
     short = fixed_points(file, effort=-20)
     assert (short.found, short.undecided) == ((), "work limit reached; raise --effort")

@@ -84,20 +84,20 @@ def entries(language, text, function):
 
 def names_in(language, text, file):
     """The names of the variables in a converted file, which are told where they are others."""
-    told = " ".join(line.lstrip("%#!/*(\\ ") for line in text.split("\n\n")[0].splitlines())
-    found = dict(re.findall(r"(\w+) is called (\w+)", told))
-    return [found.get(name, name) for name in file.variables]
+    messages = " ".join(line.lstrip("%#!/*(\\ ") for line in text.split("\n\n")[0].splitlines())
+    results = dict(re.findall(r"(\w+) is called (\w+)", messages))
+    return [results.get(name, name) for name in file.variables]
 
 
 @pytest.mark.parametrize("language", VECTOR)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_expressions_are_read_back_as_the_same_polynomials_and_values(language, name):
     file = SYSTEMS[name]
-    text, asked = converted(language, file)
+    text, requested = converted(language, file)
     names = names_in(language, text, file)
     read = [km.parse_polynomial(piece, names) for piece in entries(language, text, "vector_field")]
     assert [polynomial.to_dict() for polynomial in read] == [polynomial.to_dict() for polynomial in file.system.rhs]
-    for question in asked:
+    for question in requested:
         if question.function == "kahan_map_formula":
             closed = entries(language, text, question.function)
             read = [km.parse_rational_function(piece, (*names, "eps")) for piece in closed]
@@ -174,9 +174,9 @@ def test_a_reserved_name_is_replaced_and_reported(name, expected, in_mathematica
 def test_different_names_stay_different_and_avoid_what_the_file_uses(language):
     names = ["a_1", "a1", "_a1", "I", "v_I", "vI", "x", "X", "point", "v_point", "image", "M", "m", "E", "__", "_"]
     file = km.SystemFile.from_system(km.QuadraticSystem.from_text(names, names))
-    found = names_in(language, convert(file, language, ["system"]), file)
-    assert len({name.lower() for name in found}) == len(names)  # Fortran does not tell x from X
-    assert not {"point", "eps", "image", "value"} & set(found)
+    result = names_in(language, convert(file, language, ["system"]), file)
+    assert len({name.lower() for name in result}) == len(names)  # Fortran does not tell x from X
+    assert not {"point", "eps", "image", "value"} & set(result)
 
 
 def test_integrals_whose_names_come_out_alike_get_functions_of_their_own():
@@ -210,33 +210,33 @@ DOCUMENTS = {name: convert(file, "latex", questions(file)[0]) for name, file in 
 
 def mistakes(document: str) -> list[str]:
     """Braces, environments and alignment marks that do not fit together."""
-    found = []
+    results = []
     body = "\n".join(line for line in document.splitlines() if not line.startswith("%"))
     text = body.replace("\\\\", " NEWLINE ").replace("\\{", "").replace("\\}", "")
     depth = 0
     for character in text:
         depth += {"{": 1, "}": -1}.get(character, 0)
         if depth < 0:
-            found.append("} without {")
+            results.append("} without {")
             break
     if depth > 0:
-        found.append("{ without }")
+        results.append("{ without }")
     opened: list[str] = []
     for what, name in re.findall(r"\\(begin|end)\{([a-z*]+)\}", body):
         if what == "begin":
             opened.append(name)
         elif not opened or opened.pop() != name:
-            found.append(f"\\end{{{name}}} does not close what is open")
-    found += [f"{name} is not closed" for name in opened]
+            results.append(f"\\end{{{name}}} does not close what is open")
+    results += [f"{name} is not closed" for name in opened]
     for rows in re.findall(r"\\begin\{align\*\}(.*?)\\end\{align\*\}", body, re.DOTALL):
         outer = re.sub(r"\\begin\{pmatrix\}.*?\\end\{pmatrix\}", "", rows, flags=re.DOTALL)
-        found += [f"not one & in {row}" for row in outer.split("\\\\") if row.count("&") != 1]
+        results += [f"not one & in {row}" for row in outer.split("\\\\") if row.count("&") != 1]
         if "\n\n" in rows:
-            found.append("an empty line in a display")
+            results.append("an empty line in a display")
     for matrix in re.findall(r"\\begin\{pmatrix\}(.*?)\\end\{pmatrix\}", body, re.DOTALL):
         if len({row.count("&") for row in matrix.split("\\\\")}) != 1:
-            found.append("rows of different length")
-    return found
+            results.append("rows of different length")
+    return results
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
@@ -262,9 +262,9 @@ def test_a_mistake_would_be_noticed(right, wrong):
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_the_lines_of_a_right_hand_side_together_are_all_of_it(name):
-    whole = re.sub(r" \\\\\n&\\quad", "", DOCUMENTS[name])
+    complete = re.sub(r" \\\\\n&\\quad", "", DOCUMENTS[name])
     for variable, polynomial in zip(SYSTEMS[name].variables, SYSTEMS[name].system.rhs, strict=True):
-        assert rf"\dot{{{latex_name(variable)}}} &= {km.latex_polynomial(polynomial)}" in whole
+        assert rf"\dot{{{latex_name(variable)}}} &= {km.latex_polynomial(polynomial)}" in complete
 
 
 def test_matrices_of_more_than_ten_columns_are_announced():

@@ -28,10 +28,10 @@ def answers_of(line):
     return [fmpq(*map(int, piece.split("/"))) for piece in re.findall(r"-?\d+(?:/\d+)?", line)]
 
 
-def script(text, asked):
+def script(text, requested):
     """A converted file for SymPy that prints its answers."""
     lines = [text]
-    for q in asked:
+    for q in requested:
         point = ", ".join(f"Rational({x.p}, {x.q})" for x in q.point)
         lines.append(f"value = {q.function}([{point}], Rational({q.eps.p}, {q.eps.q}))")
         lines.append("print(list(value) if hasattr(value, 'shape') else [value])")
@@ -65,10 +65,10 @@ def start_of(file):
 def printed():
     """What each of the scripts prints; loading SymPy takes a second, so all are run by one process."""
     scripts = {name: script(*converted("sympy", file)) for name, file in SYSTEMS.items()}
-    text, asked = converted("sympy", TOP)
+    text, requested = converted("sympy", TOP)
     for name, (right, wrong) in WRONG.items():
         assert right in text
-        scripts[f"wrong {name}"] = script(text.replace(right, wrong), asked)
+        scripts[f"wrong {name}"] = script(text.replace(right, wrong), requested)
     for name, file in MAPS.items():
         point = f"[{', '.join(f'Rational({x.p}, {x.q})' for x in start_of(file))}]"
         eps = ", Rational(1, 3)" if file.map.has_eps else ""
@@ -88,14 +88,14 @@ def printed():
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_sympy_gives_the_values_of_the_library_exactly(name, printed):
-    _, asked = converted("sympy", SYSTEMS[name])
-    assert list(map(answers_of, printed[name])) == [question.expected for question in asked]
+    _, requested = converted("sympy", SYSTEMS[name])
+    assert list(map(answers_of, printed[name])) == [question.expected for question in requested]
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_formula_would_be_noticed(name, printed):
-    _, asked = converted("sympy", TOP)
-    assert list(map(answers_of, printed[f"wrong {name}"])) != [question.expected for question in asked]
+    _, requested = converted("sympy", TOP)
+    assert list(map(answers_of, printed[f"wrong {name}"])) != [question.expected for question in requested]
 
 
 @pytest.mark.parametrize("name", MAPS)
@@ -137,10 +137,10 @@ def gp(text, lines, folder):
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_gp_gives_the_values_of_the_library_exactly(name, tmp_path):
-    text, asked = converted("pari", SYSTEMS[name])
-    lines = [f"print({q.function}([{', '.join(map(str, q.point))}]~, {q.eps}));" for q in asked]
-    found = [answers_of(line.removeprefix("Mat(").rstrip(")")) for line in gp(text, lines, tmp_path)]
-    assert found == [question.expected for question in asked]
+    text, requested = converted("pari", SYSTEMS[name])
+    lines = [f"print({q.function}([{', '.join(map(str, q.point))}]~, {q.eps}));" for q in requested]
+    results = [answers_of(line.removeprefix("Mat(").rstrip(")")) for line in gp(text, lines, tmp_path)]
+    assert results == [question.expected for question in requested]
 
 
 def test_arguments_of_gp_that_are_left_out_stay_symbols(tmp_path):
@@ -148,15 +148,15 @@ def test_arguments_of_gp_that_are_left_out_stay_symbols(tmp_path):
     assert gp(text, ["print(vector_field([1, 1/2, -3]~)[1] + 3/2*a1)"], tmp_path) == ["0"]
 
 
-def numpy_answers(text: str, asked: list[Question], folder):
-    calls = [f"np.ravel({q.function}({floats(q.point)}, {floats([q.eps])[0]})).tolist()" for q in asked]
+def numpy_answers(text: str, requested: list[Question], folder):
+    calls = [f"np.ravel({q.function}({floats(q.point)}, {floats([q.eps])[0]})).tolist()" for q in requested]
     (line,) = run_python({"numpy": f"{text}\nprint(*{' + '.join(calls)})\n"})["numpy"]
     return list(map(float, line.split()))
 
 
-def c_answers(text: str, asked: list[Question], folder):
+def c_answers(text: str, requested: list[Question], folder):
     calls = []
-    for q in asked:
+    for q in requested:
         call = f"{q.function}((vector){{{{{', '.join(map(repr, floats(q.point)))}}}}}, {floats([q.eps])[0]!r})"
         kind = "double" if q.function.startswith(("integral", "modified", "density")) else "vector"
         kind = "matrix" if q.function == "kahan_jacobian" else kind
@@ -166,9 +166,9 @@ def c_answers(text: str, asked: list[Question], folder):
     return compiled(["cc", "-std=c99", "-Wall", "-Werror", "-Wno-unused", "all.c", "-o", "all", "-lm"], program, folder)
 
 
-def fortran_answers(text: str, asked: list[Question], folder):
+def fortran_answers(text: str, requested: list[Question], folder):
     lines = ["program main", "use kahan_module"]
-    for q in asked:
+    for q in requested:
         point = ", &\n".join(f"{x!r}d0" for x in floats(q.point))
         call = f"{q.function}([double precision :: {point}], &\n{floats([q.eps])[0]!r}d0)"
         lines.append(f"print *, {f'transpose({call})' if q.function == 'kahan_jacobian' else call}")
@@ -196,11 +196,11 @@ FLOATS = {"numpy": numpy_answers, "c": c_answers, "fortran": fortran_answers}
 @pytest.mark.parametrize("language", FLOATS)
 @pytest.mark.parametrize("name", ["euler_top", "nasty-capitals", "constant"])
 def test_floats_are_near_the_values_of_the_library(language, name, tmp_path):
-    text, asked = converted(language, SYSTEMS[name])
-    expected = floats(value for question in asked for value in question.expected)
-    assert FLOATS[language](text, asked, tmp_path) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    text, requested = converted(language, SYSTEMS[name])
+    expected = floats(value for question in requested for value in question.expected)
+    assert FLOATS[language](text, requested, tmp_path) == pytest.approx(expected, rel=1e-9, abs=1e-9)
     if name == "euler_top":  # and a wrong sign is seen
-        wrong = FLOATS[language](text.replace("-eps*x3", "eps*x3"), asked, tmp_path)
+        wrong = FLOATS[language](text.replace("-eps*x3", "eps*x3"), requested, tmp_path)
         assert wrong != pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
@@ -209,6 +209,6 @@ def test_rows_are_exchanged_in_c_where_a_pivot_vanishes_and_long_integers_are_fl
     file = km.parse_system(rhs, "pivot")  # at eps = 1/2, I - eps f' = (0 -1/2; -1/2 1)
     x, half = (fmpq(3), fmpq(5)), fmpq(1, 2)
     image = list(km.KahanMap(file.system, half).step(x))
-    asked = [Question("kahan_map", x, half, image), Question("integral_I", x, half, [fmpq(10) ** 30])]
-    found = c_answers(convert(file, "c"), asked, tmp_path)
-    assert found == pytest.approx([*floats(image), 1e30], rel=1e-12)
+    requested = [Question("kahan_map", x, half, image), Question("integral_I", x, half, [fmpq(10) ** 30])]
+    result = c_answers(convert(file, "c"), requested, tmp_path)
+    assert result == pytest.approx([*floats(image), 1e30], rel=1e-12)

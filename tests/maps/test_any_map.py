@@ -73,10 +73,10 @@ def start_of(map_):
 
 
 def generic_orbit(over, start, steps):
-    found = [over.point(start)]
+    results = [over.point(start)]
     for _ in range(steps):
-        found.append(over.generic_step(found[-1]))
-    return found
+        results.append(over.generic_step(results[-1]))
+    return results
 
 
 @every_map
@@ -92,7 +92,7 @@ def test_integers_over_one_denominator_step_as_rationals_do(name):
                 over.step(x)
             return
         assert over.step(x) == image
-        assert over.determinant(x) == prod(det(one.denominator_matrix(here)) for one, here in over.stages(x))
+        assert over.determinant(x) == prod(det(stage.denominator_matrix(here)) for stage, here in over.stages(x))
 
     compare()
 
@@ -122,12 +122,12 @@ def test_a_map_without_inverse_says_so():
 def test_the_jacobi_matrix_is_that_of_dual_numbers(name):
     map_ = MAPS[name]
     x, n = start_of(map_), map_.dim
-    found = map_.at("1/10").jacobian(x)
+    jacobian = map_.at("1/10").jacobian(x)
     for k in range(n):
         duals = DualField(QQ)
         moved = tuple(duals.dual(entry, fmpq(int(i == k))) for i, entry in enumerate(x))
         image = map_.at("1/10", duals).generic_step(moved)
-        assert [entry.slope for entry in image] == [found[i, k] for i in range(n)]
+        assert [entry.slope for entry in image] == [jacobian[i, k] for i in range(n)]
 
 
 @pytest.mark.parametrize(("name", "backward"), [*((name, False) for name in MAPS), *((n, True) for n in WITH_INVERSE)])
@@ -135,21 +135,21 @@ def test_machine_numbers_follow_the_exact_orbit(name, backward):
     map_ = MAPS[name]
     over = map_.at("1/10")
     exact = generic_orbit(over.inverse if backward else over, start_of(map_), 5)
-    found = [x for _, x in FloatOrbit(map_, "1/10", start_of(map_), 5, kernel="numpy", backward=backward)]
+    results = [x for _, x in FloatOrbit(map_, "1/10", start_of(map_), 5, kernel="numpy", backward=backward)]
     expected = [[float(int(e.p) / int(e.q)) for e in x] for x in exact]
-    assert np.allclose(found, expected, rtol=1e-9, atol=1e-12)  # a dozen roundings of numbers of size 1, magnified
+    assert np.allclose(results, expected, rtol=1e-9, atol=1e-12)  # a dozen roundings of numbers of size 1, magnified
 
 
 @every_map
 def test_kernels_for_machine_numbers_agree_to_the_last_bit(name):
     map_ = MAPS[name]
     starts = np.array([[0.3 + 0.01 * i + 0.1 * k for k in range(map_.dim)] for i in range(100)])
-    found = []
+    results = []
     for kernel, count in (("numpy", 100), ("numba", 100), ("numpy", 1), ("numba", 1)):
         ensemble = FloatEnsemble(map_, "1/10", starts[:count], kernel=kernel, threads=1)
         ensemble.advance(5)
-        found.append(ensemble.x[:1])
-    assert all(np.array_equal(found[0], other, equal_nan=True) for other in found[1:])
+        results.append(ensemble.x[:1])
+    assert all(np.array_equal(results[0], other, equal_nan=True) for other in results[1:])
 
 
 @given(points(2), rationals().filter(bool))
@@ -158,13 +158,13 @@ def test_kahan_maps_are_bilinear_maps_and_polarised_maps_of_degree_two(x, eps):
     names = ["x", "y", "X", "Y", "eps"]
     written = bilinear_map(["x", "y"], [parse_polynomial(text, names) for text in texts])
     others = [written, cubic("x*(1 - y)", "y*(x - 1)", degree=2)]
-    one = KahanMap(LOTKA_VOLTERRA, eps)
+    entry = KahanMap(LOTKA_VOLTERRA, eps)
     for other in others:
         over = other.at(eps)
-        assert over.denominator_matrix(x) == one.denominator_matrix(x)
-        assert over.linear_system(x) == one.linear_system(x)
-        assert over.inverse.denominator_matrix(x) == one.inverse.denominator_matrix(x)
-        assert over.numerator_matrix(x, x) == one.numerator_matrix(x, x)
+        assert over.denominator_matrix(x) == entry.denominator_matrix(x)
+        assert over.linear_system(x) == entry.linear_system(x)
+        assert over.inverse.denominator_matrix(x) == entry.inverse.denominator_matrix(x)
+        assert over.numerator_matrix(x, x) == entry.numerator_matrix(x, x)
 
 
 @given(points(2), rationals().filter(bool))
@@ -183,15 +183,15 @@ def test_a_polarised_map_solves_its_defining_equation(x, eps):
 def test_the_door_gives_the_orbit_in_every_arithmetic(name, text):
     map_ = MAPS[name]
     walk = orbit(map_, start_of(map_), "1/10" if map_.has_eps else None, steps=3, arithmetic=text)
-    found = list(walk)
-    assert (walk.end.status, [point.step for point in found]) == ("completed", [0, 1, 2, 3])
+    results = list(walk)
+    assert (walk.end.status, [point.step for point in results]) == ("completed", [0, 1, 2, 3])
     exact = generic_orbit(map_.at("1/10"), start_of(map_), 3)[-1]
     if text == "exact":
-        assert found[-1].x == exact
+        assert results[-1].x == exact
     elif text.startswith("mod"):
-        assert found[-1].x == tuple(GF(1009).convert(e) for e in exact)
+        assert results[-1].x == tuple(GF(1009).convert(e) for e in exact)
     else:
-        numbers = [float(e) if text == "float" else float(e.mid()) for e in found[-1].x]
+        numbers = [float(e) if text == "float" else float(e.mid()) for e in results[-1].x]
         assert np.allclose(numbers, [int(e.p) / int(e.q) for e in exact], rtol=1e-9)
 
 
@@ -221,8 +221,8 @@ def test_orbits_over_a_number_field_reduce_to_those_modulo_a_prime(name):
     exact = list(km.orbit(map_, point.over(root.number_field), "1/3", 3))
     modular = list(km.orbit(map_, point.over(field), "1/3", 3, arithmetic=f"mod:{2**61 - 1}"))
     at_root = root.over(field)
-    for one, other in zip(exact, modular, strict=True):
-        values = [sum(field.convert(c) * at_root**k for k, c in enumerate(entry.coefficients)) for entry in one.x]
+    for item, other in zip(exact, modular, strict=True):
+        values = [sum(field.convert(c) * at_root**k for k, c in enumerate(entry.coefficients)) for entry in item.x]
         assert [int(value) for value in values] == [int(entry) for entry in other.x]
 
 

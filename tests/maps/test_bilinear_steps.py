@@ -19,7 +19,7 @@ from kahanmaps.maps.orbits.integer_point import IntegerPoint
 
 @pytest.fixture(autouse=True)
 def early(monkeypatch):
-    """Forms are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
+    """Forms are searched for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
     monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
@@ -80,9 +80,13 @@ def test_points_are_in_lowest_terms_also_where_an_orbit_leaves_a_curve_for_one_s
     # z -> z / (1 + z) is 1/Z, 1/(Z + 1), ..., and y is 0 but where Z + k is none of the zeros of p.
     field = ring(["z", "y", "u", "eps"])
     z, y, u, _ = field.gens()
-    one, last, Z = field.constant(1), 32, fmpz(2) ** 360
-    p = prod((1 - z * (Z + k) for k in range(last + 1) if k != last - 1), start=one)
-    images = [RationalFunction(z, 1 + z), RationalFunction(p + u, one), RationalFunction(y * (1 - z * (Z + last)), one)]
+    entry, last, Z = field.constant(1), 32, fmpz(2) ** 360
+    p = prod((1 - z * (Z + k) for k in range(last + 1) if k != last - 1), start=entry)
+    images = [
+        RationalFunction(z, 1 + z),
+        RationalFunction(p + u, entry),
+        RationalFunction(y * (1 - z * (Z + last)), entry),
+    ]
     map_over = explicit_map(["z", "y", "u"], images).at(1)
     start = IntegerPoint.from_rationals((fmpq(1, Z), fmpq(0), fmpq(0)))
     points, orbit = walked(map_over, start, last + 3)

@@ -41,17 +41,17 @@ def out(name):
 @pytest.mark.parametrize("field", [QQ, GF(10007), GF(2**61 - 1), RR(200), DualField(QQ)], ids=str)
 def test_a_step_and_its_derivatives_are_those_of_the_formula(name, field):
     word, formula = WORDS[name].at(EPS, field), out(name).at(EPS, field)
-    for one, other in ((word, formula), (word.inverse, formula.inverse)):
+    for entry, other in ((word, formula), (word.inverse, formula.inverse)):
         x = tuple(field.convert(e) for e in START)
-        assert all(field.equal(a, b) for a, b in zip(one.step(x), other.step(x), strict=True))
-        pairs = zip(one.jacobian(x).entries(), other.jacobian(x).entries(), strict=True)
+        assert all(field.equal(a, b) for a, b in zip(entry.step(x), other.step(x), strict=True))
+        pairs = zip(entry.jacobian(x).entries(), other.jacobian(x).entries(), strict=True)
         assert all(field.equal(a, b) for a, b in pairs)
-        above, below = jacobian_determinant_sides(one, x, one.step(x))
+        above, below = jacobian_determinant_sides(entry, x, entry.step(x))
         assert field.equal(above, below * det(other.jacobian(x)))
 
 
 def test_an_orbit_stays_where_a_factor_has_no_value():
-    """x -> 1/x -> 1/x is the identity, without a value at 0 if it is stepped."""
+    """x -> 1/x -> 1/x is the identity, undefined at 0 if it is stepped."""
     inversion = parse_system('variables = ["x", "y"]\n[map]\nimage = ["1/x", "y"]').map
     shift = parse_system('variables = ["x", "y"]\n[map]\nimage = ["x - 1", "y"]').map
     word = composed_map(shift, inversion, shift)
@@ -88,8 +88,8 @@ def parse_symbolic():
 
 
 def test_maps_that_share_a_symbol_are_joined_by_its_name():
-    one = parse_symbolic()
-    word = composed_map(one, (F, -1), one)
+    entry = parse_symbolic()
+    word = composed_map(entry, (F, -1), entry)
     assert (word.symbols, word.names) == (("a",), ("x", "y", "a", "eps"))
     step = load("lyness", {"a": fmpq(2, 5)}).map.at(EPS).step
     assert word.at(EPS, values=[fmpq(2, 5)]).step(START) == step(F.at(EPS).inverse.step(step(START)))

@@ -32,7 +32,7 @@ small = st.fractions(min_value=-3, max_value=3, max_denominator=7).map(lambda x:
 
 @pytest.fixture(autouse=True)
 def early(monkeypatch):
-    """Sequences are looked for as soon as numbers grow slowly enough, and orbits here need not be long."""
+    """Sequences are searched for as soon as numbers grow slowly enough, and orbits here need not be long."""
     monkeypatch.setattr(rational_orbit, "_MIN_BITS", 20)
     monkeypatch.setattr(rational_orbit, "_MIN_BITS_BY_COORDINATES", 20)
     monkeypatch.setattr(rational_orbit, "_LONGER_THAN_START", 0)
@@ -100,7 +100,7 @@ def test_compositions_and_inverses_move_points_of_a_curve_as_well():
         assert orbit.relations is not None
 
 
-def found(name, stride=None):
+def sequences(name, stride=None):
     map_over = over(name)
     search = elliptic._Search(map_over.factors, begin(map_over), stride or len(map_over.factors))
     return map_over, search, search.numbers()
@@ -108,17 +108,17 @@ def found(name, stride=None):
 
 @pytest.mark.parametrize("name", ["weierstrass", "qrt_asymmetric"])
 def test_a_wrong_number_is_refuted(name):
-    map_over, search, numbers = found(name)
+    map_over, search, numbers = sequences(name)
     start = begin(map_over)
     assert elliptic._is_proved(start, search, elliptic._Exact(search, numbers).steps(map_over))
-    for place, one in numbers.items():
-        coefficients = list(one.coefficients)
+    for place, entry in numbers.items():
+        coefficients = list(entry.coefficients)
         coefficients[0] += 1
         for changed in (
-            one._replace(H=one.H + 1),
-            one._replace(y=one.y + 1),
-            one._replace(z=-one.z),
-            one._replace(coefficients=tuple(coefficients)),
+            entry._replace(H=entry.H + 1),
+            entry._replace(y=entry.y + 1),
+            entry._replace(z=-entry.z),
+            entry._replace(coefficients=tuple(coefficients)),
         ):
             wrong = {**numbers, place: changed}
             try:
@@ -135,7 +135,7 @@ def test_a_wrong_number_is_refuted(name):
 def test_forms_have_to_agree_at_more_steps_than_the_degree(name, stride, last):
     # The equation is of degree 3 + 3 for cubics; 2 * 2 + 2, for the new coordinate in the old ones, and 2 for a double
     # cover: one step more has to agree, after the first ones that are compared.
-    map_over, search, numbers = found(name, stride)
+    map_over, search, numbers = sequences(name, stride)
     steps = elliptic._Exact(search, numbers).steps(map_over)
 
     class Wrong(elliptic_steps.EllipticSteps):
@@ -149,7 +149,7 @@ def test_forms_have_to_agree_at_more_steps_than_the_degree(name, stride, last):
 
 def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     # Of coordinates (Y x - X y, q y) a prime q divides all where it divides the denominator W of the point (X, Y)/W.
-    map_over, search, numbers = found("weierstrass")
+    map_over, search, numbers = sequences("weierstrass")
     points = single_steps(map_over, begin(map_over), 30)
     bad = elliptic._Exact(search, numbers).steps(map_over)._places[0][0]._primes
     at, q = next((n, q) for n in range(8, 31) for q in range(50, 500) if points[n].denominator % q == 0 != bad % q)
@@ -190,24 +190,24 @@ def test_points_that_are_not_wanted_are_left_out(name):
 
 
 @pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:200"])
-@pytest.mark.parametrize("asked", [{"steps": 7, "every": 3}, {"at": [3, 6]}, {"at": []}])
-def test_points_of_an_orbit_are_those_asked_for_in_every_arithmetic(arithmetic, asked):
-    found = orbit(load("euler_top").map, START[:3], "3/11", arithmetic=arithmetic, **asked)
-    steps = asked.get("at", [0, 3, 6])
-    assert [point.step for point in found] == [row["step"] for row in found.rows()] == steps
-    assert len(found) == len(list(found)) == len(steps)
+@pytest.mark.parametrize("requested", [{"steps": 7, "every": 3}, {"at": [3, 6]}, {"at": []}])
+def test_points_of_an_orbit_are_those_asked_for_in_every_arithmetic(arithmetic, requested):
+    result = orbit(load("euler_top").map, START[:3], "3/11", arithmetic=arithmetic, **requested)
+    steps = requested.get("at", [0, 3, 6])
+    assert [point.step for point in result] == [row["step"] for row in result.rows()] == steps
+    assert len(result) == len(list(result)) == len(steps)
     stream = StringIO()
-    found.write(stream, "csv")
+    result.write(stream, "csv")
     assert [line.split(",")[0] for line in stream.getvalue().splitlines()[1:]] == list(map(str, steps))
 
 
 def test_a_pole_or_too_many_bits_on_the_way_end_an_orbit_though_points_are_left_out(monkeypatch):
     map_over = over("euler_top")
     points = [point.step for point in Orbit(map_over, START[:3], 150, max_digits=1000, is_requested={150}.__contains__)]
-    whole = Orbit(map_over, START[:3], 150, max_digits=1000)
+    complete = Orbit(map_over, START[:3], 150, max_digits=1000)
     orbit = Orbit(map_over, START[:3], 150, max_digits=1000, is_requested={150}.__contains__)
-    assert len(list(whole)) > len(list(orbit)) == len(points)
-    assert (orbit.end, orbit.end.status) == (whole.end, "budget")
+    assert len(list(complete)) > len(list(orbit)) == len(points)
+    assert (orbit.end, orbit.end.status) == (complete.end, "budget")
     # Modulo 7 there seems to be a pole every few steps: then points are made all the same.
     monkeypatch.setattr(elliptic_steps, "_PRIME", 7)
     expected = single_steps(map_over, begin(map_over), 50)
@@ -242,15 +242,15 @@ def points_on_a_curve(degree, size, length):
 )
 def test_curves_of_any_degree(degree, size):
     points = points_on_a_curve(degree, size, 150)
-    found = None
+    result = None
     for needed in search.points_needed(size - 1):
         try:
-            found = found or search.curve(points[:needed], P)
+            result = result or search.curve(points[:needed], P)
         except ArithmeticError:
             continue
-    assert found is not None
-    assert found.sections.degree == degree
-    assert search.curve(points[: found.sections.points_used], P, found.sections) == found
+    assert result is not None
+    assert result.sections.degree == degree
+    assert search.curve(points[: result.sections.points_used], P, result.sections) == result
 
 
 @pytest.mark.parametrize("degree", range(2, 8))

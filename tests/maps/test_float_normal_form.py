@@ -56,12 +56,12 @@ over_kernels = pytest.mark.parametrize("kernel", KERNELS)
 def test_lines_at_right_angles_are_not_parallel():
     """Their product is a ball around exactly 0, whose square is nan in python-flint 0.9.0."""
     for radius in (0, 1e-30):
-        one, small = acb(1), acb(arb(0, radius))
-        right, parallel = ([one, small], [small, one]), ([one, small], [one, small])
-        assert _sine(right, [[one, small], [small, one]]) == pytest.approx(1, abs=1e-15)
-        assert _sine(parallel, [[one, small], [small, one]]) == 0
+        entry, small = acb(1), acb(arb(0, radius))
+        right, parallel = ([entry, small], [small, entry]), ([entry, small], [entry, small])
+        assert _sine(right, [[entry, small], [small, entry]]) == pytest.approx(1, abs=1e-15)
+        assert _sine(parallel, [[entry, small], [small, entry]]) == 0
     with pytest.raises(_Unclear):
-        _sine(([one, one], [acb(arb(0, 1)), acb(arb(0, 1))]), [[one, one], [one, one]])
+        _sine(([entry, entry], [acb(arb(0, 1)), acb(arb(0, 1))]), [[entry, entry], [entry, entry]])
 
 
 def starts_of(dim: int, n: int, seed: int = 0) -> np.ndarray:
@@ -117,9 +117,9 @@ def last(orbit: FloatOrbit) -> np.ndarray:
 
 @given(a=st.integers(-(10**30), 10**30), b=st.integers(1, 10**30))
 def test_a_number_is_rounded_to_the_nearest_double(a, b):
-    found = to_float(fmpq(a, b))
-    error = abs(fmpq(a, b) - exact(found))
-    for neighbour in (nextafter(found, -np.inf), nextafter(found, np.inf)):
+    result = to_float(fmpq(a, b))
+    error = abs(fmpq(a, b) - exact(result))
+    for neighbour in (nextafter(result, -np.inf), nextafter(result, np.inf)):
         assert error <= abs(fmpq(a, b) - exact(neighbour))
 
 
@@ -157,14 +157,14 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path):
         [sys.executable, "-c", ENDLESS.format(path=str(path))], stdout=subprocess.PIPE, text=True
     )
     try:
-        told = [int(process.stdout.readline()) for _ in range(2)]
+        messages = [int(process.stdout.readline()) for _ in range(2)]
         time.sleep(0.01)
     finally:
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
         process.stdout.close()
     points = np.load(path)
-    assert len(points) >= told[-1] // 50 + 1  # what was told is there, and perhaps a portion more
+    assert len(points) >= messages[-1] // 50 + 1  # what was told is there, and perhaps a portion more
     steps = 50 * (len(points) - 1)
     expected = np.concatenate(list(FloatEnsemble(EULER_TOP, "1/10", [START], kernel="numpy").records(steps, 50)))
     assert np.array_equal(points, expected[:, 0])
@@ -182,12 +182,12 @@ def exponent(eps: float, eigenvalue: float) -> float:
 @pytest.mark.parametrize("eps", ["1/10", "-1/10", "1/3"])
 def test_linear_systems_have_the_logarithms_of_their_eigenvalues(eps):
     """Triangular, so that the frame turns into the flag of eigenvectors at a geometric rate."""
-    found = lyapunov_exponents(system_of("x/2 + y", "-y", "-2*z + x"), [[1.0, 0.5, 0.2]], eps, 400, transient=200)
+    exponents = lyapunov_exponents(system_of("x/2 + y", "-y", "-2*z + x"), [[1.0, 0.5, 0.2]], eps, 400, transient=200)
     value = float(eps.split("/")[0]) / float(eps.split("/")[1])
     expected = sorted((exponent(value, a) for a in (0.5, -1.0, -2.0)), reverse=True)
-    assert found.mean == pytest.approx(expected, abs=1e-9)
-    assert found.per_step == pytest.approx(np.array(expected) * 2 * value, abs=1e-9)
-    assert found.change == pytest.approx([0, 0, 0], abs=1e-9)
+    assert exponents.mean == pytest.approx(expected, abs=1e-9)
+    assert exponents.per_step == pytest.approx(np.array(expected) * 2 * value, abs=1e-9)
+    assert exponents.change == pytest.approx([0, 0, 0], abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["lorenz", "lotka_volterra", "henon_heiles"])
@@ -208,35 +208,43 @@ def test_the_exponents_are_those_of_the_exact_derivatives_along_the_exact_orbit(
     exponents, early = sum(counted) / (steps / 25), sum(counted[:half]) / (half / 25)
     order = np.argsort(-exponents)
     point = [int(entry.p) / int(entry.q) for entry in start]
-    found = lyapunov_exponents(load(name).system, [point, point], "1/50", steps, transient=transient)
-    assert (found.steps, found.transient, found.orbits, found.ended, found.stopped) == (steps, transient, 2, 0, False)
+    result = lyapunov_exponents(load(name).system, [point, point], "1/50", steps, transient=transient)
+    assert (result.steps, result.transient, result.orbits, result.ended, result.stopped) == (
+        steps,
+        transient,
+        2,
+        0,
+        False,
+    )
     for lane in (0, 1):
-        assert found.exponents[lane] == pytest.approx(exponents[order], abs=1e-9)
-        assert found.half[lane] == pytest.approx(early[order], abs=1e-9)
-        assert found.log_volume[lane] == pytest.approx(sum(volumes[transient:]) / (steps / 25), abs=1e-9)
+        assert result.exponents[lane] == pytest.approx(exponents[order], abs=1e-9)
+        assert result.half[lane] == pytest.approx(early[order], abs=1e-9)
+        assert result.log_volume[lane] == pytest.approx(sum(volumes[transient:]) / (steps / 25), abs=1e-9)
 
 
 @pytest.mark.slow
 def test_the_lorenz_map_at_a_small_step():
     """About 0.906 for the flow (s = 10, r = 28, b = 8/3), and the divergence -41/3 for the sum."""
-    found = lyapunov_exponents(load("lorenz").system, starts_in_box(32, 3, 5.0, 0), "1/400", 20_000, transient=4_000)
-    assert found.ended == 0
-    assert found.mean[0] == pytest.approx(0.906, abs=0.06)
-    assert abs(found.mean[1]) < 0.05
-    assert found.mean.sum() == pytest.approx(-41 / 3, abs=0.05)
+    exponents = lyapunov_exponents(
+        load("lorenz").system, starts_in_box(32, 3, 5.0, 0), "1/400", 20_000, transient=4_000
+    )
+    assert exponents.ended == 0
+    assert exponents.mean[0] == pytest.approx(0.906, abs=0.06)
+    assert abs(exponents.mean[1]) < 0.05
+    assert exponents.mean.sum() == pytest.approx(-41 / 3, abs=0.05)
 
 
 def test_a_time_limit_keeps_the_complete_portions():
-    told = []
+    messages = []
 
     def stop(sentence):
-        told.append(sentence)
-        if len(told) == 4:
+        messages.append(sentence)
+        if len(messages) == 4:
             raise TimeLimit
 
     system, starts = load("lorenz").system, [[1.0, 2.0, 3.0]]
-    found = lyapunov_exponents(system, starts, "1/100", 5000, progress=stop)
-    assert (told[-1], found.stopped, found.steps) == ("step 1536 of 5000", True, 1536)
-    whole = lyapunov_exponents(system, starts, "1/100", 1536)
-    assert found.exponents == pytest.approx(whole.exponents, abs=1e-9)
-    assert np.isnan(found.half).all()
+    exponents = lyapunov_exponents(system, starts, "1/100", 5000, progress=stop)
+    assert (messages[-1], exponents.stopped, exponents.steps) == ("step 1536 of 5000", True, 1536)
+    complete = lyapunov_exponents(system, starts, "1/100", 1536)
+    assert exponents.exponents == pytest.approx(complete.exponents, abs=1e-9)
+    assert np.isnan(exponents.half).all()

@@ -73,12 +73,12 @@ def starts_of(dim: int, n: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-1, 1, (n, dim))
 
 
-def same(one: FloatEnsemble, other: FloatEnsemble, some=slice(None)) -> None:
+def same(ensemble: FloatEnsemble, other: FloatEnsemble, some=slice(None)) -> None:
     """Equal in everything that can be asked, NaN where NaN is."""
-    assert np.array_equal(one.x[some], other.x, equal_nan=True)
+    assert np.array_equal(ensemble.x[some], other.x, equal_nan=True)
     for name in ("status", "failed_at", "near_singular", "near_singular_at"):
-        assert np.array_equal(getattr(one, name)[some], getattr(other, name)), name
-    for left, right in zip(one.drift, other.drift, strict=True):
+        assert np.array_equal(getattr(ensemble, name)[some], getattr(other, name)), name
+    for left, right in zip(ensemble.drift, other.drift, strict=True):
         assert np.array_equal(left.largest[some], right.largest), left.name
         assert np.array_equal(left.last[some], right.last, equal_nan=True), left.name
 
@@ -97,12 +97,12 @@ def test_a_step_of_an_ensemble_is_that_of_the_exact_map(system, kernel, monkeypa
     orbits = FloatEnsemble(system, "1/50", starts, kernel=kernel)
     orbits.advance(1)
     phi = KahanMap(system, "1/50")
-    for start, found in zip(starts, orbits.x, strict=True):
+    for start, result in zip(starts, orbits.x, strict=True):
         x = [exact(entry) for entry in start.tolist()]
         expected = to_floats(phi.step(x))
         matrix = to_floats(phi.denominator_matrix(x).entries()).reshape(system.dim, system.dim)
         # some dozen roundings for each entry of the matrix and on the way through the elimination
-        assert abs(found - expected).max() <= 100 * 2.0**-53 * np.linalg.cond(matrix) * abs(expected).max()
+        assert abs(result - expected).max() <= 100 * 2.0**-53 * np.linalg.cond(matrix) * abs(expected).max()
 
 
 @over_members
@@ -172,11 +172,11 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
             rows[at : at + size] = [1 - 2.0**-43, *[0.0] * (size - 1)]
             starts[20 + r] = blocks.out @ rows
     system, form = MEMBERS[name].chosen.system, FORMS[name]
-    one, other = (FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sampled=10) for k in ("numpy", "numba"))
-    for it in (one, other):
+    entry, other = (FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sampled=10) for k in ("numpy", "numba"))
+    for it in (entry, other):
         it.advance(40)
-    same(one, other)
-    assert (one.near_singular[20 : 20 + len(lines)] > 0).tolist() == lines
+    same(entry, other)
+    assert (entry.near_singular[20 : 20 + len(lines)] > 0).tolist() == lines
 
 
 @over_kernels
@@ -315,9 +315,9 @@ def test_midpoint_of_linear_equations_is_their_cayley_transform(rows):
     n = len(rows)
     names = ["x", "y", "z", "w"][:n]
     rhs = [" + ".join(f"{a}*{name}" for a, name in zip(row, names, strict=True)) for row in rows]
-    one, A = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)]), fmpq_mat(rows)
+    entry, A = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)]), fmpq_mat(rows)
     start = fmpq_mat(n, 1, [1, -2, 3, 5][:n])
-    expected = (one - A / 2).solve((one + A / 2) * start)
+    expected = (entry - A / 2).solve((entry + A / 2) * start)
     x, end = walk(QuadraticSystem.from_text(names, rhs), "1/2", [str(e) for e in start.entries()], 1, "midpoint")
     assert end.status == "completed"
     assert x[1].tolist() == pytest.approx([float(e.p) / float(e.q) for e in expected.entries()], rel=1e-12)
@@ -347,14 +347,14 @@ def to_float(x):
 def code_of(pattern, careful):
     """The solution of M y = r as code of the entries of M that are not 0, row by row, and of r."""
     n = len(pattern)
-    code, asked = StraightLineProgram(sum(row.count("*") for row in pattern) + n), StepChecks(careful)
+    code, requested = StraightLineProgram(sum(row.count("*") for row in pattern) + n), StepChecks(careful)
     entries = iter(code.arguments)
     rows = [[next(entries) if mark == "*" else 0.0 for mark in row] for row in pattern]
     rows = [[*row, right] for row, right in zip(rows, entries, strict=True)]
     size = code.arguments[0]
     for x in code.arguments[1:]:
         size = size.code.emit("max", abs(size), abs(x))
-    code.outputs = [*solve(rows, lambda: abs(size), asked), *asked.outputs()]
+    code.outputs = [*solve(rows, lambda: abs(size), requested), *requested.outputs()]
     return code
 
 
@@ -374,17 +374,17 @@ def test_equations_of_any_pattern_have_the_exact_solution(pattern, small):
         expected = [to_float(x) for x in fmpq_mat(M).solve(fmpq_mat(n, 1, right)).entries()]
         given = [to_float(M[i][j]) for i in range(n) for j in range(n) if pattern[i][j] == "*"]
         given += [to_float(x) for x in right]
-        *found, near, singular, overflow = careful.function(float)(*given)
+        *result, near, singular, overflow = careful.function(float)(*given)
         assert (bool(near), bool(singular), bool(overflow)) == (False, False, False)
         condition = np.linalg.cond([[to_float(x) for x in row] for row in M])
         # some dozen roundings, and rows subtracted up to 8 times from others
-        assert found == pytest.approx(expected, rel=1e-13 * condition, abs=1e-13 * condition)
+        assert result == pytest.approx(expected, rel=1e-13 * condition, abs=1e-13 * condition)
         *quick, good = fast.function(float)(*given)
         if good:
             contented += 1
-            assert quick == found
+            assert quick == result
         arrays = careful.function(np.ndarray)(*(np.array([x]) for x in given))
-        assert [float(x[0]) for x in arrays[:n]] == found
+        assert [float(x[0]) for x in arrays[:n]] == result
     assert small or contented > 10
 
 

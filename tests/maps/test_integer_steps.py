@@ -48,17 +48,17 @@ def start(dim: int) -> tuple[fmpq, ...]:
 
 def rational_step(system: QuadraticSystem, eps: fmpq, x: tuple[fmpq, ...]) -> tuple[fmpq, ...]:
     """(I - eps f'(x)) x~ = (I + eps B) x + 2 eps c, with rational entries, by FLINT."""
-    column, one = QQ.column(x), QQ.identity(system.dim)
+    column, entry = QQ.column(x), QQ.identity(system.dim)
     right = column + system.B * column * eps + QQ.column(system.c) * (2 * eps)
-    return tuple((one - system.over(QQ).jacobian(x) * eps).solve(right).entries())
+    return tuple((entry - system.over(QQ).jacobian(x) * eps).solve(right).entries())
 
 
 def walk(system: QuadraticSystem, eps: str, steps: int) -> list[IntegerPoint]:
     stepper, point = KahanMap(system, QQ.convert(eps)).integer_steps, IntegerPoint.from_rationals(start(system.dim))
-    found = [point]
+    results = [point]
     for _ in range(steps):
-        found.append(stepper.step(found[-1]))
-    return found
+        results.append(stepper.step(results[-1]))
+    return results
 
 
 @pytest.mark.parametrize(("system", "eps", "steps"), ORBITS)
@@ -120,8 +120,8 @@ def test_a_step_of_a_map_is_that_of_fractions_and_so_is_its_determinant(name, da
         assert image is None
         return
     assert image == IntegerPoint.from_rationals(expected)
-    for one, point in map_over.stages(x):
-        assert one.determinant(point) == det(one.denominator_matrix(point))
+    for entry, point in map_over.stages(x):
+        assert entry.determinant(point) == det(entry.denominator_matrix(point))
 
 
 rational = st.integers(-4, 4)

@@ -53,10 +53,10 @@ def walked(system, eps, field, start, steps):
     return [point.x for point in orbit], orbit.end
 
 
-def reached(found, start, n):
+def reached(result, start, n):
     """The n-th iterate, None where it is singular."""
     try:
-        return coordinates(found.value(start, n))
+        return coordinates(result.value(start, n))
     except SingularStep:
         return None
 
@@ -67,7 +67,7 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
     normal_form, system = structure_and_system(name)
     field, rng, eps = GF(prime), random.Random(prime), "3/13"
     try:
-        found = NthIterate(normal_form, eps, field)
+        iterate = NthIterate(normal_form, eps, field)
     except BadPrime:
         assert prime in (3, 5)  # of S or T
         return
@@ -75,7 +75,7 @@ def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
         start = [rng.randrange(prime) for _ in range(system.dim)]
         points, _ = walked(system, eps, field, start, NUMBERS[-1])
         for n in NUMBERS:
-            image = reached(found, start, n)
+            image = reached(iterate, start, n)
             if n < len(points):
                 assert image == points[n]
             elif len(points) <= (16 if n <= 16 else 4):  # a pole among the first steps
@@ -87,9 +87,9 @@ def test_over_q_it_is_the_point_of_the_orbit(name):
     normal_form, system = structure_and_system(name)
     start = random_point(system.dim, 6, height=3)
     points, _ = walked(system, "1/10", QQ, start, 27)
-    found = NthIterate(normal_form, "1/10", QQ)
+    iterate = NthIterate(normal_form, "1/10", QQ)
     for n in (0, 1, 7, 16, 17, 24, 25, 27):
-        assert coordinates(found.value(start, n)) == points[n]
+        assert coordinates(iterate.value(start, n)) == points[n]
 
 
 def poles():
@@ -106,12 +106,12 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
     start = (fmpq(U, W), u, fmpq(V, W), v)
     points, end = walked(system, "1/2", QQ, start, 60)
     assert (end.status, end.steps) == ("singular", last)
-    found = NthIterate(normal_form, "1/2", QQ)
+    iterate = NthIterate(normal_form, "1/2", QQ)
     for n in (last + 1, last + 2, last + 3, 57):
         with pytest.raises(SingularStep, match=f"not defined at step {last}$"):
-            found.value(start, n)
+            iterate.value(start, n)
     for n in (0, last):
-        assert coordinates(found.value(start, n)) == points[n]
+        assert coordinates(iterate.value(start, n)) == points[n]
 
 
 @over_members
@@ -119,10 +119,10 @@ def test_balls_enclose_the_exact_iterate(name):
     normal_form, system = structure_and_system(name)
     # Large numbers, so that the sixteen steps before the doublings already cost some hundred bits.
     start, field = random_point(system.dim, 6, height=3), RR(2000)
-    exact, found = NthIterate(normal_form, "1/10", QQ), NthIterate(normal_form, "1/10", field)
+    exact, result = NthIterate(normal_form, "1/10", QQ), NthIterate(normal_form, "1/10", field)
     for n in (0, 1, 10, 24, 30):
         try:
-            balls = found.value(start, n)
+            balls = result.value(start, n)
         except PrecisionLost:  # balls cannot decide that a level is degenerate
             assert "double root" in name
             continue
@@ -142,7 +142,7 @@ def test_a_wrong_doubling_is_noticed(monkeypatch):
 
 @together("name", STARTS)
 def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(name):
-    """The level is infinite where the map has no value, and 0 or delta = 1 as the names of the starts say."""
+    """The level is infinite where the map is not defined, and 0 or delta = 1 as the names of the starts say."""
     _, normal_form, start = side_by_side(name)
     kinds = {
         "h = 0": "at rest",
@@ -160,7 +160,7 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
 def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
     normal_form, _ = structure_and_system("m = 2")
     start = [1, 2, 3, fmpq(1, 4)]
-    wanted = coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30))
+    expected = coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30))
     steps_modulo, random_prime = rational_iterate._steps_modulo, rational_iterate.random_prime
     drawn = [1000003, 1000033, 1000037]  # with a pole at step 2, as if these divided W there
     monkeypatch.setattr(rational_iterate, "random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
@@ -169,7 +169,7 @@ def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
         "_steps_modulo",
         lambda *at: (2, (1, 1, 0)) if at[2](fmpz(0)).modulus() < 2**20 else steps_modulo(*at),
     )
-    assert coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30)) == wanted
+    assert coordinates(NthIterate(normal_form, "1/10", QQ).value(start, 30)) == expected
     assert drawn == []
 
 
@@ -180,9 +180,9 @@ FAR = 10**12
 
 
 def found_structure(system) -> SystemNormalForm:
-    found = system_normal_form(system)
-    assert isinstance(found, SystemNormalForm)
-    return found
+    normal_form = system_normal_form(system)
+    assert isinstance(normal_form, SystemNormalForm)
+    return normal_form
 
 
 def ended(orbit) -> OrbitEnd:
@@ -198,7 +198,7 @@ def event(system, normal_form, eps, start, steps, digits):
     assert walks[0] == walks[-1]
     far = ended(Orbit(kahan, start, at=[steps], normal_form=normal_form, max_digits=digits))
     walk = walks[0]
-    if walk.is_whole:
+    if walk.is_complete:
         assert (far.status, far.steps) == ("completed", steps)
     elif walk.status == "singular":
         where = f"step {steps} cannot be reached: the map is not defined at step {walk.steps}"
@@ -218,7 +218,7 @@ def seen_from(cubic, eps, sixths, runs):
             walk = event(system, normal_form, eps, [u, v], steps, digits)
             seen.append(walk.status)
             far = ended(Orbit(KahanMap(system, eps), [u, v], at=[FAR], normal_form=normal_form, max_digits=digits))
-            if not walk.is_whole:
+            if not walk.is_complete:
                 assert far.status == walk.status
     return seen
 
@@ -249,8 +249,8 @@ def is_zero(element) -> bool:
 
 def planes(field, seed, amount):
     """Random planes with starts of every kind that are not constant."""
-    found = planes_over(field, random.Random(f"{field} {seed}"), 10**9)
-    return islice((case for case in found if not case[0].is_zero and case[1][:2] != (0, 0)), amount)
+    result = planes_over(field, random.Random(f"{field} {seed}"), 10**9)
+    return islice((case for case in result if not case[0].is_zero and case[1][:2] != (0, 0)), amount)
 
 
 def stepped(block, start, steps):
@@ -264,7 +264,7 @@ def stepped(block, start, steps):
     return points
 
 
-def found(block, start, n):
+def translated(block, start, n):
     """The n-th point, or what is said instead."""
     try:
         return iterate(block, start, n, is_zero, inexact=isinstance(start[0], flint.arb | flint.acb))
@@ -286,7 +286,7 @@ def test_over_a_finite_field_it_is_the_point_that_steps_lead_to(field, amount):
     for block, start in planes(field, 1, amount):
         points = stepped(block, start, TIMES[-1])
         for n in TIMES:
-            image = found(block, start, n)
+            image = translated(block, start, n)
             if n < len(points) and image is not None:
                 assert same_point(image, points[n])
                 compared += 1
@@ -308,7 +308,7 @@ def test_on_a_smooth_level_it_is_a_multiple_of_the_translation(field, amount):
     rng, passed = random.Random(field.q), 0
     for block, start, cubic in smooth(field, 4, min(amount, 40)):
         for n in (rng.randrange(17, 100), rng.randrange(field.q**2 + 100), rng.randrange(10**30)):
-            image = found(block, start, n)
+            image = translated(block, start, n)
             if isinstance(image, tuple):
                 assert any(image)
                 assert same_point(image, cubic.multiple(n, block.image(start)))
@@ -321,7 +321,7 @@ def test_with_another_gamma_or_other_digits_the_point_is_another(wrong, monkeypa
     block, start = next(iter(planes(Finite(10007), 1, 1)))
     by_curve, digits = translation._by_curve, translation._digits
     if wrong == "gamma":
-        monkeypatch.setattr(translation, "_by_curve", lambda P, gamma, *rest: by_curve(P, gamma + 1, *rest))
+        monkeypatch.setattr(translation, "_by_curve", lambda P, gamma, *others: by_curve(P, gamma + 1, *others))
     else:
         monkeypatch.setattr(translation, "_digits", lambda n: digits(n + 1))
-    assert not same_point(found(block, start, 50), stepped(block, start, 50)[50])
+    assert not same_point(translated(block, start, 50), stepped(block, start, 50)[50])

@@ -89,7 +89,7 @@ def test_the_text_of_a_rational_point_is_in_lowest_terms_and_of_any_length():
 def test_an_orbit_that_meets_the_singular_set_ends_there(start, last):
     orbit = Orbit(KahanMap(RICCATI, "1/2"), [start], 100)
     points = [point.x for point in orbit]
-    assert (orbit.end.status, orbit.end.steps, orbit.end.is_whole) == ("singular", last, False)
+    assert (orbit.end.status, orbit.end.steps, orbit.end.is_complete) == ("singular", last, False)
     assert points[-1] == (1,)
     assert len(points) == last + 1
 
@@ -105,7 +105,7 @@ FOUR_CYCLES = [
 @pytest.mark.parametrize(("system", "eps", "start"), FOUR_CYCLES, ids=["henon_heiles", "w = 2", "w = 1/3"])
 def test_at_eps_times_w_equal_to_one_every_orbit_has_period_four(system, eps, start):
     end = ended(Orbit(KahanMap(system, eps), start, 10))
-    assert (end.status, end.period, end.steps, end.is_whole) == ("periodic", 4, 10, True)
+    assert (end.status, end.period, end.steps, end.is_complete) == ("periodic", 4, 10, True)
 
 
 @pytest.mark.parametrize(("prime", "start"), [(5, (1, 2)), (7, (3, 1)), (11, (2, 2)), (13, (1, 2))])
@@ -229,7 +229,7 @@ NONE = NoNormalForm("H is not a homogeneous cubic")
 
 
 @pytest.mark.parametrize(
-    ("wish", "arithmetic", "normal_form", "at", "expected"),
+    ("requested", "arithmetic", "normal_form", "at", "expected"),
     [
         (None, "exact", NONE, None, "generic"),
         (None, "mod", NONE, (10**9,), "generic"),
@@ -260,10 +260,10 @@ NONE = NoNormalForm("H is not a homogeneous cubic")
         (None, "exact", SPLIT, (), "normal-form"),
     ],
 )
-def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, normal_form, at, expected):
-    found = choose_method(wish, arithmetic, normal_form, at)
-    assert found.name == expected
-    assert found.text == f"method {expected}: {found.reason}"
+def test_the_method_follows_from_what_is_asked_for(requested, arithmetic, normal_form, at, expected):
+    result = choose_method(requested, arithmetic, normal_form, at)
+    assert result.name == expected
+    assert result.text == f"method {expected}: {result.reason}"
 
 
 TOP = load("euler_top")
@@ -271,9 +271,9 @@ ARITHMETICS = ["exact", "float", "mod:101", "ball:100"]
 
 
 def walk(arithmetic="exact", **options):
-    found = km.orbit(TOP, [1, "1/2", "-1/3"], "1/10", **({"steps": 4} | options), arithmetic=arithmetic)
-    found.integrals = functions_along(TOP, [("", "F1"), ("p", "1/(x1 - 1)")], arithmetic == "float")
-    return found
+    orbit = km.orbit(TOP, [1, "1/2", "-1/3"], "1/10", **({"steps": 4} | options), arithmetic=arithmetic)
+    orbit.integrals = functions_along(TOP, [("", "F1"), ("p", "1/(x1 - 1)")], arithmetic == "float")
+    return orbit
 
 
 def read(path):

@@ -50,19 +50,19 @@ FIELDS = [
 def test_in_a_small_field_the_period_and_the_poles_are_those_that_walking_finds(field, count):
     rng, kinds = random.Random(field.q), Counter()
     for block, point in planes_over(field, rng, count):
-        found = plane_period(block, point, field.prime, field.context)
+        result = plane_period(block, point, field.prime, field.context)
         period, met = walked(block, point, field.q)
-        kinds[found.kind] += 1
-        assert found.meets_pole == met, found
+        kinds[result.kind] += 1
+        assert result.meets_pole == met, result
         if period is not None:
-            assert (found.period, found.status) == (period, "periodic"), found
-        elif found.kind is PeriodKind.SMOOTH:
-            assert_order_on_the_cubic(block, point, found.period, poles(block, field.prime, field.context))
-        elif found.kind is PeriodKind.ADDITIVE:
-            assert found.period == field.prime
+            assert (result.period, result.status) == (period, "periodic"), result
+        elif result.kind is PeriodKind.SMOOTH:
+            assert_order_on_the_cubic(block, point, result.period, poles(block, field.prime, field.context))
+        elif result.kind is PeriodKind.ADDITIVE:
+            assert result.period == field.prime
     expected = {PeriodKind.STEPPED} if field.prime <= 3 else {PeriodKind.SMOOTH, PeriodKind.ADDITIVE, PeriodKind.FIXED}
     if field.prime > 3 and field.q < 20:
-        expected |= {PeriodKind.TRIANGLE, PeriodKind.VERTEX, PeriodKind.AT_POLE, PeriodKind.NO_VALUE}
+        expected |= {PeriodKind.TRIANGLE, PeriodKind.VERTEX, PeriodKind.AT_POLE, PeriodKind.UNDEFINED}
     assert expected <= set(kinds)
 
 
@@ -81,26 +81,26 @@ def assert_order_on_the_cubic(block, point, order, at_infinity):
 def test_in_a_large_prime_field_n_T_is_zero_and_no_smaller_multiple_is(prime):
     field, rng = Finite(prime), random.Random(3)
     for block, point in planes_over(field, rng, 2):
-        found = plane_period(block, point, prime)
-        assert (found.kind, found.status) == (PeriodKind.SMOOTH, "periodic")
-        assert found.period > 10
-        assert_order_on_the_cubic(block, point, found.period, poles(block, prime))
+        period = plane_period(block, point, prime)
+        assert (period.kind, period.status) == (PeriodKind.SMOOTH, "periodic")
+        assert period.period > 10
+        assert_order_on_the_cubic(block, point, period.period, poles(block, prime))
 
 
 def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happen():
     prime = 10_009
     rng, answers = random.Random(8), Counter()
     for block, point in planes_over(Finite(prime), rng, 40):
-        found = plane_period(block, point, prime)
-        if found.kind is not PeriodKind.SMOOTH:
+        period = plane_period(block, point, prime)
+        if period.kind is not PeriodKind.SMOOTH:
             continue
         image, met = point, False
-        for _ in range(found.period):
+        for _ in range(period.period):
             image = block.image(image)
             if image[2] == 0:
                 met = True
                 break
-        assert found.meets_pole == met
+        assert period.meets_pole == met
         answers[met, bool(poles(block, prime))] += 1
     assert answers[True, True] > 3
     assert answers[False, False] > 3
@@ -132,15 +132,15 @@ def test_the_period_of_a_member_is_that_of_its_kahan_map_where_that_meets_no_pol
     kahan, rng, ends = KahanMap(system, "1/10", GF(prime)), random.Random(4), Counter()
     for _ in range(20):
         start = [rng.randrange(prime) for _ in range(4)]
-        found = period_of(normal_form, "1/10", start, prime)
-        if not isinstance(found.period, int) or found.period > 3000:
+        period = period_of(normal_form, "1/10", start, prime)
+        if not isinstance(period.period, int) or period.period > 3000:
             continue
-        orbit = Orbit(kahan, start, found.period)
+        orbit = Orbit(kahan, start, period.period)
         for _ in orbit:
             pass
-        assert orbit.end.status == ("singular" if found.meets_pole else "periodic")
-        if not found.meets_pole:
-            assert orbit.end.period == found.period == lcm(*(plane.period for plane in found.planes))
+        assert orbit.end.status == ("singular" if period.meets_pole else "periodic")
+        if not period.meets_pole:
+            assert orbit.end.period == period.period == lcm(*(plane.period for plane in period.planes))
         ends[orbit.end.status] += 1
     assert ends["periodic"] > 0
     assert period_of(normal_form, "1/10", [1, 2, 3, 4]).status == "aperiodic"
@@ -159,13 +159,13 @@ PERIODIC_OVER_Q = [
 def test_a_rational_orbit_of_period_5_or_6_closes(h, start, period):
     block = PlanarBlock(*(fmpq(c) for c in h))
     u, v = (QQ.convert(value) for value in start)
-    found = plane_period_over_rationals(block, (u, v, fmpq(1)))
-    assert (found.status, found.period) == ("periodic", period)
+    result = plane_period_over_rationals(block, (u, v, fmpq(1)))
+    assert (result.status, result.period) == ("periodic", period)
     orbit = Orbit(KahanMap(planar_system(h), "1/2"), start, period)  # 2 eps (u, v) = (u, v)
     for _ in orbit:
         pass
-    assert orbit.end.status == ("singular" if found.meets_pole else "periodic")
-    assert found.meets_pole or orbit.end.period == period
+    assert orbit.end.status == ("singular" if result.meets_pole else "periodic")
+    assert result.meets_pole or orbit.end.period == period
 
 
 @together("name", STARTS)
@@ -173,7 +173,7 @@ def test_a_period_of_a_plane_over_q_is_what_walking_shows(name):
     cubic, (U, V, W) = STARTS[name]
     block = PlanarBlock(*(fmpq(c) for c in cubic))
     start = point = (fmpq(U, W), fmpq(V, W), fmpq(1))
-    found = plane_period_over_rationals(block, start)
+    period = plane_period_over_rationals(block, start)
     met = False
     for step in range(1, 13):  # Mazur: no torsion point of a cubic over Q has an order above 12
         point = block.image(point)
@@ -181,9 +181,9 @@ def test_a_period_of_a_plane_over_q_is_what_walking_shows(name):
             break
         met = met or point[2] == 0
         if same_point(point, start):
-            assert (found.status, found.period, found.meets_pole) == ("periodic", step, met)
+            assert (period.status, period.period, period.meets_pole) == ("periodic", step, met)
             return
-    assert found.status in ("aperiodic", "undefined") or (met and found.meets_pole)
+    assert period.status in ("aperiodic", "undefined") or (met and period.meets_pole)
 
 
 RATIONAL = {5: fmpq(32, 27), 6: fmpq(28, 27), 9: fmpq(8, 9), 12: fmpq(80, 81)}

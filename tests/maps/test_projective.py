@@ -74,7 +74,7 @@ def test_the_forms_of_an_explicit_map_are_its_minors_without_common_factor(image
     rng = random.Random(degree)
     for last in (1, 1, 0):
         X = [over.convert(k) for k in (*(rng.randint(1, 9) for _ in names), last)]
-        found = equation.image(X, over.zero)
+        result = equation.image(X, over.zero)
         minors = kernel_minors(equation.rows(equation.monomials(X), over.zero))
-        assert any(found) or not last
-        assert all(a * d == b * c for (a, b), (c, d) in itertools.pairwise(zip(found, minors, strict=True)))
+        assert any(result) or not last
+        assert all(a * d == b * c for (a, b), (c, d) in itertools.pairwise(zip(result, minors, strict=True)))

@@ -66,16 +66,16 @@ def test_a_pole_is_passed_over(steps):
     cubic, start = STARTS["a pole at step 2"]
     block = integer_block(cubic, before(cubic, start, steps))
     pole = steps + 2
-    found = {n: reduced(tau.iterate(block, n)) for n in range(pole - 1, 2 * pole)}
+    results = {n: reduced(tau.iterate(block, n)) for n in range(pole - 1, 2 * pole)}
     U, V, W = by_gcds(block, 2 * pole)[-1]
-    assert found[pole - 1] == (U, V, W)
-    assert same_point(found[pole], (U, V, 0))
-    assert found[pole + 1] == reduced((U, V, -W))
-    assert reduced(preimage(cubic, found[pole + 2])) == found[pole + 1]
+    assert results[pole - 1] == (U, V, W)
+    assert same_point(results[pole], (U, V, 0))
+    assert results[pole + 1] == reduced((U, V, -W))
+    assert reduced(preimage(cubic, results[pole + 2])) == results[pole + 1]
     for n in range(pole + 2, 2 * pole - 1):
-        above, below = block.block.level(found[n])
+        above, below = block.block.level(results[n])
         assert fmpq(above, below) == block.level
-        assert reduced(image(cubic, found[n])) == found[n + 1]
+        assert reduced(image(cubic, results[n])) == results[n + 1]
 
 
 @pytest.mark.parametrize("name", SMOOTH)
@@ -89,9 +89,9 @@ def test_no_number_is_longer_than_the_result(name, n, monkeypatch):
         return divide(values, divisor)
 
     monkeypatch.setattr(planar_integers, "divide_exactly", watched)
-    found = tau.iterate(integer_block(*STARTS[name]), n)
+    result = tau.iterate(integer_block(*STARTS[name]), n)
     # A tenth, for bad primes and the three points around the base.
-    assert max(lengths) < 1.1 * max(entry.bit_length() for entry in found)
+    assert max(lengths) < 1.1 * max(entry.bit_length() for entry in result)
     assert len(lengths) < 20 * n.bit_length()
 
 
@@ -144,9 +144,9 @@ def member_of(text: str, seed: int = 5):
 @given(seed=st.integers(0, 10**6))
 def test_the_points_are_those_of_steps_in_the_field(name, seed):
     block = random_block(name, seed)
-    stepped, found = (list(islice(points, 11)) for points in (block.triples(), tau.triples(block)))
-    assert len(found) == len(stepped)
-    assert all(same_point(P, Q) for P, Q in zip(found, stepped, strict=True))
+    stepped, result = (list(islice(points, 11)) for points in (block.triples(), tau.triples(block)))
+    assert len(result) == len(stepped)
+    assert all(same_point(P, Q) for P, Q in zip(result, stepped, strict=True))
 
 
 @pytest.mark.parametrize("chi", CHI)
@@ -156,10 +156,10 @@ def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
     normal_form, system = member_of(chi)
     start = random_point(system.dim, seed, height=3)
     generic = [point.value for point in Orbit(KahanMap(system, eps), start, 8, max_digits=None)]
-    found = list(islice(NormalSteps(normal_form, fmpq(eps)).points(start), 9))
-    assert [IntegerPoint.from_rationals(point.rationals()) for point in found] == generic
-    assert [point.lowest_terms() for point in found] == [point.lowest_terms() for point in generic]
-    assert all(point.height <= point.bits + point._assembly.excess for point in found)
+    results = list(islice(NormalSteps(normal_form, fmpq(eps)).points(start), 9))
+    assert [IntegerPoint.from_rationals(point.rationals()) for point in results] == generic
+    assert [point.lowest_terms() for point in results] == [point.lowest_terms() for point in generic]
+    assert all(point.height <= point.bits + point._assembly.excess for point in results)
 
 
 def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):

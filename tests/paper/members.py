@@ -66,31 +66,31 @@ def file(name: str) -> SystemFile:
 @cache
 def point(name: str, number: int = 0) -> PaperObjects:
     """A random point of a member over a field GF(p) in which chi splits; the same one for all tests."""
-    found, rng = member(name), random.Random(f"{name} {number}")
-    rational = specialize.rational_roots(found)
+    result, rng = member(name), random.Random(f"{name} {number}")
+    rational = specialize.rational_roots(result)
     while True:
         try:
             if rational is None:
-                split = specialize.split_prime_field(chi_of(found.A), rng, 100_000)
+                split = specialize.split_prime_field(chi_of(result.A), rng, 100_000)
                 assert split is not None
                 K, roots = split
             else:
                 K = random_prime_field(rng)
                 roots = tuple(K.convert(root) for root in rational)
-            return specialize.point_over(found, K, roots, None, rng, 3)
+            return specialize.point_over(result, K, roots, None, rng, 3)
         except BadPrime:
             continue
 
 
-def verifier_of(found: FamilyMember | None, m: int = 0) -> Verifier:
+def verifier_of(member: FamilyMember | None, m: int = 0) -> Verifier:
     """The verifier of a member, or of the member in general, without options."""
-    return Verifier(found, m if found is None else found.m, Settings(), VerifyOptions())
+    return Verifier(member, m if member is None else member.m, Settings(), VerifyOptions())
 
 
 def named(key: str) -> Claim:
     """The claim with this key."""
-    (found,) = (claim for claim in claims() if claim.key == key)
-    return found
+    (result,) = (claim for claim in claims() if claim.key == key)
+    return result
 
 
 def values(side: Any) -> list[Any]:

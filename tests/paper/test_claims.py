@@ -22,8 +22,8 @@ from kahanmaps.paper.registry import ClaimKind, claims
 QUICK = ["m=1", "m=2, irreducible", "m=3, split"]
 LARGER = [name for name in (*SPECTRA, *LARGE_SPECTRA) if name not in QUICK]
 CLAIMS = claims()
-RIGHT = [found for found in CLAIMS if not found.misprint]
-MISPRINTS = [found for found in CLAIMS if found.misprint]
+RIGHT = [claim for claim in CLAIMS if not claim.misprint]
+MISPRINTS = [claim for claim in CLAIMS if claim.misprint]
 
 
 def test_every_claim_names_a_control_that_applies_to_the_least_m_for_which_it_makes_sense():
@@ -34,11 +34,11 @@ def test_every_claim_names_a_control_that_applies_to_the_least_m_for_which_it_ma
 
 
 def test_every_control_is_named_by_a_claim():
-    assert {name for found in CLAIMS for name in found.breaks} == set(CONTROLS)
+    assert {name for claim in CLAIMS for name in claim.breaks} == set(CONTROLS)
 
 
 def test_the_misprints_are_those_documented():
-    assert {found.key for found in MISPRINTS} == {
+    assert {entry.key for entry in MISPRINTS} == {
         "two-forms-of-the-integral-for-any-cubic",
         "brackets-as-printed",
         "dimension-of-the-cubics-for-any-A",
@@ -51,12 +51,12 @@ def test_the_misprints_are_those_documented():
 
 def compared(claim, o):
     """For every pair of a claim, whether its sides are equal; compared entry by entry."""
-    found = []
+    results = []
     for left, right in claim.function(o):
         a, b = values(left), values(right)
         assert len(a) == len(b)
-        found.append(a == b)
-    return found
+        results.append(a == b)
+    return results
 
 
 def members_of(claim, spectra):
@@ -66,9 +66,11 @@ def members_of(claim, spectra):
 def failing(claim, spectra):
     """The members on which a claim does not do what it says, and those for which it says nothing."""
     names = members_of(claim, spectra)
-    wanted = claim.kind is not ClaimKind.DIFFERENT
+    expected = claim.kind is not ClaimKind.DIFFERENT
     outcomes = {name: compared(claim, point(name)) for name in names}
-    return [name for name, found in outcomes.items() if not found or any(equal is not wanted for equal in found)]
+    return [
+        name for name, results in outcomes.items() if not results or any(equal is not expected for equal in results)
+    ]
 
 
 spectra = pytest.mark.parametrize("spectra", [QUICK, pytest.param(LARGER, marks=pytest.mark.slow)], ids=len)
@@ -92,24 +94,24 @@ def outcome(claim, name, control):
     """Whether a claim "fails" or "holds" at a point of a member that a control has broken; None where undefined."""
     for number in range(3):
         try:
-            found = compared(claim, broken(control, point(name, number)))
+            result = compared(claim, broken(control, point(name, number)))
         except (SingularStep, SingularMatrix, ZeroDivisionError):
             continue
-        wanted = claim.kind is not ClaimKind.DIFFERENT
-        return "holds" if all(equal is wanted for equal in found) else "fails"
+        expected = claim.kind is not ClaimKind.DIFFERENT
+        return "holds" if all(equal is expected for equal in result) else "fails"
     return None
 
 
 def idle_controls(claim, spectra, first_alone):
     """The controls that a claim names and that do not refute it: on the first member that can show it, or on all."""
-    found = []
+    results = []
     for control in claim.breaks:
         able = (
             n for n in members_of(claim, spectra) if member(n).m >= max(2, CONTROLS[control].least_m) or claim.only_m
         )
         names = list(able)[: 1 if first_alone else None]
-        found += [(name, control) for name in names if outcome(claim, name, control) != "fails"]
-    return found
+        results += [(name, control) for name in names if outcome(claim, name, control) != "fails"]
+    return results
 
 
 @together("claim", RIGHT)
@@ -123,7 +125,7 @@ def test_every_control_that_a_claim_names_refutes_it_on_all_members(claim):
     assert idle_controls(claim, (*QUICK, *LARGER), first_alone=False) == []
 
 
-@together("claim", [found for found in RIGHT if found.makes_sense(1)])
+@together("claim", [entry for entry in RIGHT if entry.makes_sense(1)])
 def test_some_control_refutes_a_claim_for_m_1(claim):
     applicable = [control for control in claim.breaks if CONTROLS[control].least_m == 1]
     assert "fails" in [outcome(claim, "m=1", control) for control in applicable]
@@ -157,9 +159,9 @@ LETTERS = {
 @pytest.mark.parametrize("name", ["m=2, split", "m=3, split"])
 @pytest.mark.parametrize("letter", LETTERS)
 def test_a_letter_of_the_library_is_that_of_the_formulas(name, letter):
-    found = member(name)
-    roots = specialize.rational_roots(found)
-    library = specialize.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
+    result = member(name)
+    roots = specialize.rational_roots(result)
+    library = specialize.point_over(result, QQ, roots, fmpq(1, 7), random.Random(name), 3)
     formulas = library.changed(base=None, known_chi=None, draw=library.vector)
     other = formulas.changed(third=library.third * fmpq(2), roots=roots[::-1], draw=library.vector)
     ours, theirs, wrong = ([values(LETTERS[letter](o, i)) for i in o.each] for o in (library, formulas, other))

@@ -105,8 +105,8 @@ def changed(claim):
         first = True
         for left, right in claim.function(o):
             if first and hasattr(right, "nrows"):
-                one = [o.K.one] * (right.nrows() * right.ncols())
-                right = right + o.K.matrix(right.nrows(), right.ncols(), one)
+                entry = [o.K.one] * (right.nrows() * right.ncols())
+                right = right + o.K.matrix(right.nrows(), right.ncols(), entry)
             elif first:
                 right = right + o.eps
             first = False

@@ -7,6 +7,7 @@ the table of what survives beyond the paper everything is proved, or refuted by 
 """
 
 import random
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,23 +82,23 @@ def misprints(m):
 def test_every_claim_but_misprints_is_proved_for_a_member_with_distinct_roots(name):
     # One report, and what it has to be: neighbours would compute it again in another process.
     report, wrong = verify(file(name)), misprints(member(name).m)
-    found = by_key(report)
+    result = by_key(report)
     assert [finding.place["key"] for finding in report.findings] == stated(member(name).m)
     assert keys(report, REFUTED) == wrong
-    assert keys(report, PROVED) == set(found) - wrong
+    assert keys(report, PROVED) == set(result) - wrong
     assert report.verdict is PROVED
     assert report.holds is True
     for key in wrong:
-        assert found[key].control
-        assert found[key].place["misprint"]
-        assert found[key].witness.left != found[key].witness.right
+        assert result[key].control
+        assert result[key].place["misprint"]
+        assert result[key].witness.left != result[key].witness.right
 
 
-@pytest.mark.parametrize("asked", [1, 300])
-def test_beside_a_proof_stand_random_points_with_the_error_bound_asked_for(asked):
-    for finding in verify(file("m=2, irreducible"), Settings(error_bits=asked), SIXTH).findings:
+@pytest.mark.parametrize("requested", [1, 300])
+def test_beside_a_proof_stand_random_points_with_the_error_bound_asked_for(requested):
+    for finding in verify(file("m=2, irreducible"), Settings(error_bits=requested), SIXTH).findings:
         (points,) = [evidence for evidence in finding.also if evidence.method == "random points over GF(p)"]
-        assert bits(points) >= asked
+        assert bits(points) >= requested
 
 
 @pytest.mark.parametrize("name", quick(["m=3, irreducible", "m=2, complex"], ["m=2, complex"]))
@@ -184,9 +185,9 @@ def test_claims_that_need_distinct_roots_are_undecided_and_nothing_is_refuted_bu
         if claim.kind is ClaimKind.EQUAL:
             uses_roots = bool(list(claim.function(bounds))) and "roots" in bounds.used
         if claim.distinct_roots or uses_roots:
-            found = by_key(report)[claim.key]
-            assert (found.verdict, found.evidence.method) == (UNDECIDED, "outside the hypotheses")
-            assert "repeated roots" in found.evidence.summary
+            result = by_key(report)[claim.key]
+            assert (result.verdict, result.evidence.method) == (UNDECIDED, "outside the hypotheses")
+            assert "repeated roots" in result.evidence.summary
 
 
 def of_two_planes(H):
@@ -211,12 +212,12 @@ def test_identities_are_proved_for_a_special_member_and_what_is_said_in_general_
 def test_statements_that_something_differs_are_proved_where_the_roots_are_irrational():
     """chi = t^2 - 2: what needs the roots is shown at a point over a prime field in which chi splits."""
     verifier = verifier_of(random_member_with_chi(fmpq_poly([-2, 0, 1]), 1))
-    found = [
+    results = [
         verifier.verify_claim(claim) for claim in STATED if claim.kind is not ClaimKind.EQUAL and claim.makes_sense(2)
     ]
-    assert len(found) > 10
-    assert {finding.verdict for finding in found} == {PROVED}
-    assert {finding.evidence.method for finding in found} == {"exact rational point", "point over GF(p)"}
+    assert len(results) > 10
+    assert {finding.verdict for finding in results} == {PROVED}
+    assert {finding.evidence.method for finding in results} == {"exact rational point", "point over GF(p)"}
 
 
 @pytest.mark.parametrize(
@@ -251,9 +252,9 @@ def test_what_is_special_about_a_member_is_said(H, reason):
 def test_the_zero_hamiltonian_refutes_nothing():
     report = verify(SystemFile.from_member(of_two_planes("x1 - x1")), options=VerifyOptions(sections=(1, 3, 7, 8)))
     assert keys(report, REFUTED) <= misprints(2)
-    told = {key: finding.evidence.summary for key, finding in by_key(report).items()}
-    assert "both sides agree at 4 random points" in told["associated-fields-are-pairwise-different"]
-    assert "not attained at 4 random points" in told["hamiltonians-are-independent"]
+    messages = {key: finding.evidence.summary for key, finding in by_key(report).items()}
+    assert "both sides agree at 4 random points" in messages["associated-fields-are-pairwise-different"]
+    assert "not attained at 4 random points" in messages["hamiltonians-are-independent"]
     silent = [finding for finding in report.findings if "the misprint does not show" in finding.evidence.summary]
     special = [finding for finding in report.findings if finding.evidence.method == "special member"]
     assert silent
@@ -264,9 +265,9 @@ def test_the_signs_of_a_file_choose_the_system_that_is_examined(monkeypatch):
     examined = []
     original = Verifier.__init__
 
-    def spy(self, found, *arguments):
-        examined.append(found)
-        original(self, found, *arguments)
+    def spy(self, result, *arguments):
+        examined.append(result)
+        original(self, result, *arguments)
 
     monkeypatch.setattr(Verifier, "__init__", spy)
     plain = member("m=2, split")
@@ -320,13 +321,20 @@ def test_every_cell_is_proved_or_refuted_by_a_counterexample_and_the_page_shows_
         for _, formula, *_, signs in STATEMENTS
         for name, sign in zip(VARIATIONS, signs, strict=True)
     }
-    found = {(one.place["statement"], one.place["variation"]): one.verdict for one in report.findings}
+    results = {(finding.place["statement"], finding.place["variation"]): finding.verdict for finding in report.findings}
     words = {"+": Certainty.PROVED, "-": Certainty.REFUTED}
-    assert found == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
+    assert results == {cell: words[sign] for cell, sign in answers.items() if sign != " "}
     assert table(report) in PAGE.read_text(encoding="utf-8")
-    for one in report.findings:
-        assert (one.verdict is Certainty.REFUTED) is one.control is (one.witness is not None)
-        assert one.witness is None or one.witness.left != one.witness.right
+    for entry in report.findings:
+        assert (entry.verdict is Certainty.REFUTED) is entry.control is (entry.witness is not None)
+        assert entry.witness is None or entry.witness.left != entry.witness.right
+
+
+def test_formulas_of_the_table_are_code_so_that_markdown_prints_their_stars():
+    text = table(beyond_table(1))
+    assert "u1^2*v1" in text
+    outside_code = re.sub(r"`[^`]*`", "", text)
+    assert not re.search(r"(?<!^)\*|_", outside_code, re.MULTILINE)  # only the stars of the list are left
 
 
 def test_without_a_term_of_lower_degree_the_counterexample_is_none():

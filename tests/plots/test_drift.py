@@ -29,8 +29,8 @@ def survey(file, start, steps, requests, methods=("generic",), eps=EPS, **how):
     return survey_drift(file.system, eps, start, steps, requested_functions(file, eps, requests), methods, **how)
 
 
-def only(found):
-    [curve] = found.curves
+def only(result):
+    [curve] = result.curves
     return curve
 
 
@@ -44,17 +44,17 @@ def test_integrals_with_the_image_in_them_have_their_exact_values():
         function = OfTheImage(integral, EPS, "I")
         value = integral.value(QQ, EPS, start)
         assert function.at(start) == value
-        found = function(points)
-        assert np.isnan(found).tolist() == [False, True, False]
-        assert found[0] == pytest.approx(int(value.p) / int(value.q), rel=1e-12)
+        result = function(points)
+        assert np.isnan(result).tolist() == [False, True, False]
+        assert result[0] == pytest.approx(int(value.p) / int(value.q), rel=1e-12)
 
 
 def test_a_hamiltonian_system_without_claims_has_its_modified_hamiltonian():
     x, y = ring(["x", "y"]).gens()
     file = SystemFile.from_hamiltonian(CubicHamiltonian((x**2 + y**2) / 2 + x**3 / 3, standard_structure(2)), "w")
     assert [function.name for function in known_functions(file, EPS)] == ["modified H", "H"]
-    found = survey_drift(file.system, EPS, ["1/4", "1/8"], 100, known_functions(file, EPS), ("generic",))
-    assert [bool(curve.errors.max() < 1e-12) for curve in found.curves] == [True, False]
+    survey = survey_drift(file.system, EPS, ["1/4", "1/8"], 100, known_functions(file, EPS), ("generic",))
+    assert [bool(curve.errors.max() < 1e-12) for curve in survey.curves] == [True, False]
 
 
 def test_known_functions_are_claims_and_then_H_and_where_nothing_is_known_the_option_is_named():
@@ -77,26 +77,26 @@ def test_expressions_may_contain_eps_and_have_a_name_each():
 
 @pytest.mark.parametrize(("text", "k", "scale"), [("x", 0, 2), ("y", 1, None)])
 def test_errors_are_relative_and_absolute_where_the_function_is_0_at_the_start(text, k, scale):
-    found = survey(CIRCLE, [2, 0], 50, [("E", text)])
+    result = survey(CIRCLE, [2, 0], 50, [("E", text)])
     values = np.array([x[k] for _, x in FloatOrbit(CIRCLE.system, EPS, [2, 0], 50)])
-    assert only(found).steps.tolist() == list(range(1, 51))
-    assert only(found).errors.tolist() == (abs(values[1:] - values[0]) / (scale or 1)).tolist()
-    assert found.relative == {"E": scale is not None}
+    assert only(result).steps.tolist() == list(range(1, 51))
+    assert only(result).errors.tolist() == (abs(values[1:] - values[0]) / (scale or 1)).tolist()
+    assert result.relative == {"E": scale is not None}
     # 1/10 + 1/5 - 3/10 is 0, and 5.6e-17 in doubles: whether the function is 0 is decided exactly.
     assert survey(CIRCLE, ["1/10", "1/5"], 5, [("E", "x + y - 3/10")]).relative == {"E": False}
 
 
 def test_the_methods_conserve_different_things():
-    found = survey(load("weierstrass"), ["1/4", "1/8"], 1000, [("", "known")], ("generic", "rk4", "midpoint"))
-    largest = {(curve.function, curve.method): curve.errors.max() for curve in found.curves}
+    result = survey(load("weierstrass"), ["1/4", "1/8"], 1000, [("", "known")], ("generic", "rk4", "midpoint"))
+    largest = {(curve.function, curve.method): curve.errors.max() for curve in result.curves}
     assert largest["modified_H", "generic"] < 1e-10 < 1e-5 < largest["modified_H", "rk4"]
     assert largest["H", "generic"] > 1e-5
 
 
 def test_an_orbit_that_ends_early_is_no_whole_one():
-    found = survey(SQUARE, [10], 100, [("E", "x")], ("rk4", "midpoint"), eps=fmpq(1, 2))
-    assert {method: end.is_whole for method, end in found.ends.items()} == {"rk4": False, "midpoint": False}
-    assert [len(curve.steps) for curve in found.curves][1] == 0
+    result = survey(SQUARE, [10], 100, [("E", "x")], ("rk4", "midpoint"), eps=fmpq(1, 2))
+    assert {method: end.is_complete for method, end in result.ends.items()} == {"rk4": False, "midpoint": False}
+    assert [len(curve.steps) for curve in result.curves][1] == 0
 
 
 @together(
@@ -116,12 +116,12 @@ def test_wrong_values_are_refused(start, steps, eps, methods):
 
 
 def test_a_pole_at_the_start_is_refused_and_points_without_a_value_are_counted():
-    with pytest.raises(InputError, match="E has no value in floating point at the start"):
+    with pytest.raises(InputError, match="E is not defined in floating point at the initial point"):
         survey(CIRCLE, [1, 0], 10, [("E", "1/(x - 1)")])
     file = SystemFile.from_system(QuadraticSystem.from_text(["x"], ["1"]), "shift")
-    found = survey(file, [0], 10, [("E", "1/(x - 1)")], eps=fmpq(1, 2))  # x_n = n
-    assert only(found).undefined == 1
-    assert only(found).steps.tolist() == list(range(2, 11))
+    result = survey(file, [0], 10, [("E", "1/(x - 1)")], eps=fmpq(1, 2))  # x_n = n
+    assert only(result).undefined == 1
+    assert only(result).steps.tolist() == list(range(2, 11))
 
 
 @pytest.mark.parametrize("linear", [False, True])
@@ -141,17 +141,17 @@ def test_the_largest_of_every_bin_is_kept_however_errors_come(linear, portion):
 def test_a_random_start_is_the_same_for_the_same_seed_and_small_enough_for_rk4():
     first, second, other = (small_start(CIRCLE.system, EPS, seed) for seed in (0, 0, 1))
     assert first == second != other
-    found = survey(load("paper_m2"), small_start(load("paper_m2").system, EPS), 1000, [("", "I1")], ("rk4",))
-    assert found.ends["rk4"].is_whole
+    result = survey(load("paper_m2"), small_start(load("paper_m2").system, EPS), 1000, [("", "I1")], ("rk4",))
+    assert result.ends["rk4"].is_complete
 
 
-def drawn(found, **how):
-    return plot_drift(found, Style(width=12), **how)
+def drawn(result, **how):
+    return plot_drift(result, Style(width=12), **how)
 
 
 def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():
-    found = survey(load("weierstrass"), ["1/4", "1/8"], 300, [("", "known")], ("generic", "rk4", "midpoint"))
-    figure = drawn(found)
+    result = survey(load("weierstrass"), ["1/4", "1/8"], 300, [("", "known")], ("generic", "rk4", "midpoint"))
+    figure = drawn(result)
     assert [axes.get_ylabel() for axes in figure.axes] == ["relative error of modified $H$", "relative error of $H$"]
     assert [len(axes.lines) for axes in figure.axes] == [3, 3]
     assert len({line.get_linestyle() for line in figure.axes[0].lines}) == 3
@@ -161,14 +161,14 @@ def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():
 
 
 def test_the_label_of_a_panel_is_not_broken_within_a_formula():
-    found = survey(load("euler_top"), [1, "1/2", "1/3"], 9, [("", "(x1^2 - 3*x2^2 + 7*x3^2)/(1 - x2^2)")])
-    [axes] = drawn(found).axes
+    result = survey(load("euler_top"), [1, "1/2", "1/3"], 9, [("", "(x1^2 - 3*x2^2 + 7*x3^2)/(1 - x2^2)")])
+    [axes] = drawn(result).axes
     assert axes.get_ylabel() == "relative error of\n" + "(x1^2 - 3*x2^2 + 7*x3^2)/(1 - ".replace(" ", "\xa0")
 
 
 def test_an_exact_0_is_in_the_band_and_not_left_out():
-    found = survey(CIRCLE, [1, 0], 20, [("E", "0*x + 1 + 0*y")])
-    [axes] = drawn(found).axes
+    result = survey(CIRCLE, [1, 0], 20, [("E", "0*x + 1 + 0*y")])
+    [axes] = drawn(result).axes
     heights = axes.lines[0].get_ydata()
     assert len(heights) == 20
     assert [text.get_text() for text in axes.texts] == ["0"]
@@ -177,11 +177,11 @@ def test_an_exact_0_is_in_the_band_and_not_left_out():
 
 
 def test_what_blows_up_is_an_arrow_and_flattens_nothing_and_an_orbit_that_ends_early_has_a_cross():
-    found = survey(SQUARE, ["1/10"], 2000, [("E", "x")], ("generic", "rk4"))
-    [axes] = drawn(found).axes
-    limit = clipped_from(found, "E")
+    result = survey(SQUARE, ["1/10"], 2000, [("E", "x")], ("generic", "rk4"))
+    [axes] = drawn(result).axes
+    limit = clipped_from(result, "E")
     assert any(line.get_marker() == "^" and line.get_ydata().tolist() == [limit] for line in axes.lines)
-    assert axes.get_ylim()[1] < 10 * limit < found.curves[1].errors.max()
+    assert axes.get_ylim()[1] < 10 * limit < result.curves[1].errors.max()
     assert not axes.patches  # no band for errors of 0, as there are none
     assert any("ended at step" in text.get_text() for text in axes.figure.legends[0].get_texts())
     [axes] = drawn(survey(SQUARE, ["1"], 30, [("E", "1/x")], ("generic", "midpoint"))).axes

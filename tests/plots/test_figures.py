@@ -1,4 +1,4 @@
-"""Figures: the size asked for, the same bytes every time, whole files or none, matplotlib's settings left alone."""
+"""Figures: the requested size, the same bytes every time, complete files or none, matplotlib's settings left alone."""
 
 import re
 import xml.etree.ElementTree as ElementTree
@@ -64,19 +64,19 @@ def test_settings_of_a_user_do_not_get_into_a_picture_and_are_left_as_they_were(
 
 
 @together(
-    "path, asked, expected",
+    "path, requested, expected",
     [
         *(("a.pdf", None, "pdf"), ("a.PNG", None, "png"), ("a.b.svg", None, "svg")),
         *(("a.pdf", "png", "png"), ("a", "svg", "svg")),
         *((path, None, None) for path in ("a", "a.jpg", "a.pdf.gz", ".svg")),
     ],
 )
-def test_the_format_is_that_of_the_ending_or_the_one_asked_for(path, asked, expected):
+def test_the_format_is_that_of_the_ending_or_the_one_requested(path, requested, expected):
     if expected is None:
         with pytest.raises(InputError, match=r"expected \.pdf, \.svg or \.png"):
-            format_of(path, asked)
+            format_of(path, requested)
     else:
-        assert format_of(path, asked) == expected
+        assert format_of(path, requested) == expected
 
 
 def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():
@@ -89,7 +89,7 @@ def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():
 
 
 def test_pictures_of_more_dots_than_fit_into_memory_are_refused():
-    with pytest.raises(InputError, match="take fewer dots per inch than 2400"):
+    with pytest.raises(InputError, match="use fewer dots per inch than 2400"):
         Style(width=200, dpi=2400)
     tall = Style(width=20, dpi=2000)  # 12 000 x 16 000 dots are few enough, as high as three times that are not
     with pytest.raises(InputError, match="2000"):

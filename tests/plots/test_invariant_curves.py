@@ -89,11 +89,11 @@ def test_dots_of_one_plane_do_not_lie_on_the_curve_of_another(curves):
 
 @pytest.mark.parametrize("name", MEMBERS)
 def test_the_planes_together_are_the_exact_orbit(curves, name):
-    file, found = MEMBERS[name](), curves(name)
+    file, result = MEMBERS[name](), curves(name)
     phi, point = KahanMap(file.system, "1/20"), START[file.system.dim]
     for k in range(8):
         # The planes are added up in doubles: a few roundings of numbers as large as the orbit's.
-        assert found.originals[0][k] == pytest.approx(rounded(phi.point(point)), rel=1e-10, abs=1e-10)
+        assert result.originals[0][k] == pytest.approx(rounded(phi.point(point)), rel=1e-10, abs=1e-10)
         point = phi.step(point)
 
 
@@ -103,8 +103,8 @@ def rounded(point):
 
 def test_the_curve_is_the_conserved_quantity_of_the_catalogue(curves):
     # paper_m2 claims I1 and I2 = h_i/(1 + eps^2 D_i): at the start they are the levels, up to 1/chi'(root) = -1, 1
-    file, found = load("paper_m2"), curves("m = 2")
-    levels = sorted(abs(p.orbits[0].cubic.numerator / p.orbits[0].cubic.denominator) for p in found.planes)
+    file, result = load("paper_m2"), curves("m = 2")
+    levels = sorted(abs(p.orbits[0].cubic.numerator / p.orbits[0].cubic.denominator) for p in result.planes)
     point = [QQ.convert(entry) for entry in (*START[4], "1/20")]
     claimed = [f.numerator(*point) / f.denominator(*point) for f in file.integrals.values()]
     assert levels == pytest.approx(sorted(map(abs, rounded(claimed))))
@@ -118,11 +118,11 @@ def test_roots_are_named_exactly_where_they_are_rational(curves):
 
 
 def test_a_complex_plane_has_two_panels_with_dots_but_no_curve(curves):
-    found = curves("one real root of three")
-    real, pair = found.planes
+    result = curves("one real root of three")
+    real, pair = result.planes
     assert (real.orbits[0].cubic is None, pair.orbits[0].cubic is None) == (False, True)
     assert np.iscomplexobj(pair.orbits[0].u)
-    assert [(place, column) for place, _, column in panels_of(found)] == [("1", "uv"), ("2", "u"), ("2", "v")]
+    assert [(place, column) for place, _, column in panels_of(result)] == [("1", "uv"), ("2", "u"), ("2", "v")]
 
 
 def test_a_sign_turns_one_plane_around(curves):
@@ -137,11 +137,11 @@ def test_a_sign_turns_one_plane_around(curves):
 def test_one_pole_ends_the_orbit_in_all_planes_and_a_plane_at_rest_is_said_to_be_one():
     rhs = ["-6*x*z", "0", "3*z^2 - 3*x^2", "-y^2"]
     system = QuadraticSystem.from_text(["x", "y", "z", "w"], rhs)
-    found = find_invariant_curves(SystemFile.from_system(system), [["3/5", 1, "4/5", 1]], "1/6", 5)
-    assert {len(plane.orbits[0].u) for plane in found.planes} == {1}
+    curves = find_invariant_curves(SystemFile.from_system(system), [["3/5", 1, "4/5", 1]], "1/6", 5)
+    assert {len(plane.orbits[0].u) for plane in curves.planes} == {1}
     system = QuadraticSystem.from_text(["x", "y", "z", "w"], ["0", "0", "-x^2", "0"])
-    found = find_invariant_curves(SystemFile.from_system(system), [[1, 3, 1, 1]], "1/6", 5)
-    assert ZERO in [plane.shape for plane in found.planes]
+    curves = find_invariant_curves(SystemFile.from_system(system), [[1, 3, 1, 1]], "1/6", 5)
+    assert ZERO in [plane.shape for plane in curves.planes]
 
 
 @together(
@@ -152,7 +152,7 @@ def test_one_pole_ends_the_orbit_in_all_planes_and_a_plane_at_rest_is_said_to_be
         ([START[4]], -1, "found -1 steps"),
         ([START[4]], MAX_POINTS, "expected 0 or more steps and at most 1000000 points"),
         ([[1, 2]], 5, "found a point with 2 coordinates, expected 4"),
-        ([[10**200, 0, 0, 0]], 5, "scale the start"),
+        ([[10**200, 0, 0, 0]], 5, "scale the initial point"),
     ],
 )
 def test_wrong_sizes_are_refused(starts, steps, message):
@@ -172,40 +172,40 @@ def test_a_system_without_normal_form_is_refused_with_the_reason():
 
 
 def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_color_in_all_panels(curves):
-    found = curves("m = 3")
-    figure = plot_invariant_curves(found, STYLE, original=(0, 1))
+    result = curves("m = 3")
+    figure = plot_invariant_curves(result, STYLE, original=(0, 1))
     clouds = [axes.collections[0] for axes in figure.axes[:4]]
     for cloud in clouds:
         assert np.array_equal(cloud.get_array(), np.arange(61))
         assert cloud.norm is clouds[0].norm
-    orbit = found.planes[1].orbits[0]
+    orbit = result.planes[1].orbits[0]
     assert np.array_equal(clouds[2].get_offsets(), np.stack([orbit.u, orbit.v], axis=1))
 
 
 def test_the_lines_drawn_lie_on_the_curve(curves):
-    found = curves("m = 2")
-    axes = plot_invariant_curves(found, STYLE).axes[0]
+    result = curves("m = 2")
+    axes = plot_invariant_curves(result, STYLE).axes[0]
     lines = [line for line in axes.lines if line.get_marker() == "None"]
     u, v = (np.concatenate([line.get_data()[k] for line in lines]) for k in (0, 1))
-    window = view_of(found.planes[0])
+    window = view_of(result.planes[0])
     inside = np.hypot(u, v) < 10 * np.abs(window.window).max()  # what is farther is cut off where it is not seen
     assert inside.any()
-    assert defect(found.planes[0].orbits[0].cubic, u[inside], v[inside]) < 1e-7
+    assert defect(result.planes[0].orbits[0].cubic, u[inside], v[inside]) < 1e-7
 
 
 def test_a_circle_of_poles_is_met_at_the_first_step_and_said_in_the_picture():
     # 1 + eps^2 D = 1 - 36 eps^2 (x^2 + y^2) is 0 at (3/5, 4/5) for eps = 1/6
-    found = find_invariant_curves(SystemFile.from_system(monkey_saddle()), [["3/5", "4/5"], [1, 3]], "1/6", 5)
-    assert found.poles == (1, None)
-    figure = plot_invariant_curves(found, STYLE, labels=("one", "two"))
+    curves = find_invariant_curves(SystemFile.from_system(monkey_saddle()), [["3/5", "4/5"], [1, 3]], "1/6", 5)
+    assert curves.poles == (1, None)
+    figure = plot_invariant_curves(curves, STYLE, labels=("one", "two"))
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["one (a pole at step 1)", "two"]
 
 
 def test_the_disc_shows_every_dot_on_its_curve(curves):
-    found = curves("m = 2")
-    for axes in plot_invariant_curves(found, STYLE, projective=True).axes[:2]:
+    result = curves("m = 2")
+    for axes in plot_invariant_curves(result, STYLE, projective=True).axes[:2]:
         assert np.linalg.norm(axes.collections[0].get_offsets(), axis=1).max() <= 1
-    plane = found.planes[0]
+    plane = result.planes[0]
     orbit, disc = plane.orbits[0], Disc.of(plane)
     x, y = disc.place(orbit.u, orbit.v)
     vertices = np.concatenate(disc.curves(orbit.cubic))

@@ -102,7 +102,7 @@ def test_a_value_beyond_the_range_of_doubles_is_missing_without_a_warning():
 def test_a_name_is_that_of_an_integral_or_unknown():
     named = {"I1": parse_rational_function("x*y/eps", ["x", "y", "eps"])}
     assert point_function("I1", ["x", "y"], fmpq(1, 2), named=named)(np.array([2.0, 3.0])) == 12
-    with pytest.raises(InputError, match=r"found the name H, known are x, y, eps; integrals are named I1"):
+    with pytest.raises(InputError, match=r"found the name H, expected one of x, y, eps; integrals are named I1"):
         point_function("H", ["x", "y"], named=named)
 
 

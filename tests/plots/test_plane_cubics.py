@@ -72,7 +72,7 @@ def test_at_a_tiny_level_the_curve_is_close_to_the_lines_of_h_and_at_zero_on_the
 def test_every_line_through_the_origin_meets_the_curve_as_often_as_the_equation_has_roots(form):
     # an independent count: the real roots of s^3 + p s - q for lines between those that were followed
     cubic = PlaneCubic(FORMS[form], 0.5, 0.2, 1.0)
-    found = list(arcs(cubic))
+    results = list(arcs(cubic))
     for angle in np.linspace(0.0123, np.pi - 0.01, 40):
         x, y = np.cos(angle), np.sin(angle)
         a, b, c, d = cubic.h
@@ -81,7 +81,7 @@ def test_every_line_through_the_origin_meets_the_curve_as_often_as_the_equation_
         roots = np.roots([1, 0, cubic.eps**2 * D, -h / cubic.numerator])
         expected = sum(abs(root.imag) < 1e-9 for root in roots)
         crossings = 0
-        for arc in found:
+        for arc in results:
             side = arc[:, 0] * y - arc[:, 1] * x
             crossings += int(np.sum(side[1:] * side[:-1] < 0))
         assert crossings == expected
@@ -90,8 +90,8 @@ def test_every_line_through_the_origin_meets_the_curve_as_often_as_the_equation_
 def test_neighbouring_vertices_are_close_and_arcs_end_at_infinity_or_at_each_other():
     for arc in arcs(PlaneCubic(FORMS["three lines"], 0.5, 1e-6, 1.0)):
         assert all(abs(before @ after) > np.cos(0.03) for before, after in pairwise(arc))
-    found = arcs(PlaneCubic(FORMS["three lines"], 0.5, 0.3, 1.0))
-    ends = [row for arc in found for row in (arc[0], arc[-1]) if row[2] > 1e-6]
+    result = arcs(PlaneCubic(FORMS["three lines"], 0.5, 0.3, 1.0))
+    ends = [row for arc in result for row in (arc[0], arc[-1]) if row[2] > 1e-6]
     for end in ends:
         assert sum(np.linalg.norm(end - other) < 1e-6 for other in ends) == 2
 
@@ -133,10 +133,10 @@ def test_the_gradient_is_the_derivative():
 def test_the_cubic_becomes_symmetric_and_areas_and_values_are_kept(coefficients, shape, sign):
     with ctx.workprec(256):
         block = PlanarBlock(*map(arb, coefficients))
-        found, matrix = symmetric_coordinates(block)
+        result, matrix = symmetric_coordinates(block)
         f, g, k, l = matrix.entries()
         a, b, c, d = new = transformed(block, matrix)
-        assert found == shape
+        assert result == shape
         assert float(f * l - g * k) == pytest.approx(1)
         if sign is not None:
             assert a > 0

@@ -42,17 +42,17 @@ def test_all_points_of_all_orbits_are_there_and_an_axis_may_be_the_step():
 
 
 def test_points_at_a_pole_of_an_axis_or_of_the_color_are_left_out_and_counted():
-    found = trajectories([[[1, 0]], [[2, 1]], [[0, 1]]])
-    shown = portrait_of(found, [point_function("1/x", "xy"), AXES[1]], color=point_function("1/y", "xy"))
+    result = trajectories([[[1, 0]], [[2, 1]], [[0, 1]]])
+    shown = portrait_of(result, [point_function("1/x", "xy"), AXES[1]], color=point_function("1/y", "xy"))
     assert shown.undefined == 2
     assert np.isnan(shown.points[:, 0, 0]).tolist() == [True, False, True]
 
 
 def test_orbits_that_ended_are_not_called_undefined():
-    found = walked(ensemble_for(QuadraticSystem.from_text(["x"], ["x^2"]), "1", np.array([[0.5], [3.0]]), 2), 2)
+    result = walked(ensemble_for(QuadraticSystem.from_text(["x"], ["x^2"]), "1", np.array([[0.5], [3.0]]), 2), 2)
     # (x~ - x)/2 = x x~ has a pole at x = 1/2
-    assert found.ended == {"met a singular matrix I - eps f'": 1}
-    assert portrait_of(found, ["step", point_function("x", "x")]).undefined == 0
+    assert result.ended == {"met a singular matrix I - eps f'": 1}
+    assert portrait_of(result, ["step", point_function("x", "x")]).undefined == 0
 
 
 def test_explicit_euler_is_what_its_formula_says_and_spirals_outward_where_kahans_orbit_does_not():
@@ -75,8 +75,8 @@ def test_more_orbits_are_one_cloud_with_a_color_for_each_the_widest_first():
 
 def test_points_outside_the_window_do_not_spoil_the_colors():
     values = np.append(np.linspace(0, 1, 50), [1e6] * 20)
-    found = trajectories(np.stack([values, values], axis=1)[:, None])
-    shown = portrait_of(found, AXES, color=AXES[0], window=((0, 2), (0, 2)))
+    result = trajectories(np.stack([values, values], axis=1)[:, None])
+    shown = portrait_of(result, AXES, color=AXES[0], window=((0, 2), (0, 2)))
     axes = plot_portrait(shown, STYLE).axes[0]
     assert axes.collections[0].norm.vmax == 1
     assert (axes.get_xlim(), axes.get_ylim(), shown.left_out) == ((0, 2), (0, 2), 20)
@@ -84,9 +84,9 @@ def test_points_outside_the_window_do_not_spoil_the_colors():
 
 def test_points_outside_the_window_are_not_drawn_in_space():
     top = load("euler_top", {}).system
-    found = walked(ensemble_for(top, "1/10", np.array([[1.0, 0.5, 0.2]]), 100), 100)
+    result = walked(ensemble_for(top, "1/10", np.array([[1.0, 0.5, 0.2]]), 100), 100)
     axes = [point_function(name, top.variables) for name in top.variables]
-    shown = portrait_of(found, axes, window=((0, 2), (-2, 2), (-2, 2)))
+    shown = portrait_of(result, axes, window=((0, 2), (-2, 2), (-2, 2)))
     (line, *_) = plot_portrait(shown, STYLE).axes[0].lines
     x = np.asarray(line.get_data_3d()[0], dtype=float)
     assert np.isnan(x).sum() == shown.left_out
@@ -96,8 +96,8 @@ def test_points_outside_the_window_are_not_drawn_in_space():
 def test_no_line_goes_through_a_missing_point_and_no_points_at_all_are_an_empty_picture():
     shown = portrait_of(trajectories([[[0, 0]], [[1, 1]], [[np.nan, np.nan]], [[3, 0]]]), AXES, color="step")
     assert len(plot_portrait(shown, STYLE, lines=True).axes[0].collections[0].get_segments()) == 1
-    found = trajectories(np.full((2, 1, 2), np.nan))
-    assert picture_bytes(plot_portrait(portrait_of(found, AXES, color="step"), STYLE), "png", STYLE)
+    result = trajectories(np.full((2, 1, 2), np.nan))
+    assert picture_bytes(plot_portrait(portrait_of(result, AXES, color="step"), STYLE), "png", STYLE)
 
 
 def circle(turn):
@@ -124,8 +124,8 @@ def test_a_cloud_has_no_curve():
 
 
 def test_initial_points_and_equilibria_have_different_marks_and_both_are_in_the_legend():
-    found = orbits(8)
-    shown = replace(portrait_of(found, AXES), flow=plane_flow(LOTKA_VOLTERRA, (0, 1), ((-1, 3), (-1, 3))))
+    result = orbits(8)
+    shown = replace(portrait_of(result, AXES), flow=plane_flow(LOTKA_VOLTERRA, (0, 1), ((-1, 3), (-1, 3))))
     [legend] = plot_portrait(shown, STYLE).legends
     marks = {
         text.get_text(): line.get_marker() for text, line in zip(legend.get_texts(), legend.get_lines(), strict=True)
@@ -203,17 +203,17 @@ def test_eigenvalues_tell_the_kind(rhs, kind):
 
 
 def test_arrows_have_the_direction_of_the_field_along_the_axes_as_they_are_drawn():
-    found = plane_flow(planar("x", "-y"), (1, 0), BOX)  # y to the right
-    to_the_right = found.places[:, 0] > 0
-    assert (found.arrows[to_the_right, 0] < 0).all()
-    lengths = np.linalg.norm(found.arrows, axis=1)
+    flow = plane_flow(planar("x", "-y"), (1, 0), BOX)  # y to the right
+    to_the_right = flow.places[:, 0] > 0
+    assert (flow.arrows[to_the_right, 0] < 0).all()
+    lengths = np.linalg.norm(flow.arrows, axis=1)
     assert np.allclose(lengths[lengths > 0], 1)
     assert (lengths == 0).sum() == 1, "the saddle"
 
 
 def test_separatrices_lie_on_the_level_of_their_saddle():
-    found = plane_flow(planar("y", "x - x^2"), (0, 1), BOX)  # H = y^2/2 - x^2/2 + x^3/3
-    inside = [curve[(np.abs(curve) <= 3).all(axis=1)].T for curve in found.separatrices]
+    flow = plane_flow(planar("y", "x - x^2"), (0, 1), BOX)  # H = y^2/2 - x^2/2 + x^3/3
+    inside = [curve[(np.abs(curve) <= 3).all(axis=1)].T for curve in flow.separatrices]
     assert len(inside) == 4
     # the offset from the saddle is 6e-3 and along the eigenvector H is of the third order
     assert max(np.abs(y**2 / 2 - x**2 / 2 + x**3 / 3).max() for x, y in inside) < 1e-6

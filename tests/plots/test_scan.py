@@ -16,33 +16,35 @@ rhs = ["x*(a*x + y)", "y*(x + b*y)"]"""
 
 
 @pytest.fixture(scope="module")
-def found():
+def scanned():
     return scan(parse_system(PLANE), ["a", "b"], terms=3, primes=[11, 13, 17])
 
 
-def of_growth(found, kind):
+def of_growth(scanned, kind):
     """The components of the blocks with this growth."""
     return [
-        one
-        for _, some in found.classes
-        for one in some
+        entry
+        for _, some in scanned.classes
+        for entry in some
         if any(o.growth is not None and o.growth.growth == kind for o in some)
     ]
 
 
-def test_marks_are_the_points_of_each_kind_of_growth(found):
-    figure = plot_scan(found)
+def test_marks_are_the_points_of_each_kind_of_growth(scanned):
+    figure = plot_scan(scanned)
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    kinds = [kind for kind in ("bounded", "linear", "quadratic", "exponential") if of_growth(found, kind)]
+    kinds = [kind for kind in ("bounded", "linear", "quadratic", "exponential") if of_growth(scanned, kind)]
     assert len(kinds) > 2
     assert texts[: len(kinds)] == [f"{kind} growth" for kind in kinds]
     for text, line in zip(texts, figure.axes[0].lines, strict=True):
-        points = [one for one in of_growth(found, text.split()[0]) if one.dimension == 0]
-        assert sorted(line.get_xdata()) == sorted(int(one.values["a"].p) / int(one.values["a"].q) for one in points)
+        points = [entry for entry in of_growth(scanned, text.split()[0]) if entry.dimension == 0]
+        assert sorted(line.get_xdata()) == sorted(
+            int(point.values["a"].p) / int(point.values["a"].q) for point in points
+        )
 
 
-def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_them(found):
-    figure = plot_scan(found, window=((-2.0, 2.0), (-2.0, 2.0)))
+def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_them(scanned):
+    figure = plot_scan(scanned, window=((-2.0, 2.0), (-2.0, 2.0)))
     [axes] = figure.axes
     a, b = np.concatenate(axes.collections[1].get_segments()).T  # those of linear growth
     assert len(a) > 50
@@ -56,8 +58,8 @@ def test_curves_are_the_zeros_of_the_conditions_and_these_are_written_beside_the
     figure.canvas.draw()
     boxes = [text.get_window_extent() for text in axes.texts]
     assert len(boxes) > 3
-    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
-    assert not set(at) & {label_of(one.text) for one in of_growth(found, "exponential")}
+    assert not any(box.overlaps(other) for k, box in enumerate(boxes) for other in boxes[:k])
+    assert not set(at) & {label_of(entry.text) for entry in of_growth(scanned, "exponential")}
 
 
 def test_a_scan_without_conditions_is_an_empty_plane_and_one_of_another_dimension_refused():
@@ -69,12 +71,12 @@ def test_a_scan_without_conditions_is_an_empty_plane_and_one_of_another_dimensio
         plot_scan(line)
 
 
-def test_the_plane_modulo_a_prime_has_every_slow_member(found):
-    [axes] = plot_scan(found, modulo=13).axes
-    sweep = next(one for one in found.sweeps if one.prime == 13)
+def test_the_plane_modulo_a_prime_has_every_slow_member(scanned):
+    [axes] = plot_scan(scanned, modulo=13).axes
+    sweep = next(sweep for sweep in scanned.sweeps if sweep.prime == 13)
     drawn = [tuple(point) for line in axes.lines for point in line.get_xydata().tolist()]
     assert sorted(drawn) == sorted(sweep.special)
     a, b = {text.get_text(): text.xy for text in axes.texts}[label_of("2*a*b - a - b = 0")]
     assert (2 * a * b - a - b) % 13 == 0
     with pytest.raises(InputError, match="expected one modulo which all members were tried: 11, 13, 17"):
-        plot_scan(found, modulo=19)
+        plot_scan(scanned, modulo=19)

@@ -62,32 +62,32 @@ def test_the_points_are_those_of_the_maps(both):
 
 def test_a_gap_by_hand():
     # f = (x^2, 0), g = (y^2, 0), eps = 1/10: x~ = x/(1 - x/5) and x + y^2/5 at (1, 2): 41/20 or 9/5 /(1 - 9/25) = 45/16
-    found = squares(plane_pair(["x^2", "0"], ["y^2", "0"]), [1, 2], "1/10")
-    assert found.g_after_f[1][1] == (fmpq(41, 20), fmpq(2))
-    assert found.f_after_g[1][1] == (fmpq(45, 16), fmpq(2))
-    assert found.gap == pytest.approx(45 / 16 - 41 / 20)
+    result = squares(plane_pair(["x^2", "0"], ["y^2", "0"]), [1, 2], "1/10")
+    assert result.g_after_f[1][1] == (fmpq(41, 20), fmpq(2))
+    assert result.f_after_g[1][1] == (fmpq(45, 16), fmpq(2))
+    assert result.gap == pytest.approx(45 / 16 - 41 / 20)
 
 
 def test_a_gap_too_small_for_machine_numbers_is_a_gap():
-    found = squares(plane_pair(["x^2", "0"], ["1/10^30*y^2", "0"]), [1, 2], "1/10")
-    assert found.closes is False
-    assert 0 < found.gap < 1e-29
+    result = squares(plane_pair(["x^2", "0"], ["1/10^30*y^2", "0"]), [1, 2], "1/10")
+    assert result.closes is False
+    assert 0 < result.gap < 1e-29
 
 
 def test_a_singular_point_is_reported_and_only_existing_corners_are_compared():
     # x~ = x/(1 - 2 eps x) has a pole at x = 5 for eps = 1/10; from 5/3 it is met at the third step
     pair = plane_pair(["x^2", "0"], ["0", "y^2"])
-    found = squares(pair, [5, 2], "1/10")
-    assert (found.closes, found.verdict) == (None, "no fourth corner")
-    assert found.stopped == "Phi_f: the map has no value at a point on the way"
+    result = squares(pair, [5, 2], "1/10")
+    assert (result.closes, result.verdict) == (None, "no fourth corner")
+    assert result.stopped == "Phi_f: the map is not defined at a point on the way"
     later = squares(pair, ["5/3", "1/7"], "1/10", 3)
     assert (later.g_after_f[3][0], later.closes, bool(later.stopped)) == (None, True, True)
 
 
 def test_numbers_that_grow_too_long_are_left_out_and_wrong_numbers_of_steps_refused(monkeypatch):
     monkeypatch.setattr(module, "MAX_BITS", 40)
-    found = squares(pairs_of_member(load("paper_m2"))[0], START, "1/50", 2)
-    assert "more than 40 bits" in found.stopped
+    result = squares(pairs_of_member(load("paper_m2"))[0], START, "1/50", 2)
+    assert "more than 40 bits" in result.stopped
     for steps in (0, 13):
         with pytest.raises(InputError, match="expected 1 to 12"):
             squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [1, 2], "1/10", steps)
@@ -110,8 +110,8 @@ def test_members_are_recognised_in_the_plane_with_twice_the_system_as_the_contro
 
 def test_an_irreducible_chi_leaves_a_map_and_its_inverse():
     pair, _ = pairs_of_member(SystemFile.from_member(random_member_with_chi(parse_chi("t^2 - 2"), seed=3)))
-    found = squares(pair, START, "1/50")
-    assert found.g_after_f[1][1] == found.g_after_f[0][0]
+    result = squares(pair, START, "1/50")
+    assert result.g_after_f[1][1] == result.g_after_f[0][0]
 
 
 def test_systems_that_are_no_pair_are_refused():
@@ -140,9 +140,9 @@ def test_axes_in_which_nothing_moves_are_not_chosen():
 
 
 def test_rings_hold_their_dots_exactly_where_the_maps_commute(both):
-    for panel, found in zip(plot_squares(both, STYLE).axes, both, strict=True):
+    for panel, result in zip(plot_squares(both, STYLE).axes, both, strict=True):
         rings, dots = (np.array(line.get_data()) for line in panel.lines if line.get_marker() == "o")
-        assert np.array_equal(rings, dots) is (found.closes is True)
+        assert np.array_equal(rings, dots) is (result.closes is True)
         assert rings.shape == (2, 9)
 
 

@@ -30,7 +30,7 @@ FILES = {
 
 
 @cache
-def found(name):
+def search_catalog(name):
     return km.analyze(FILES[name])
 
 
@@ -48,7 +48,7 @@ def in_node(data, eps, steps):
 @pytest.mark.skipif(NODE is None, reason="needs node")
 @pytest.mark.parametrize("name", list(FILES))
 def test_orbits_in_javascript_are_those_of_the_library(name):
-    analysis = found(name)
+    analysis = search_catalog(name)
     data = explore_data(analysis)
     start = [fmpq(*value.as_integer_ratio()) for value in data["start"]]
     map_ = FILES[name].map.at("1/8")
@@ -65,11 +65,11 @@ def test_orbits_in_javascript_are_those_of_the_library(name):
 
 @pytest.mark.skipif(NODE is None, reason="needs node")
 def test_another_eps_gives_another_orbit_and_a_singular_step_ends_it():
-    data = explore_data(found("plane"))
+    data = explore_data(search_catalog("plane"))
     assert in_node(data, 0.1, 3)[0][1] != in_node(data, 0.2, 3)[0][1]
-    one = {**explore_data(found("hostile")), "start": [1.0]}  # x~ = (1 + eps) x/(1 - eps)
-    assert len(in_node(one, 1, 5)[0]) == 1
-    assert len(in_node(one, 0.5, 5)[0]) == 6
+    entry = {**explore_data(search_catalog("hostile")), "start": [1.0]}  # x~ = (1 + eps) x/(1 - eps)
+    assert len(in_node(entry, 1, 5)[0]) == 1
+    assert len(in_node(entry, 0.5, 5)[0]) == 6
 
 
 @pytest.mark.skipif(NODE is None, reason="needs node")
@@ -84,11 +84,11 @@ def test_the_window_holds_the_start_of_an_orbit_that_converges():
 
 @pytest.mark.parametrize("name", list(FILES))
 def test_the_page_has_the_verdict_and_nothing_of_the_network(name):
-    analysis = found(name)
+    analysis = search_catalog(name)
     html = report_html(analysis, explore=True, command="kahanmaps report")
     page = Page(html)
     assert analysis.conclusion.sentence in page.text
-    assert [one for one in page.fetched if not one.startswith(("#", "data:"))] == []
+    assert [entry for entry in page.fetched if not entry.startswith(("#", "data:"))] == []
     assert page.tags.count("script") == 2, "data and program; names of users do not begin one"
     program = re.search("<script>(.*?)</script>", page.html, re.DOTALL)[1]
     digest = base64.b64encode(hashlib.sha256(program.encode()).digest()).decode()
@@ -103,7 +103,7 @@ def test_the_page_has_the_verdict_and_nothing_of_the_network(name):
 def test_a_verdict_for_one_eps_says_so():
     page = Page(report_html(km.analyze(FILES["plane"], eps="1/7"), explore=True))
     assert "at eps = 1/7 only" in page.text
-    assert "for every eps" in Page(report_html(found("plane"), explore=True)).text
+    assert "for every eps" in Page(report_html(search_catalog("plane"), explore=True)).text
 
 
 def test_only_an_analysis_can_be_explored():

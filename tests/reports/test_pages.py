@@ -79,8 +79,8 @@ def test_formulas_are_mathml_of_exact_latex(volterra):
 def test_relations_are_set_as_they_read_in_the_analysis():
     terms = (("x^2", "1"), ("y^2", "c1"), ("x", "-5/(18*eps^2)"), ("1", "-2"))
     file = km.load("planar_cubic_hamiltonian")
-    found = Analysis(file, None, 1.0, 0, relations=(SparseRelation(terms, ("c1",)),))
-    html = formulas_of(found)["along orbits x^2 + c1*y^2 - 5/(18*eps^2)*x - 2 = 0"]
+    result = Analysis(file, None, 1.0, 0, relations=(SparseRelation(terms, ("c1",)),))
+    html = formulas_of(result)["along orbits x^2 + c1*y^2 - 5/(18*eps^2)*x - 2 = 0"]
     assert re.findall(r"\\\((.*?)\\\)", html) == [
         "x^2",
         "{}+ c_1 y^2",
@@ -162,8 +162,8 @@ def test_names_and_titles_are_text(volterra):
 @pytest.mark.parametrize("pictures", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_degenerate_systems_have_pages(pictures):
     for rhs in ("0", "x", "1", "x^2"):
-        found = km.analyze(km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], [rhs])))
-        require_sound(report_html(found, pictures=pictures))
+        analysis = km.analyze(km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], [rhs])))
+        require_sound(report_html(analysis, pictures=pictures))
 
 
 def test_the_paper_is_laid_out_by_section_with_its_evidence_folded(paper):
@@ -231,7 +231,7 @@ def test_a_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch, volterra):
     with pytest.raises(KeyboardInterrupt):
         write_report(path, volterra, pictures=False, title="another")
     assert path.read_bytes() == before
-    assert [one.name for one in tmp_path.iterdir()] == ["page.html"]
+    assert [entry.name for entry in tmp_path.iterdir()] == ["page.html"]
 
 
 def test_the_font_has_every_letter_of_formulas():

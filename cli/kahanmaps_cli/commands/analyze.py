@@ -36,13 +36,13 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)" --json
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
-    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).
-    The report has fixed points with their eigenvalues; a catalogue system that is affinely equivalent; integrals and
-    densities in closed form with their proofs; which integrals of the flow the map keeps, deforms or loses; genus and
-    base points of the curves of a planar integral; Hirota-Kimura relations; degrees of the iterates with their
-    recurrence; heights; symmetries and reversing symmetries; commuting systems; singularity confinement; and whether
-    the system belongs to the commuting family, in these or other affine coordinates. Claims in the file are ignored.
-    Without --eps all results hold for every eps.
+    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md). The report
+    has fixed points with their eigenvalues; a catalogue system that is affinely equivalent; integrals and densities in
+    closed form with their proofs; which integrals of the flow the map conserves, deforms or loses; genus and base
+    points of the curves of a planar integral; Hirota-Kimura relations; degrees of the iterates with their recurrence;
+    heights; symmetries and reversing symmetries; commuting systems; singularity confinement; and whether the system
+    belongs to the commuting family, in these or other affine coordinates. Claims in the file are ignored. Without --eps
+    all results hold for every eps.
 
     proved, supported: formulas, as identities in x and eps. derived: from the measured singularity patterns. measured:
     modulo primes and along orbits, which is evidence. The number of integrals and the growth are independent results.

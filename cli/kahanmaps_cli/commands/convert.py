@@ -72,7 +72,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
 
 
 def write_text(text: str, what: str, output: str | None, quiet: bool) -> None:
-    """Write a text to a file, with a line on standard error that says what it is, or to standard output."""
+    """Write a text to a file, with a line on standard error that names its kind, or to standard output."""
     if output is None or output == "-":
         click.echo(text, nl=False)
         return

@@ -82,12 +82,12 @@ def command(system: str | None, **options: Any) -> int:
                 "cycles",
                 file,
                 "exact modulo primes",
-                **opt.given(options, "seed", "samples", steps_asked="steps"),
+                **opt.given(options, "seed", "samples", steps_requested="steps"),
                 primes=list(dict.fromkeys(options["primes"])),
                 runs=[
                     {
                         **lib.attributes(
-                            census, "prime", "complete", "stopped", "looked_at", "indeterminate", "open", "steps"
+                            census, "prime", "complete", "stopped", "examined", "indeterminate", "open", "steps"
                         ),
                         **lib.attributes(census, "pre_indeterminate", "preperiodic", "periodic", "cycles", "longest"),
                         "eps": str(census.eps),

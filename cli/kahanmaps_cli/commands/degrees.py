@@ -97,7 +97,7 @@ def command(system: str | None, **options: Any) -> int:
                 "modulo the primes of the lines" if growth.primes else "exact",
                 time_step="generic" if time_step == "every" else time_step,
                 **search.work,
-                **opt.given(options, "max_degree", terms_asked="terms"),
+                **opt.given(options, "max_degree", terms_requested="terms"),
                 **growth.to_json(),
             )
 

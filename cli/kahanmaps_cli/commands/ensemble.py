@@ -21,7 +21,7 @@ from kahanmaps_cli.signals import interruptible
 
 MAX_STEPS = 10**13  # more would take years
 FAILURES_SHOWN = 20
-_MIN_COMPILED_WORK = 5_000_000  # below this numpy is done before the code is loaded and compiled
+_MIN_COMPILED_WORK = 5_000_000  # with less work numpy finishes before the code is loaded and compiled
 _SAMPLES = 100  # of the integrals, unless --every is given
 _MAX_VALUES = 200_000  # of the integrals
 
@@ -68,7 +68,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     starts = requested_starts(file, options)
     normal_form = normal_form_for(file, options["method"])
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
-    value = lib.to_float(number)  # backward too: the inverse conserves what the map conserves
+    value = lib.to_float(number)  # backward too: the inverse has the same integrals
 
     def of_point(claimed: Any) -> Callable[[Sequence[float]], float | None]:
         in_floats = lib.float_function(claimed.function)

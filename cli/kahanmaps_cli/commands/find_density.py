@@ -39,7 +39,7 @@ def command(system: str | None, **options: Any) -> int:
         file = opt.load_system(system, options)
         settings = search_arguments(options, "flow", "max_degree")
         if options["flow"] and options["as_toml"]:
-            raise click.UsageError("--flow goes without --toml, which is about the map")
+            raise click.UsageError("--flow cannot be combined with --toml, which is for the map")
         result = lib.find_densities(file, **settings, progress=search)
     further = f"note\t{result.further}" if result.further else ""
     print_search("find-density", result, search, options, [("phi", phi, "") for phi in result.shown], further)

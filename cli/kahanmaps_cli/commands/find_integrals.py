@@ -64,7 +64,8 @@ def command(system: str | None, **options: Any) -> int:
     the differential equation are limits of integrals of the map as eps -> 0, and which are lost.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
-    combination of values; with --json one record per line. Values without a map are listed at the end.
+    combination of values; with --json one record per line. Values at which the map does not exist are listed at the
+    end.
 
     Exit status: 0 if every integral that theorems give or orbits show has a formula, 2 for a usage error, 3 if some
     have none, orbits were not measured, or the work or time limit was too small.
@@ -73,7 +74,9 @@ def command(system: str | None, **options: Any) -> int:
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
-            raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
+            raise click.UsageError(
+                "a range of values cannot be combined with --monomials, --darboux, --flow, --toml and --latex"
+            )
         result = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{integral.text} ({integral.verdict})" for integral in result.integrals)
         line = f"{_count(result).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
@@ -82,12 +85,12 @@ def command(system: str | None, **options: Any) -> int:
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
     if options["flow"] and (options["sets"] or options["as_toml"]):
-        raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
+        raise click.UsageError("--flow cannot be combined with --monomials and --toml, which are for the map")
     if options["sets"] and options["darboux"] is not None:
         raise click.UsageError("give --monomials or --darboux, not both")
     instead = "--monomials" if options["sets"] else "--darboux" if options["darboux"] is not None else ""
     if instead and (options["as_toml"] or options["as_latex"]):
-        raise click.UsageError(f"{instead} goes with --json, not with --toml and --latex")
+        raise click.UsageError(f"{instead} can be combined with --json, not with --toml and --latex")
     if instead:
         return (_bases if options["sets"] else _darboux)(system, options)
     with SearchProgress(options) as search:
@@ -136,7 +139,9 @@ def _darboux(system: str | None, options: dict[str, Any]) -> int:
 
 def _bases(system: str | None, options: dict[str, Any]) -> int:
     if options["symbolic"]:
-        raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")
+        raise click.UsageError(
+            "--monomials cannot be combined with --symbolic: the null space is measured at random eps"
+        )
     eps = symbols_and_eps(options)[1]
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)

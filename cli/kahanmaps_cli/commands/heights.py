@@ -71,7 +71,8 @@ def command(system: str | None, **options: Any) -> int:
     is evidence, not proof.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
-    combination of values; with --json one record per line. Values without a map are listed at the end.
+    combination of values; with --json one record per line. Values at which the map does not exist are listed at the
+    end.
 
     Exit status: 0 if all decided orbits agree, 2 for a usage error, 3 if no orbit is decided, the orbits disagree, or
     the work limit was reached.
@@ -82,7 +83,7 @@ def command(system: str | None, **options: Any) -> int:
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         survey = surveyed(file, eps, options, search)
         undecided = f"undecided: {survey.text}" if survey.kind is lib.Growth.UNDECIDED else ""
-        if not survey.is_whole:
+        if not survey.is_complete:
             undecided = "stopped early: work limit reached before all orbits were finished; raise --effort"
 
         def print_text() -> None:

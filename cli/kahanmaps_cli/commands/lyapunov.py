@@ -71,7 +71,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             variables=list(file.variables),
             **lib.eps_record(eps, file.map),
             **starts_record(options, result.orbits),
-            steps_asked=steps,
+            steps_requested=steps,
             **lib.attributes(result, "orbits", "ended", "steps", "transient", "stopped"),
             **{name: [number(value) for value in values] for name, values in lists.items()},
             sum=number(result.mean.sum()),

@@ -73,7 +73,7 @@ def command(system: str | None, **options: Any) -> int:
     --from analyze shows the verdict, what the map preserves and how it grows; --from verify the claims of the paper for
     a member of the family, by sections; --from checks those of the four checks that apply. The page is a single file
     with its pictures and the command that made it; it needs neither network nor JavaScript. With --explore it has
-    sliders for eps and the initial point beside the exact verdict; with one --eps, for the initial point only.
+    sliders for eps and the initial point beside the exact verdict; with --eps given, only for the initial point.
 
     Exit status: as that of the command named by --from.
     """

@@ -59,8 +59,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     codimension 1, and of codimension 2 where at least one of two equations is linear. The output says what may
     have been missed.
 
-    Exit status: 0 completed, whatever was found; 2 usage error; 3 the work limit was reached, and what was not done is
-    reported; 130 interrupted, with the results up to then.
+    Exit status: 0 completed, with or without conditions; 2 usage error; 3 the work limit was reached, and what was not
+    done is reported; 130 interrupted, with the results up to then.
     """
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")

@@ -90,7 +90,7 @@ def _known(file: Any) -> dict[str, Any]:
 def _latex(file: Any) -> str:
     """Return the system or map as displayed LaTeX formulas."""
     names = [lib.latex_name(name) for name in file.variables]
-    if isinstance(file.map, lib.KahanFamily):  # with eps in its coefficients, if it is an adjusted one
+    if isinstance(file.map, lib.KahanFamily):  # eps occurs in its coefficients if the discretization is an adjusted one
         rows = [rf"\dot{{{x}}} &= {lib.latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
     elif file.map.image is not None:
         rows = [

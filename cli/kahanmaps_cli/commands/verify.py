@@ -204,7 +204,7 @@ def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool
     )
     table.add_column("statement", overflow="fold", min_width=17, max_width=19)
     table.add_column("formula", overflow="fold", ratio=1)
-    table.add_column("broken" if controls else "how", overflow="fold", min_width=11, max_width=24 if controls else 14)
+    table.add_column("violated" if controls else "how", overflow="fold", min_width=11, max_width=24 if controls else 14)
     table.add_column("verdict", no_wrap=True)
     for finding in findings:
         misprint = finding.place.get("misprint")
@@ -215,11 +215,11 @@ def _table(name: str, findings: list[lib.Finding], verbose: bool, controls: bool
         if finding.witness is not None and (verbose or not finding.control):
             lines += witness_lines(finding.witness, NUMBER_WIDTH)
         verdict = f"{finding.verdict}\nas printed" if misprint else str(finding.verdict)
-        is_broken = controls and "broken" in finding.place
+        is_control = controls and "violation" in finding.place
         table.add_row(
             styled(finding.place["place"]),
             styled("\n  ".join(lines)),
-            styled(str(finding.place["broken"]) if is_broken else _how(finding.evidence)),
+            styled(str(finding.place["violation"]) if is_control else _how(finding.evidence)),
             styled(verdict, verdict_style(finding)),
         )
     return table

@@ -110,8 +110,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
             what = f"{curve.function} along {lib.METHODS[curve.method]}"
             messages.append(f"{what}: errors above {limit:.0e} are an arrow at the top")
     for method, end in survey.ends.items():
-        if not end.is_whole:
+        if not end.is_complete:
             messages.append(f"{lib.METHODS[method]} ended early: {end.message}")
-    early = not all(end.is_whole for end in survey.ends.values())
+    early = not all(end.is_complete for end in survey.ends.values())
     figure = lib.plot_drift(survey, options["style"], scale=options["scale"])
     return Drawing(figure, file, messages, 3 if early else 0)

@@ -138,12 +138,12 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
             raise click.UsageError("give a SYSTEM or --from FILE, not both")
         record = read_record(options["record"])
         curves = lib.curves_of_record(record, options["record"])
-        is_complete, digits = record.get("whole") is not False, record.get("max_digits", digits)
+        is_complete, digits = record.get("complete") is not False, record.get("max_digits", digits)
     else:
         file = opt.load_system(options["system"], options)
         eps = opt.the_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
-        curves, is_complete = lib.height_curves(survey), survey.is_whole
+        curves, is_complete = lib.height_curves(survey), survey.is_complete
     figure = lib.plot_heights(curves, options["style"], scale=options["scale"])
     messages = []
     if short := sum(curve.status == "budget" for curve in curves):
@@ -156,7 +156,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
 
 
 def read_record(path: str) -> Any:
-    """The JSON object in a file, `-` for standard input. Raises InputError where there is none."""
+    """Return the JSON object in a file, `-` for standard input. Raises InputError if the file contains no object."""
     try:
         with click.open_file(path, "rb") as file:
             content = file.read(_MAX_BYTES + 1)

@@ -136,7 +136,7 @@ def window_option(numbers: str = "X0,X1,Y0,Y1") -> Callable[[F], F]:
 
 
 def window_from(options: dict[str, Any], axes: int) -> lib.Window | None:
-    """Return the window requested by --window for so many axes, or None."""
+    """Return the window requested by --window for this number of axes, or None."""
     return None if options["window"] is None else lib.require_window(lib.to_floats(options["window"]).tolist(), axes)
 
 

@@ -1,1 +1,1 @@
-"""What the longer commands do between reading their options and printing."""
+"""The work of the longer commands between reading their options and printing."""

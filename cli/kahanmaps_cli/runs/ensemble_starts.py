@@ -43,9 +43,9 @@ def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: in
 def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
     """Return the part of a record from which the initial points can be reproduced."""
     if options["starts"] is not None:
-        return {"starts": {"file": options["starts"]}, "seed": None}
+        return {"initial_points": {"file": options["starts"]}, "seed": None}
     box = "1" if options["box"] is None else lib.format_number(options["box"])
-    return {"starts": {"random": orbits, "box": box}, "seed": options["seed"] or 0}
+    return {"initial_points": {"random": orbits, "box": box}, "seed": options["seed"] or 0}
 
 
 def normal_form_for(file: lib.SystemFile, method: str | None) -> lib.SystemNormalForm | lib.NoNormalForm:

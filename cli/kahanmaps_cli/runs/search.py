@@ -51,7 +51,7 @@ def search_arguments(options: dict[str, Any], *names: str) -> dict[str, Any]:
 
 
 def scope(result: Any) -> str:
-    """Return text behind the name of the map: for which eps and symbols the formulas hold."""
+    """Return the text that follows the name of the map: for which eps and symbols the formulas hold."""
     if getattr(result, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(result.symbols)}" if result.symbols else "")
     step = lib.eps_suffix(result.eps, result.file.map)
@@ -112,7 +112,7 @@ def print_search(
 def print_list(
     name: str, heading: str, result: Any, search: SearchProgress, context: dict[str, Any], as_json: bool
 ) -> int:
-    """Print the result of a search that is complete or says what is undecided; return the exit status."""
+    """Print the result of a search, which is complete or names what is undecided; return the exit status."""
     if as_json:
         print_json({"command": name, **context, **result.to_json()})
     else:

@@ -50,7 +50,7 @@ def as_typed(words: Iterable[str]) -> str:
 class Progress:
     """Show progress inside a `with` block, whose end clears the line: call it with a sentence at any rate.
 
-    On a terminal a thread updates the elapsed time behind the last sentence, since a step may take minutes.
+    On a terminal a thread updates the elapsed time after the last sentence, since a step may take minutes.
     """
 
     def __init__(self, quiet: bool = False) -> None:
@@ -138,7 +138,7 @@ class SearchProgress(Progress):
 
     @property
     def ending(self) -> str:
-        """The message that the search was stopped, with what was being done."""
+        """Return the message that the search was stopped, and in which step."""
         return f"stopped after {self._seconds:g} s (--seconds){self._sentence and ': '}{self._sentence}"
 
     def __enter__(self) -> Self:

@@ -76,14 +76,14 @@ def console() -> Console:
 
 
 def formula(text: str, width: int = 400) -> str:
-    """Shorten a long formula on a terminal; a pipe gets all of it."""
+    """Shorten a long formula on a terminal; a pipe gets the complete formula."""
     return shorten(text, width) if on_terminal() else text
 
 
 def print_stdout(text: str, hang: int = _LABEL_WIDTH, style: str = "") -> None:
     """Print lines of cells separated by tabs; on a terminal the first cell is a label in front of the others.
 
-    Verdicts are colored, and lines that start with # are headings. `hang` is the column behind the label.
+    Verdicts are colored, and lines that start with # are headings. `hang` is the column after the label.
     """
     for line in printable(text).split("\n"):
         cells = line.split("\t")

@@ -39,9 +39,9 @@ MARK = re.compile(r"^<!-- generated: (.+) -->$", re.MULTILINE)
 def expanded(docname: str, text: str) -> str:
     """The text of a page with its generated parts, and links that lead to pages where files are pages."""
     page = ROOT / "docs" / f"{docname}.md"
-    whole = re.search(r"^<!-- generated: file (\S+) -->$", text, re.MULTILINE)
-    if whole:
-        origin = ROOT / whole[1]
+    complete = re.search(r"^<!-- generated: file (\S+) -->$", text, re.MULTILINE)
+    if complete:
+        origin = ROOT / complete[1]
         return with_keys_linked(with_links_for(page, origin, origin.read_text(encoding="utf-8")))
     text = with_keys_linked(with_links_for(page, page, text))
     return MARK.sub(lambda mark: part(mark[1]), text)

@@ -18,7 +18,7 @@ LONGEST_FORMULA = 900  # characters of LaTeX; longer ones are said to be long, a
 
 def catalogue() -> str:
     """A table of all systems and then of all maps, and a section for each."""
-    systems, maps = ([load(name) for name in found] for found in (names(), map_names()))
+    systems, maps = ([load(name) for name in entry] for entry in (names(), map_names()))
     tables = [_table("system", systems), "Maps that are not Kahan's:\n", _table("map", maps)]
     return "\n".join([*tables, *(section(file) for file in (*systems, *maps))])
 
@@ -64,14 +64,14 @@ def formulas(file: SystemFile) -> list[str]:
         rows = [rf"\tilde {latex_name(x)} &= {latex_rational_function(f)}" for x, f in images]
     else:
         rows = [rf"{latex_polynomial(equation)} &= 0" for equation in file.map.equations]
-    found = [r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"]
+    results = [r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"]
     if file.hamiltonian is not None:
-        found.append(f"H = {latex_polynomial(file.hamiltonian.H)}")
+        results.append(f"H = {latex_polynomial(file.hamiltonian.H)}")
     for name, integral in file.integrals.items():
-        found.append(f"{latex_name(name) if name else 'I'} = {latex_rational_function(integral)}")
+        results.append(f"{latex_name(name) if name else 'I'} = {latex_rational_function(integral)}")
     if file.density is not None:
-        found.append(rf"\phi = {latex_rational_function(file.density)}")
-    return found
+        results.append(rf"\phi = {latex_rational_function(file.density)}")
+    return results
 
 
 def displayed(formula: str) -> str:
@@ -85,17 +85,17 @@ def displayed(formula: str) -> str:
 def facts(file: SystemFile) -> list[str]:
     """What is known, first what programs can read as well."""
     known = file.catalog
-    found = []
+    results = []
     if "degrees" in known or "growth" in known:
         degrees = ", ".join(map(str, known.get("degrees", [])))
         growth = f"{known['growth']} growth" if "growth" in known else ""
         root = f", by the largest root of {code(known['dynamical_degree'])}" if "dynamical_degree" in known else ""
-        found.append(f"degrees of the iterates: {degrees + ', ...: ' if degrees else ''}{growth}{root}")
+        results.append(f"degrees of the iterates: {degrees + ', ...: ' if degrees else ''}{growth}{root}")
     if "codimension" in known:
-        found.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
+        results.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
     for relation in relations(known, file.variables):
-        found.append(f"relations along an orbit: {relation.dimension} among {code(relation.text)}")
-    return found + [_linked(fact) for fact in known.get("facts", [])]
+        results.append(f"relations along an orbit: {relation.dimension} among {code(relation.text)}")
+    return results + [_linked(fact) for fact in known.get("facts", [])]
 
 
 def where_from(file: SystemFile, known: Mapping[str, Any]) -> str:

@@ -42,27 +42,27 @@ def section(command: click.Command, name: str, parent: click.Context, depth: int
         pieces.append(table(("option", ""), rows))
     if isinstance(command, click.Group):
         for below in command.list_commands(context):
-            found = command.get_command(context, below)
-            assert found is not None
-            pieces.append(section(found, below, context, depth + 1))
+            result = command.get_command(context, below)
+            assert result is not None
+            pieces.append(section(result, below, context, depth + 1))
     return "\n".join(pieces)
 
 
 def help_text(text: str) -> list[str]:
     """Paragraphs, and as code what the help keeps in lines (after a line with the character \\b): examples, lists."""
-    found = []
+    results = []
     for paragraph in re.split(r"\n\s*\n", text.strip()):
         lines = paragraph.split("\n")
         if lines[0].strip() != "\b":
-            found.append(prose(" ".join(paragraph.split())) + "\n")
+            results.append(prose(" ".join(paragraph.split())) + "\n")
             continue
         kept = lines[1:]
         # A line at the margin says what the indented ones below it are.
         if len(kept) > 1 and kept[0].endswith(":") and not kept[0].startswith(" "):
-            found.append(prose(kept.pop(0)) + "\n")
+            results.append(prose(kept.pop(0)) + "\n")
         indent = min((len(line) - len(line.lstrip()) for line in kept if line.strip()), default=0)
-        found.append(block("\n".join(line[indent:] for line in kept)))
-    return found
+        results.append(block("\n".join(line[indent:] for line in kept)))
+    return results
 
 
 def prose(text: str) -> str:

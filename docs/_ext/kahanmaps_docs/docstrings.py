@@ -58,13 +58,13 @@ def as_rst(lines: list[str]) -> list[str]:
 
 def blocks(lines: list[str]) -> list[tuple[int, list[str]]]:
     """The paragraphs, each with its indentation."""
-    found: list[list[str]] = [[]]
+    results: list[list[str]] = [[]]
     for line in lines:
         if line.strip():
-            found[-1].append(line.rstrip())
-        elif found[-1]:
-            found.append([])
-    return [(min(len(line) - len(line.lstrip()) for line in block), block) for block in found if block]
+            results[-1].append(line.rstrip())
+        elif results[-1]:
+            results.append([])
+    return [(min(len(line) - len(line.lstrip()) for line in block), block) for block in results if block]
 
 
 def under_section(done: list[str]) -> bool:

@@ -15,12 +15,12 @@ from kahanmaps_docs.markdown import block, code, plain, table
 
 def exported() -> dict[str, dict[str, list[str]]]:
     """Folder -> module -> names, all in the order of `kahanmaps.__all__`."""
-    found: dict[str, dict[str, list[str]]] = {}
+    result: dict[str, dict[str, list[str]]] = {}
     for name in kahanmaps.__all__:
         if not name.startswith("__"):
             home = module_of(getattr(kahanmaps, name))
-            found.setdefault(home.split(".")[1], {}).setdefault(home, []).append(name)
-    return found
+            result.setdefault(home.split(".")[1], {}).setdefault(home, []).append(name)
+    return result
 
 
 def module_of(value: Any) -> str:

@@ -140,7 +140,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
         name = reference if made is None else made[0]
         if made is not None or name in (*names(), *map_names()):
             return parse_system(text_of(name), name, parameters)
-        has_ending = "." in reference and "(" not in reference  # that of files, or one that was mistyped
+        has_ending = "." in reference and "(" not in reference  # the ending of a file, or a mistyped one
         has_separator = any(mark in reference for mark in (os.sep, os.altsep) if mark)
         if not (has_ending or has_separator or os.path.exists(reference)):
             raise _unknown(reference)
@@ -148,7 +148,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
 
 
 def _unknown(name: str) -> InputError:
-    if not name or len(name) > 60 or not name.isprintable():  # no name that anybody meant
+    if not name or len(name) > 60 or not name.isprintable():  # not a name of a system
         return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
     normalized = name.lower().replace("-", "_").replace(" ", "_")
     known_names = (*names(), *map_names())

@@ -140,7 +140,7 @@ class Outcome(StrEnum):
     LOST = "lost"
 
 
-VERDICTS = ("proved", "supported", "refuted", "undecided")  # of checks; user-defined tasks may have others
+VERDICTS = ("proved", "supported", "refuted", "undecided")  # verdicts of checks; user-defined tasks may have others
 KEPT = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # the outcomes of results
 
 

@@ -325,7 +325,7 @@ class Store(HtmlDisplay):
         with self._errors():
             rows = self._execute(sql, values).fetchall()
         if any(isinstance(value, bytes) for row in rows for value in row):
-            raise StoreError(f"{self.name} is damaged (bytes in place of a text or a number): take a copy from before")
+            raise StoreError(f"{self.name} is damaged (bytes in place of a text or a number): restore an earlier copy")
         return rows
 
     def _fetch_plan(self, sql: str, experiment: StoredExperiment, size: int, *values: int) -> Iterator[list[Any]]:
@@ -352,16 +352,16 @@ class Store(HtmlDisplay):
             kind = Unavailable if code in _OF_THE_MACHINE else StoreError
             if kind is Unavailable:
                 reason = (
-                    f"cannot be read or written: {error}; what was stored before is safe, look after the disk, its "
+                    f"cannot be read or written: {error}; what was stored before is safe; check the disk, its free "
                 )
-                reason += "room and whoever uses the file, and run it again"
+                reason += "space and other users of the file, and run it again"
             elif code == sqlite3.SQLITE_NOTADB:
                 reason = "is not an SQLite database: check the name"
             elif code in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):
                 reason = f"cannot be opened ({error}): file and folder must be readable, and writable as well where a "
                 reason += f"killed writer left {self.path.name}-journal: change the permissions, or work on a copy"
             else:
-                reason = f"is damaged ({quoted(str(error), 100)}): take a copy from before, or begin another one"
+                reason = f"is damaged ({quoted(str(error), 100)}): restore an earlier copy, or begin another one"
             raise kind(f"{self.name} {reason}") from error
 
     @contextmanager
@@ -371,7 +371,7 @@ class Store(HtmlDisplay):
             yield
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             reason = quoted(" ".join(str(error).split()), 100)
-            raise StoreError(f"{self.name} is damaged ({what}: {reason}): take a copy from before") from error
+            raise StoreError(f"{self.name} is damaged ({what}: {reason}): restore an earlier copy") from error
 
     def _task(self, key: str, text: str) -> Task:
         with self._reading(f"the task {key}"):

@@ -52,7 +52,7 @@ _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
 
 
 class ClusterLost(KahanmapsError):
-    """Raised when the scheduler is gone or has dropped groups. Records that were stored are safe."""
+    """Raised when the scheduler does not answer or has dropped groups. Records that were stored are safe."""
 
 
 class WorkersUnfit(ClusterLost):
@@ -118,7 +118,9 @@ class ClusterWorkers(Executor):
     def submit(self, job: Job) -> None:
         """Add a job to the open group, which is sent when it is full, or by `wait` when a worker might be idle."""
         if job.task.key in self._tries:
-            raise InputError(f"task {job.task.key} is in flight already: submit it again when its record is back")
+            raise InputError(
+                f"task {job.task.key} is already running: submit it again when its record has been returned"
+            )
         self._tries[job.task.key] = 0
         self._open.append(job)
         # A task of unknown duration fills a group.
@@ -129,8 +131,8 @@ class ClusterWorkers(Executor):
     def wait(self, timeout: float) -> list[Record]:
         """Return the finished records as soon as there is one, or none after `timeout` seconds.
 
-        Raises ClusterLost when the scheduler is gone, and WorkersUnfit when several groups have ended by themselves,
-        including those of all jobs in flight, and none has printed a record.
+        Raises ClusterLost when the scheduler does not answer, and WorkersUnfit when several groups have ended by
+        themselves, including those of all jobs in flight, and none has printed a record.
         """
         deadline = time.monotonic() + timeout
         while True:
@@ -300,7 +302,7 @@ def connect(address: str, timeout: float) -> Any:
         client = import_module("distributed").Client  # which takes a second to import
     except ModuleNotFoundError as error:
         raise InputError(
-            f"a cluster needs the package distributed, which is not there ({error}): pip install 'kahanmaps[cluster]'"
+            f"a cluster needs distributed, which is not installed ({error}): pip install 'kahanmaps[cluster]'"
         ) from None
     path, chosen = Path(address), address
     if "://" not in address and (path.is_file() or address.endswith(".json")):

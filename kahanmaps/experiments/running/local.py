@@ -388,7 +388,7 @@ def _begin(parent: int, output: Connection) -> None:
     os.dup2(output.fileno(), 2)
     task_kinds()  # the time for importing them belongs to no task
     _state.pid, _state.idle = os.getpid(), _address_space()
-    os.fchmod(output.fileno(), S_IRUSR)  # this tells the parent that the worker is ready
+    os.fchmod(output.fileno(), S_IRUSR)  # signal to the parent that the worker is ready
 
 
 def _run_task(text: str, memory: int | None, documents: dict[str, str]) -> str:

@@ -19,7 +19,7 @@ from kahanmaps.experiments.running.local import GROUP_SECONDS, LocalWorkers
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 
 _TICK = 0.1  # seconds after which an interrupt is noticed and an empty list is yielded
-_SHARED = 4  # records are collected for so many times the time that the last list took to be written
+_SHARED = 4  # records are collected for this multiple of the time in which the last list was written
 GRACE = 10.0  # seconds that tasks in flight have after an interrupt
 
 

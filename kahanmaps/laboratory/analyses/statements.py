@@ -141,7 +141,7 @@ def of_densities(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_flow(result: AnalysisResult) -> Iterator[Statement]:
-    """A line for each structure of the flow that the map keeps, deforms or loses."""
+    """A line for each structure of the flow that the map conserves, deforms or loses."""
     if result.flow is not None:
         yield from (Statement(Certainty(known), text) for known, text in result.flow.lines())
 
@@ -242,7 +242,7 @@ def of_structure(result: AnalysisResult) -> Iterator[Statement]:
             text += f", in coordinates y with x = {' + '.join(filter(None, [centre, moved]))}"
         yield Statement(PROVED, text)
     if result.tensor is not None:
-        text = "" if result.defect else ": the map is the Kahan map over K, and has what that one has (docs/beyond.md)"
+        text = "" if result.defect else ": the map is the Kahan map over K, to which docs/beyond.md applies"
         yield Statement(PROVED, f"{result.tensor.text}{text}")
     if isinstance(result.normal_form, SystemNormalForm):
         form = result.normal_form.form
@@ -294,7 +294,7 @@ def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
     for k, family in enumerate(search.families):
         opposite = family.base.system.scaled(-1), [g.system for g in family.directions]
         if opposite not in [(other.base.system, [g.system for g in other.directions]) for other in search.families[:k]]:
-            # All g of it, or how many parameters it has where that is long.
+            # All fields g of the family, or the number of its parameters if the formula is long.
             base = [] if family.base.trivial == "0" else [f"({', '.join(family.base.rhs)})"]
             moved = [f"t{j}*({', '.join(g.rhs)})" for j, g in enumerate(family.directions, 1)]
             which = "g and -g, g" if base else "all g"  # the negatives of these are among them

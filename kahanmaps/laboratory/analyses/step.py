@@ -69,7 +69,7 @@ class AnalysisContext:
         self.result, self.seed = result, result.seed
         self.map, self.dim, self.root = file.map, file.dim, laboratory.root
         self.system = file.system if file.is_quadratic else None
-        # No step may read what a file claims of its system. With symbols the file itself is needed.
+        # No step may read the claims of a file about its system. With symbols the file itself is needed.
         self.file_without_claims = (
             file if symbols or self.system is None else SystemFile.from_system(self.system, file.name)
         )

@@ -81,7 +81,7 @@ def _singularities(context: AnalysisContext, effort: Budget, progress: Callable[
 def _degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
     """The degrees of the iterates, derived from the singularity patterns where these are known."""
     runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
-    # Used only where they are known for all steps, and are those that `degrees` would compute itself.
+    # Used only if they are known for all steps, and agree with those that `degrees` would compute itself.
     known = patterns_of(runs) if runs else None
     patterns = None if known is None or known.running else known
     return degree_growth(context.map, context.result.eps, patterns=patterns, seed=context.seed, **options)

@@ -105,6 +105,7 @@ class Line:
                 curve = self._image_by_minors(equation)
             max_length = 2 * self._max_degree + _MARGIN + 1
             length = min(2 * guess + _MARGIN + 1, max_length)
+            # A guess that is too small only costs another round: the terms of the margin disagree then.
             while curve is None:
                 self._require_budget()
                 curve = self._reconstruct_curve(self._image_series(equation, length), length)

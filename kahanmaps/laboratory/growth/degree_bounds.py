@@ -102,8 +102,8 @@ def bound_dynamical_degree(
     Source: docs/mathematics.md.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = bound_dynamical_degree(load("lotka_volterra").map, None)
-    >>> found.lower, found.upper
+    >>> result = bound_dynamical_degree(load("lotka_volterra").map, None)
+    >>> result.lower, result.upper
     ('1.973638', '2')
     >>> bound_dynamical_degree(load("nahm_tetrahedral").map, None, effort=-6) is None
     True
@@ -131,8 +131,8 @@ def bound_dynamical_degree(
 def is_birational(map_: Map, rng: random.Random) -> bool:
     """Return whether a map over GF(p) is birational; True is a proof.
 
-    False is returned also if the inverse is not known. For every factor, the equation of its inverse at the image of a
-    generic point must annihilate that point, as an identity of forms, and nothing else, which one point shows.
+    False is returned also if the inverse is not known. For every factor, the equation of the inverse, at the image
+    of a point, must have this point as a solution, as an identity of forms, and no other; one point shows the latter.
     """
     for factor in map_.factors:
         try:
@@ -193,6 +193,7 @@ def _search_lower_bound(
     bounds = {n: float(bound) for n, bound in expected.items() if bound is not None}
     if not bounds:
         return None
+    # The tangents are expensive, so that they are computed only for the number of steps that promises the best bound.
     steps = max(bounds, key=bounds.__getitem__)
     # Tangents of a random conic: the lines with coordinates (1 : s : s^2), moved by a random matrix.
     p, largest = map_.field.characteristic, 0

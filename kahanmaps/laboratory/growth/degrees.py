@@ -57,8 +57,8 @@ MAX_TERMS = 10_000
 _LINES = 2
 _OFTEN, _SELDOM = 64, 8  # a recurrence is searched for after each of the first 64 terms, then after every 8
 _ENOUGH_QUOTIENTS = 6
-_AGREEING = 12  # so many measured terms beyond twice the longest pattern have to agree with the derived ones
-_LARGE = 2000  # a degree from which on no further measured terms have to agree
+_AGREEING = 12  # measured terms beyond twice the longest pattern that must agree with the derived ones
+_LARGE = 2000  # from this degree on no further measured terms need to agree
 _MATRIX_TERMS = 60  # of monomial maps
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
@@ -137,10 +137,14 @@ class DegreeGrowth(PrintableResult):
         """
         if self.proof is None or self.derived is not None:
             return self.derived or (None if self.unconfirmed else self.fitted)
-        found = self.fitted
-        if found is None or found.rate is None or (found.growth, found.power) != (self.proof.growth, self.proof.power):
+        recurrence = self.fitted
+        if (
+            recurrence is None
+            or recurrence.rate is None
+            or (recurrence.growth, recurrence.power) != (self.proof.growth, self.proof.power)
+        ):
             return None
-        return found if found.rate.minimal_polynomial == self.proof.rate.minimal_polynomial else None
+        return recurrence if recurrence.rate.minimal_polynomial == self.proof.rate.minimal_polynomial else None
 
     @property
     def growth(self) -> Growth:
@@ -188,13 +192,13 @@ class DegreeGrowth(PrintableResult):
         """The kind of growth with its power or rate, or an estimate without a confirmed recurrence: one phrase."""
         if self.growth is Growth.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
-        if (found := self.proof or self.recurrence) is not None:
-            if found.growth is Growth.EXPONENTIAL:
+        if (reason := self.proof or self.recurrence) is not None:
+            if reason.growth is Growth.EXPONENTIAL:
                 return "exponential growth" + (
-                    f", dynamical degree {found.rate.text}" if found.rate is not None else ""
+                    f", dynamical degree {reason.rate.text}" if reason.rate is not None else ""
                 )
-            power = f" of degree {found.power}" if found.growth is Growth.POLYNOMIAL else ""
-            return f"{found.growth} growth{power}, dynamical degree 1"
+            power = f" of degree {reason.power}" if reason.growth is Growth.POLYNOMIAL else ""
+            return f"{reason.growth} growth{power}, dynamical degree 1"
         terms = counted(len(self.degrees), "term")
         if self.looks_exponential:
             why = self.unconfirmed or f"no recurrence in {terms}"
@@ -233,7 +237,7 @@ class DegreeGrowth(PrintableResult):
         return self.kind_text + (f" ({self.basis})" if self.proof is not None or is_limited else "")
 
     def rows(self) -> list[dict[str, int]]:
-        """A row for each iterate, for `pandas.DataFrame(found.rows())` and the like."""
+        """A row for each iterate, for example for `pandas.DataFrame(growth.rows())`."""
         return [{"n": n, "degree": degree} for n, degree in enumerate(self.degrees)]
 
     @property
@@ -388,22 +392,22 @@ class _Search:
             ended, message = end.ended, end.message
         if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
             self._compute_patterns()
-        found = self.result(ended, message)
-        contracted = self.patterns
-        if contracted is not None and contracted.at and self.eps is None and not self.budget.is_spent:
-            named = with_eps(self.map, rational(contracted.at), contracted.contracted)  # polynomials over Q[eps]
-            found = replace(found, patterns=replace(contracted, contracted=named))
+        result = self.result(ended, message)
+        patterns = self.patterns
+        if patterns is not None and patterns.at and self.eps is None and not self.budget.is_spent:
+            named = with_eps(self.map, rational(patterns.at), patterns.exceptional)  # polynomials over Q[eps]
+            result = replace(result, patterns=replace(patterns, exceptional=named))
         period = next((n for n, degree in enumerate(self.degrees) if n and degree == 1), None)
         if period is not None:
-            found = replace(found, proof=linear_iterate(self.map, self.eps, period))
-        if not enclosed or (found.growth is not Growth.EXPONENTIAL and not found.looks_exponential):
-            return found
-        self.measured = found
+            result = replace(result, proof=linear_iterate(self.map, self.eps, period))
+        if not enclosed or (result.growth is not Growth.EXPONENTIAL and not result.looks_exponential):
+            return result
+        self.measured = result
         enclosure = bound_dynamical_degree(self.map, self.eps, seed=self.seed, effort=self.budget, progress=progress)
         if enclosure is None and self.map.dim == 2 and self.budget.is_spent:
             unproved = "work limit reached before bounds of the dynamical degree were proved; raise --effort"
-            return replace(found, notes=(*found.notes, unproved))
-        return replace(found, enclosure=enclosure)
+            return replace(result, notes=(*result.notes, unproved))
+        return replace(result, enclosure=enclosure)
 
     def result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
         primes, residues = tuple(line.prime for line in self.lines), tuple(line.eps for line in self.lines)
@@ -415,31 +419,32 @@ class _Search:
         size = len(self.degrees)
         if size < 2 or (size > _OFTEN and size % _SELDOM):
             return
-        found = find_recurrence(self.degrees)
-        # Above dimension 4 series of maps without short forms are slow and wait until degrees say something.
-        soon = self.map.dim <= WRITTEN_DIMENSION or found is not None or self.lines[0].is_explicit
+        recurrence = find_recurrence(self.degrees)
+        # Above dimension 4 series of maps without short forms are slow and wait until the degrees suggest a recurrence.
+        soon = self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit
         if soon:
             self._compute_patterns()
         if not may_stop:
             return
         known = self.patterns
-        enough = found is not None and found.checked >= max(6, found.order)
+        enough = recurrence is not None and recurrence.checked >= max(6, recurrence.order)
         derived = self.result(Ended.TERMS, "").derived
         if derived is not None:
             last = max(known.lengths, default=0) if known is not None else 0
-            same = found is not None and found.characteristic == derived.characteristic
+            same = recurrence is not None and recurrence.characteristic == derived.characteristic
             if (enough and same) or size > 2 * last + _AGREEING or self.degrees[-1] > _LARGE:
                 raise Stopped(
                     Ended.DERIVED, "the degrees are derived from the singularity patterns, and the measured ones agree"
                 )
             return
-        if found is None or not enough:
+        if recurrence is None or not enough:
             return
         if known is not None and known.running:
-            raise Stopped(Ended.UNCONFIRMED, f"a recurrence of order {found.order} fits, but {known.running}")
-        if known is None or size >= known.terms_needed(found.order):
+            raise Stopped(Ended.UNCONFIRMED, f"a recurrence of order {recurrence.order} fits, but {known.running}")
+        if known is None or size >= known.terms_needed(recurrence.order):
             raise Stopped(
-                Ended.RECURRENCE, f"a recurrence of order {found.order} holds for {found.checked} further terms"
+                Ended.RECURRENCE,
+                f"a recurrence of order {recurrence.order} holds for {recurrence.checked} further terms",
             )
 
     def _compute_patterns(self) -> None:
@@ -459,7 +464,7 @@ class _Search:
                     k = curve.steps + 1
                     guess = known[k] if k < n else self.map.dim if k == 1 else known[1] * known[-1]
                     if k == n > 1 and known[-2]:
-                        # Degrees are as good as log-concave, so that the last ratio bounds the next one. A guess too
+                        # Degrees are almost log-concave: the last ratio bounds the next one. A guess that is too
                         # low costs a second attempt.
                         guess = min(guess, known[-1] * known[-1] // known[-2] + 4)
                     curve.step(guess)

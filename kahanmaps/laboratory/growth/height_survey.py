@@ -63,12 +63,12 @@ class SurveyedOrbit:
 class HeightSurvey(PrintableResult):
     """The orbits of the survey, in the order of eps and then of initial points.
 
-    `is_whole` is False if the budget or a TimeLimit ended the survey. If the map has no eps, that of the orbits has no
-    meaning. `heights.height` defines heights over number fields.
+    `is_complete` is False if the budget or a TimeLimit ended the survey. If the map has no eps, that of the orbits has
+    no meaning. `heights.height` defines heights over number fields.
     """
 
     orbits: tuple[SurveyedOrbit, ...]
-    is_whole: bool
+    is_complete: bool
     has_eps: bool = True
     over: str = ""  # the number field, if it is not Q
 
@@ -87,8 +87,8 @@ class HeightSurvey(PrintableResult):
 
     @property
     def text(self) -> str:
-        """One sentence: the kind of growth and the number of orbits that have it, or how they disagree."""
-        total, cut = len(self.orbits), "" if self.is_whole else "; the survey ended early; raise --effort"
+        """A sentence: the kind of growth and the number of orbits of this kind, or the kinds if they differ."""
+        total, cut = len(self.orbits), "" if self.is_complete else "; the survey ended early; raise --effort"
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
             # If all initial points of one eps agree, the kinds differ between the eps.
@@ -113,7 +113,7 @@ class HeightSurvey(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return attributes(self, "kind", "kinds", "text", whole="is_whole", orbits="orbits")
+        return attributes(self, "kind", "kinds", "text", complete="is_complete", orbits="orbits")
 
 
 def height_survey(
@@ -152,8 +152,8 @@ def height_survey(
         InputError: for wrong values.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
-    >>> found.kind, found.text
+    >>> survey = height_survey(load("weierstrass").system, starts=2, steps=40)
+    >>> survey.kind, survey.text
     (<Growth.QUADRATIC: 'quadratic'>, 'bit lengths grow quadratically on all 4 exact orbits tried, at 2 values of eps')
     """
     eps = resolve_eps(eps, time_step)

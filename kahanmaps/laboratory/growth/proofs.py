@@ -34,7 +34,7 @@ _LARGEST_ORDER = 60  # of a matrix of integers with at most _MAX_DIMENSION rows
 
 @dataclass(frozen=True)
 class GrowthProof:
-    """What is proved about the degrees of all iterates.
+    """A proved statement about the degrees of all iterates.
 
     `growth` with its `power` (k for n^k, times an exponential where the `rate` is more than 1), `rate` the dynamical
     degree, and `reason` the proof in a phrase. With `period` N the iterate N is linear; `is_identity`: it is the
@@ -98,14 +98,14 @@ def monomial_degree(matrix: fmpz_mat) -> int:
     (2, 3)
     """
     rows: list[list[int]] = [[int(entry) for entry in row] for row in matrix.tolist()]
-    # What X_j and Z have to be multiplied by: the last coordinate is then the product of these powers.
+    # The factors of X_j and Z that make them polynomial: the last coordinate is then the product of these powers.
     powers = [max(0, *(-entry for entry in column)) for column in zip(*rows, strict=True)]
     degree: int = sum(powers) + max(0, *(sum(row) for row in rows))
     return degree
 
 
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
-    """How the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
+    """Return how the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
 
     They are those of the entries of A^n up to a factor between two constants.
     """
@@ -121,7 +121,7 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
 
 
 def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
-    """The proof that a monomial map with this exponent matrix is periodic; None where it is not, or is the identity.
+    """Prove that a monomial map with this exponent matrix is periodic; return None if it is not, or is the identity.
 
     If A^n = 1, the iterate n multiplies each variable by a number or a function of eps. Its order is then 1 or 2.
     """
@@ -129,8 +129,8 @@ def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> Grow
     order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == one), None)
     periods = [] if order is None else [order, 2 * order]
     proofs = (linear_iterate(map_, eps, period) for period in periods)
-    found = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
-    return None if found is None or found.period == 1 else found
+    periodic = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
+    return None if periodic is None or periodic.period == 1 else periodic
 
 
 def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
@@ -155,7 +155,7 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
         with flint.ctx.workprec(bits):
             isolated: list[tuple[fmpz_poly, Any]] = [(g, g.complex_roots()) for g in numbers]
             reals = [(root.real, g) for g, roots in isolated for root, _ in roots if root.imag == 0]
-            (radius, polynomial), *others = sorted(reals, key=lambda one: one[0].mid().fmpq(), reverse=True)
+            (radius, polynomial), *others = sorted(reals, key=lambda pair: pair[0].mid().fmpq(), reverse=True)
             eigenvalues: list[tuple[Any, int]] = [(factor.complex_roots(), k) for factor, k in minimal]
             moduli = [(abs(root), k) for roots, k in eigenvalues for root, _ in roots]
             largest = [(modulus, k) for modulus, k in moduli if modulus.overlaps(radius)]
@@ -168,10 +168,10 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
 
 
 def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProof | None:
-    """The proof that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
+    """Prove that the iterate `period` is linear on projective space, or the identity, at one eps or over Q(eps).
 
-    Exact, by composing formulas. None where it is not, and where the formulas have too many terms. Of a linear iterate
-    powers up to 12 are tried as well, the first that is the identity is named then.
+    Exact, by composing formulas. Returns None if the iterate is not linear or the formulas have too many terms. If it
+    is linear, its powers up to 12 are computed, and the proof names the first one that is the identity.
     """
     if map_.symbols or map_.root is not None:
         return None

@@ -78,10 +78,10 @@ class Recurrence:
     from the recurrence of the others. `checked` of the terms were not needed to find it. If the recurrence was derived
     from other results, only the first `measured` values were measured, and the recurrence gives the others.
 
-    >>> found = find_recurrence([2 * n * n + 1 for n in range(12)])
-    >>> found.characteristic, found.order, found.checked, str(found.growth)
+    >>> recurrence = find_recurrence([2 * n * n + 1 for n in range(12)])
+    >>> recurrence.characteristic, recurrence.order, recurrence.checked, str(recurrence.growth)
     (x^3 + (-3)*x^2 + 3*x + (-1), 3, 6, 'quadratic')
-    >>> found.closed_form, found.rate.text
+    >>> recurrence.closed_form, recurrence.rate.text
     ('2*n^2 + 1', '1')
     """
 
@@ -163,7 +163,7 @@ class Recurrence:
     def closed_form(self) -> str | None:
         """a_n as a polynomial in n, one for each class of n modulo the period; None for exponential growth.
 
-        It holds from n = `preperiod` on. None also where there are more than 12 classes.
+        It holds from n = `preperiod` on. None also if there are more than 12 classes.
         """
         if not self.is_polynomial or not self.factors:
             return "0" if not self.factors else None
@@ -264,6 +264,8 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     order = int(polynomial.degree())
     if len(values) < 2 * order + needed_checks(order):
         return None
+    # The shortest recurrence of an integer sequence has integer coefficients (Fatou's lemma), so that the residues next
+    # to 0 are candidates for them. The test below is exact, and rejects wrong ones.
     lifted = [int(c) for c in polynomial.coeffs()]
     lifted = [c - _PRIME if 2 * c > _PRIME else c for c in lifted]
     for n in range(len(values) - order):

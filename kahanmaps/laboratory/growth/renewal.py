@@ -26,13 +26,16 @@ from kahanmaps.laboratory.singular.following import Fraction, OrbitData
 def degree_series(
     degrees: Sequence[int], hypersurfaces: Sequence[tuple[int, OrbitData]], stages: Sequence[int] = ()
 ) -> Fraction:
-    """The generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms.
+    """Return the generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms; exact.
 
-    `degrees` has d_1; of a word of maps, which are applied one after the other and from the beginning again, it has
-    those of the maps, `stages` say which of them, from 0, contracts each hypersurface, and the series has the degrees
-    after whole words only, with z for a single map. Of each contracted hypersurface its degree and its orders are
-    given. These are settled ones, and the columns nu follow the hypersurfaces; orders beyond what is known must not be
-    `needed`. Exact. Source: docs/mathematics.md.
+    Args:
+        degrees: d_1; for a word of maps, applied one after the other and periodically, the degree of each map.
+        hypersurfaces: for each exceptional hypersurface its degree and its orbit data, which must be settled; the
+            columns nu are in the same order. Multiplicities that are not known must not be `needed`.
+        stages: for a word, the index (from 0) of the map that contracts each hypersurface. The series then has the
+            degrees after complete words only, with z for a single map.
+
+    Source: docs/mathematics.md.
 
     >>> free = OrbitData((), (), 0, True)
     >>> degree_series([2], [(1, free)])
@@ -96,31 +99,34 @@ def degree_series(
 def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
     """The hypersurfaces whose preimages have to be counted for the degrees; None if their multiplicities are unknown.
 
-    These are the hypersurfaces that lower the degree, and those with images in one of these, and so on. Multiplicities
-    `beyond` the known ones matter only for hypersurfaces that are needed.
+    These are the hypersurfaces that lower the degree, and those with images in one of these, and so on. Unknown
+    multiplicities, in hypersurfaces `eventually_in` which images lie, matter only where these are needed.
 
-    >>> attracted = OrbitData(((0, 2),), (), 9, True, beyond=(0,))
-    >>> needed([attracted]), needed([OrbitData(((1, 0),), (), 9, True), OrbitData(((0, 1),), (), 9, True, beyond=(0,))])
+    >>> attracted = OrbitData(((0, 2),), (), 9, True, eventually_in=(0,))
+    >>> lowering = OrbitData(((1, 0),), (), 9, True)
+    >>> needed([attracted]), needed([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))])
     ([], None)
     """
-    chains = [[k] for k in range(len(patterns))]  # each with those that it becomes, in this order
+    chains = [
+        [k] for k in range(len(patterns))
+    ]  # each followed by the hypersurfaces onto which it is mapped, in this order
     for chain in chains:
-        while (returns := patterns[chain[-1]].returns) is not None and returns[1] not in chain:
-            chain.append(returns[1])
-    found = [k for k, chain in enumerate(chains) if any(row[0] for j in chain for row in patterns[j].rows)]
-    for i in found:
-        if any(i in patterns[j].beyond for chain in chains for j in chain):
+        while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:
+            chain.append(continuation[1])
+    indices = [k for k, chain in enumerate(chains) if any(row[0] for j in chain for row in patterns[j].rows)]
+    for i in indices:
+        if any(i in patterns[j].eventually_in for chain in chains for j in chain):
             return None
         met_by = (k for k, chain in enumerate(chains) if any(row[i + 1] for j in chain for row in patterns[j].rows))
-        found += [k for k in met_by if k not in found]
-    return sorted(found)
+        indices += [k for k in met_by if k not in indices]
+    return sorted(indices)
 
 
 def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
     """The generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of a fraction.
 
-    Its denominator has the roots to the power -n, so that it is no longer than the given one: exact. Raises
-    ArithmeticError where its coefficients have more than 520 bits.
+    Exact. The roots of its denominator are the n-th powers of the given ones, so that its degree does not grow. Raises
+    ArithmeticError if its coefficients have more than 520 bits.
 
     >>> every_nth((fmpz_poly([1]), fmpz_poly([1, -1, -1])), 3)
     ((-1)*x + 1, (-1)*x^2 + (-4)*x + 1)
@@ -169,11 +175,11 @@ def _through_returns(patterns: Sequence[OrbitData], start: int, column: int) -> 
     while k not in seen:
         seen[k] = shift, numerator
         part, denominator = patterns[k].generating_function(column)
-        returns = patterns[k].returns
-        if returns is None:
+        continuation = patterns[k].continues_as
+        if continuation is None:
             return numerator * denominator + z**shift * part, denominator
         numerator += z**shift * part
-        shift, k = shift + returns[0], returns[1]
+        shift, k = shift + continuation[0], continuation[1]
     begin, before = seen[k]
     around = 1 - z ** (shift - begin)
     return before * around + numerator - before, around

@@ -91,7 +91,7 @@ class DensitySearch(Search):
 
     @property
     def shows_none(self) -> bool:
-        """Whether the whole request was tried without a density: a measured answer."""
+        """Whether all requested degrees were searched and no density exists there: a measured answer."""
         return not self.densities and not self.cut
 
     @property
@@ -114,7 +114,7 @@ class DensitySearch(Search):
 
     @property
     def further(self) -> str:
-        """A sentence on the densities that are not shown; empty where there are none."""
+        """A sentence on the densities that are not shown; empty if all are shown."""
         if len(self.densities) < 2:
             return ""
         others = len(self.densities) - 1
@@ -123,7 +123,7 @@ class DensitySearch(Search):
 
     @property
     def note(self) -> str:
-        """Sentences on an anti-invariant density and on the period of the map; empty where there is neither."""
+        """Sentences on an anti-invariant density and on the period of the map; empty if there is neither."""
         periodic = closing_note(self.period, self.eps, self.file.map)
         if self.anti_invariant is None:
             return periodic
@@ -268,7 +268,7 @@ def _search(
     budget: Budget,
     progress: Callable[[str], None],
 ) -> tuple[list[FoundDensity], int, str]:
-    """Search for polynomial densities; the `product` is the answer where none is simpler.
+    """Search for polynomial densities; the `product` is the result unless a simpler one is found.
 
     Returns the densities, the largest degree that was tried, and what ended the search.
     """

@@ -55,7 +55,7 @@ _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation p
 MAX_UNKNOWNS = 1800
 MAX_INDEPENDENT = 800  # monomials that lower degrees leave independent; eliminating their matrix takes about a second
 _SETTLED_DEGREES = 4
-_SPARE_BITS = 40  # of 122 modulo two primes: a number counts only if it is so many bits shorter than a random residue
+_SPARE_BITS = 40  # of 122 modulo two primes, by which a number must be shorter than a random residue
 _POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 
@@ -320,7 +320,7 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
         pair: list[list[list[int]]] = []
         for _ in range(2):
             points = map_.orbit(count + iterates)
-            closed = len(points) < count + iterates
+            closed = len(points) < count + iterates  # a cycle: its points are continued around it
             periods.add(len(points) if closed else None)
             ahead = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
             rows = [
@@ -332,6 +332,8 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
             ]
             pair.append(null_space(rows, len(functions), map_.prime))
         bases += pair
+        # Entries of reduced bases that agree on two orbits of one map are constants; the others depend on the orbit,
+        # and are values of integrals.
         if len(pair[0]) == len(pair[1]):
             same = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*pair, strict=True)]
             constant = same if constant is None or len(constant) != len(same) else constant
@@ -405,12 +407,12 @@ def sparse_relations(
         lower = _descending_exponents(maps[0].dim, degree - 1)
         leads = [lower[next(k for k, c in enumerate(row) if c)] for row in _relations(maps[0], degree - 1)]
     relations, context = [], ring(variables)
-    # Letters for the names c1, c2, ... and e1, e2, ... such that no variable is named like that.
+    # Letters for the names c1, c2, ... and e1, e2, ... that no variable has as its name.
     taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
     integral, function = (next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES"))
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
-    # Two orbits of the first map tell integrals from constants; the second map gives constants as numbers.
+    # Two orbits of the first map distinguish integrals from constants; the second map gives constants as numbers.
     for row, other_orbit, other_map in zip(*tables, strict=True):
         used = [k for k, entry in enumerate(row) if entry]
         is_implied = any(all(map(ge, support[used[0]], lead)) for lead in leads)

@@ -4,7 +4,8 @@ First comes a lower bound of the number of integrals: from theorems (hamiltonian
 of orbits, which is measured (hirota_kimura.py). Then the search looks for spaces of polynomials with a common cofactor
 modulo a prime (search.py); their ratios are the integrals. The coefficients are functions of eps and of the parameters
 that stay symbols; they are interpolated, and every formula is verified as an identity (laboratory.py). Integrals that
-theorems give and the search missed are added. The remaining ones are sought as formulas in iterates (iterates.py).
+theorems give and the search missed are added. The remaining ones are searched for as formulas in iterates
+(iterates.py).
 """
 
 from __future__ import annotations

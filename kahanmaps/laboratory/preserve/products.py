@@ -101,7 +101,7 @@ def candidates(
 
     For a map they are: the variables; the polynomials of the cofactors (affine Darboux functions of a system, and
     factors of Jacobi determinants); the factors of det dPhi and det dPhi^-1, unless these are too long; and the factors
-    of the `further` polynomials. For a flow they are its Darboux polynomials, as far as the budget goes.
+    of the `further` polynomials. For a flow they are its Darboux polynomials, until the budget is spent.
     """
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
@@ -160,7 +160,7 @@ class _Line:
             self._apply(factor)
 
     def _apply(self, factor: ElementaryMap) -> None:
-        """Apply one factor of the map to the image; det of it is numerator Z^n / (denominator Z~^n)."""
+        """Apply one factor of the map to the image; its determinant is numerator Z^n / (denominator Z~^n)."""
         p, n, curve = self.prime, factor.dim, self.image
         top, size = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
@@ -178,6 +178,7 @@ class _Line:
             denominator = int(factor.determinant(x)) * pow(Z, n * top, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
+        # Without the common factor: its degree would multiply in each further map, and its zeros are not those of Z~.
         raw = _interpolated(homogeneous, n * top * size, p)
         common = reduce(nmod_poly.gcd, raw)
         self.image = [entry // common for entry in raw]
@@ -402,14 +403,16 @@ def _assembled(
     density = None
     for constant, choice in of_densities:
         vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
-        while vector is not None and density is None:  # multiply by integrals as long as that lowers the cost
+        while vector is not None and density is None:  # multiply by integrals while this lowers the cost
             others = [_combined((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
             best = min(others, key=cost, default=vector)
             if cost(best) >= cost(vector):
                 density = product(vector, constant)
             vector = best
-    one = of_densities[0][0]
-    return Products(tuple(product(v, one) for v in integrals), density, tuple(product(v, c) for v, c in time_dependent))
+    first_density = of_densities[0][0]
+    return Products(
+        tuple(product(v, first_density) for v in integrals), density, tuple(product(v, c) for v, c in time_dependent)
+    )
 
 
 def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[int]]) -> list[RationalFunction | None]:

@@ -57,12 +57,12 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.maps.kahan import KahanMap
 
-# Degrees up to which polynomials with a given cofactor are sought, by dimension.
+# Largest degrees of polynomials with a given cofactor that are searched for, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MAX_TERMS = 1000
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
 
-_SAMPLES = (150, 600, 3000)  # every coefficient is tried with few samples before one is tried with many
+_SAMPLES = (150, 600, 3000)  # all coefficients are tried with few samples before any is tried with many
 _COEFFICIENTS = 6
 NO_BRANCHES: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8
@@ -91,7 +91,7 @@ class Branches:
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
-    """Return the span of 1 and the affine integrals v.x (for Kahan maps: v.f = 0); None where there are none."""
+    """Return the span of 1 and the affine integrals v.x (for Kahan maps: v.f = 0); None if there are none."""
     n, prime = map_.dim, map_.prime
     changes = [[b - a for a, b in zip(x, image, strict=True)] for x, image in map_.pairs(n + _SPARE)]
     vectors = null_space(changes, n, prime)

@@ -19,28 +19,29 @@ from kahanmaps.laboratory.scan.modular_components import ModularComponents, find
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
-_SHARE = 0.5  # of the prime, points of a curve at least
+_SHARE = 0.5  # a curve has at least this share of p points
 
 
 def conditions(
     degrees: Degrees, sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
 ) -> list[Component]:
-    """The components of the special members with these degrees. `check` is called now and then, and may raise.
+    """Find the components over Q of the special members with these degrees.
 
-    Hypersurfaces come first, from random lines, which hardly meet anything smaller; then the smaller components of the
-    points outside these hypersurfaces.
+    Hypersurfaces come first, from random lines, which hardly meet anything smaller; then smaller components of the
+    points outside these hypersurfaces. `check` is called repeatedly, and may raise.
     """
-    found: list[Component] = []
+    components: list[Component] = []
     count = len(names)
 
     def parts_of(on_lines: bool) -> list[ModularComponents]:
         parts = []
-        for one in sweeps:
-            if one.on_lines is on_lines and degrees in one.classes:
-                rest = points_outside(one.classes[degrees], found, one.prime)
-                smallest = 0 if one.complete else count - one.width
-                parts += [find_components(rest, one.prime, one.seen, smallest, rng, check)] if rest else []
-        if count > 1:  # a hyperplane by its coefficients in the order of those of other hypersurfaces
+        for sweep in sweeps:
+            if sweep.on_lines is on_lines and degrees in sweep.classes:
+                unassigned = points_outside(sweep.classes[degrees], components, sweep.prime)
+                least = 0 if sweep.complete else count - sweep.width
+                if unassigned:
+                    parts.append(find_components(unassigned, sweep.prime, sweep.measured, least, rng, check))
+        if count > 1:  # rows of hyperplanes end with the constant; forms of other hypersurfaces begin with it
             hypersurfaces = {
                 part.prime: [
                     *((row[-1], *row[:-1]) for (row,) in part.linear.get(count - 1, [])),
@@ -48,7 +49,7 @@ def conditions(
                 ]
                 for part in parts
             }
-            found.extend(
+            components.extend(
                 Component((form,), count - 1, degrees, at) for form, at in lift_hypersurfaces(hypersurfaces, names)
             )
         return parts
@@ -60,16 +61,17 @@ def conditions(
         if dimension == 0 and len(linear) > 1:
             low, high = min(linear), max(linear)
             few, many = len(linear[low]), len(linear[high])
-            if few >= _SHARE * low and many - few >= _SHARE * (high - low):  # as many as a curve has
+            # Their number grows like the prime: these are points of a curve that was not found, not isolated points.
+            if few >= _SHARE * low and many - few >= _SHARE * (high - low):
                 continue
         lifted = lift_linear(linear)
-        found += [Component(linear_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
+        components += [Component(linear_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
         if dimension == 0:
             points = {p: [tuple(-row[-1] % p for row in rows) for rows in some] for p, some in linear.items()}
-            rest = {p: points_outside(some, found, p) for p, some in points.items()}
-            rest.update((one.prime, []) for one in sweeps if one.complete and one.prime not in rest)
-            conjugate = lift_conjugate_points(rest, names, rng, check)
-            found += [Component(equations, 0, degrees, at) for equations, at in conjugate]
+            unassigned = {p: points_outside(some, components, p) for p, some in points.items()}
+            unassigned.update((sweep.prime, []) for sweep in sweeps if sweep.complete and sweep.prime not in unassigned)
+            conjugate = lift_conjugate_points(unassigned, names, rng, check)
+            components += [Component(equations, 0, degrees, at) for equations, at in conjugate]
     for size in {len(rows) for part in parts for rows in part.hypersurfaces if rows}:
         inside = {part.prime: [rows for rows in part.hypersurfaces if len(rows) == size] for part in parts}
         for rows in lift_linear(inside):
@@ -77,28 +79,28 @@ def conditions(
             equations = linear_equations(rows, names)
             free = [name for k, name in enumerate(names) if k not in pivots(rows)]
             for form, at in lift_hypersurfaces(hypersurfaces, free):
-                whole = form.project_to_context(ring(names))
-                found.append(Component((whole, *equations), len(free) - 1, degrees, at))
-    return found
+                polynomial = form.project_to_context(ring(names))
+                components.append(Component((polynomial, *equations), len(free) - 1, degrees, at))
+    return components
 
 
 def points_outside(points: Sequence[Point], components: Iterable[Component], prime: int) -> list[Point]:
-    """The points modulo a prime that are on none of the components."""
+    """Return the points modulo a prime that lie on none of the components."""
     import numpy as np
 
-    rest = np.array(points, dtype=np.int64)
-    for one in components:
-        terms = sum(map(len, one.equations))
-        count_work(10 * terms * (1 + len(rest) / 200))
-        on = np.ones(len(rest), dtype=bool)
-        for equation in one.equations:
-            total = np.zeros(len(rest), dtype=np.int64)
+    outside = np.array(points, dtype=np.int64)
+    for component in components:
+        terms = sum(map(len, component.equations))
+        count_work(10 * terms * (1 + len(outside) / 200))
+        on = np.ones(len(outside), dtype=bool)
+        for equation in component.equations:
+            total = np.zeros(len(outside), dtype=np.int64)
             for exponents, coefficient in equation.terms():
-                term = np.full(len(rest), int(coefficient.p) % prime)
+                term = np.full(len(outside), int(coefficient.p) % prime)
                 for k, exponent in enumerate(exponents):
                     for _ in range(int(exponent)):
-                        term = term * rest[:, k] % prime
+                        term = term * outside[:, k] % prime
                 total += term
             on &= total % prime == 0
-        rest = rest[~on]
-    return [tuple(x) for x in rest.tolist()]
+        outside = outside[~on]
+    return [tuple(x) for x in outside.tolist()]

@@ -31,11 +31,11 @@ from kahanmaps.laboratory.scan.modular_components import Rows
 RationalRows = tuple[tuple[fmpq, ...], ...]
 
 _MAX_PAIRS = 100_000  # of affine subspaces modulo two primes that are tried
-_MAX_CONJUGATES = 24  # pairs are only formed of at most so many hypersurfaces modulo a prime
+_MAX_CONJUGATES = 24  # largest number of hypersurfaces modulo a prime of which pairs are formed
 _LOW_HEIGHT = 12  # up to this height one prime may be bad
 _MIN_PRIMES = 3
 MAX_FIELD_DEGREE = 6
-SPARE_BITS = 12  # the relations of a point must be smaller by so many bits than random residues would give
+SPARE_BITS = 12  # bits by which relations of a point must be shorter than those of random residues
 _MAX_FAILURES = 200
 _MAX_POINTS = 24  # modulo a prime
 _MAX_PRIMES = 14  # that are combined
@@ -61,6 +61,7 @@ def lift_linear(
     lifted: dict[RationalRows, tuple[int, ...]] = {}
     sizes = {(p, q): len(subspaces[p]) * len(subspaces[q]) for p, q in combinations(sorted(subspaces), 2)}
     pairs = 0
+    # Primes with the fewest pairs of subspaces first: a subspace over Q is lifted from the first pair that has it.
     for p, q in sorted(sizes, key=sizes.__getitem__):
         pairs += sizes[p, q]
         if pairs > _MAX_PAIRS:
@@ -258,6 +259,7 @@ def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[
     count(20 * size + size**3 * modulus.bit_length() / 500)
     shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest)
+    # Any residues have a relation with (2 height + 1)^size of about the modulus; only much smaller ones count.
     small = (2 * height + 1) ** size << spare <= modulus
     return [int(c) for c in shortest] if small and shortest[-1] else None
 

@@ -1,4 +1,4 @@
-"""Members of a family on a component of its parameters, and their degrees by another way than that of the sweep."""
+"""Members of a family on a component of parameter space, and their degrees, computed independently of the sweep."""
 
 from __future__ import annotations
 
@@ -20,44 +20,44 @@ from kahanmaps.laboratory.growth.curves import Line, Stopped
 from kahanmaps.laboratory.scan.sweep import Degrees
 from kahanmaps.maps.implicit import MapFamily
 
-_TRIES = 200
+_TRIES = 200  # random values of the free variables, until the equations have a root
 _PRIMES = 40
-_HEIGHTS = (12, 120)  # of values at random, for roots of higher degree and others
+_HEIGHTS = (12, 120)  # of random values: small ones where an equation of higher degree must have a rational root
 
 
 def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: random.Random) -> tuple[Any, ...] | None:
-    """A random solution over Q, of small height, or over GF(p); None where none is found.
+    """Return a random solution over Q, of small height, or over GF(p); None if none was found.
 
-    `equations` are those of an affine subspace, reduced so that the first variable of each is in no other, that of a
-    hypersurface, or those of a point over a number field, each with one variable more. Raises BadPrime where the prime
-    divides a denominator.
+    `equations` are those of an affine subspace, reduced so that the first variable of each occurs in no other; that of
+    a hypersurface; or those of a point over a number field, each with one more variable than the one before. Raises
+    BadPrime if the prime divides a denominator.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> a, b = ring(["a", "b"]).gens()
-    >>> found = point_on([a**2 + b**2 - 1], 2, QQ, random.Random(1))
-    >>> found[0]**2 + found[1]**2
+    >>> x, y = point_on([a**2 + b**2 - 1], 2, QQ, random.Random(1))
+    >>> x**2 + y**2
     1
     """
     pivots: list[int] = []
     for equation in equations:
-        # the first of the variables in which the degree is smallest, but not 0, and that is no pivot of another
+        # Solve for the variable of smallest positive degree that is not the pivot of an earlier equation.
         degrees = [int(d) for d in equation.degrees()]
         pivots.append(min((k for k, d in enumerate(degrees) if d and k not in pivots), key=lambda k: degrees[k]))
     height = _HEIGHTS[all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))]
     for _ in range(_TRIES if len(equations) < count else 1):
         count_work(10 + 20 * sum(map(len, equations)))
-        found = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))
-        if found:
-            return rng.choice(found)
+        points = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))
+        if points:
+            return rng.choice(points)
     return None
 
 
 def solutions(
     equations: Sequence[fmpq_mpoly], pivots: Sequence[int], values: Sequence[Any], field: Field
 ) -> Iterator[tuple[Any, ...]]:
-    """All solutions over a field with given values of the variables that are no pivots.
+    """Yield all solutions over a field with the given values of the variables that are not pivots.
 
-    Each equation has its pivot, those of later ones are not in it.
+    Each equation is solved for its pivot; pivots of later equations do not occur in it.
     """
     if not equations:
         yield tuple(values)
@@ -80,7 +80,7 @@ def solutions(
 
 @dataclass(frozen=True)
 class Scanned:
-    """What is scanned: the file and its map with the parameters `names` as symbols, eps among them if it is the last.
+    """A scanned family: the file and its map with the parameters `names` as symbols, eps among them if it is the last.
 
     `eps` is an exact number, or None for generic eps.
     """
@@ -99,10 +99,11 @@ class Scanned:
     def degrees_on(
         self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random, most: int = 1 << 20
     ) -> Degrees | None:
-        """The degrees of a random member on a component modulo a random prime of 61 bits; None where none is found.
+        """Measure the degrees of a random member on a component modulo a random prime of 61 bits, on one random line.
 
-        On one line; -1 where the iterate exists nowhere. `expected` says how many, and about how large; they end before
-        one above `most`.
+        Returns None if the component has no point modulo the primes tried. A degree is -1 if the iterate is defined
+        nowhere. As many degrees are measured as are `expected`, which also says about how large they are; the sequence
+        ends before a degree above `most`.
         """
         for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
             field = GF(random_prime(rng))
@@ -118,13 +119,13 @@ class Scanned:
         else:
             return None
         line = Line(over, rng, Budget(), most)
-        found: list[int] = []
+        degrees: list[int] = []
         try:
             for degree in expected:
                 line.step(max(1, degree))
-                found.append(line.degree)
+                degrees.append(line.degree)
         except Stopped:
             pass
         except ZeroDivisionError:
-            found += [-1] * (len(expected) - len(found))
-        return tuple(found)
+            degrees += [-1] * (len(expected) - len(degrees))
+        return tuple(degrees)

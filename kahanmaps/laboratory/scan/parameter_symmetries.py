@@ -29,7 +29,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     """Return generators of the group of changes of parameters that was found, as images of the parameters.
 
     Each preserves the degrees of the special members modulo each prime for which all members were tried, and the
-    hypersurfaces over Q, except for what is mapped to infinity. Only changes that move a component, or
+    hypersurfaces over Q, except for components that are mapped to infinity. Only changes that move a component, or
     preserve one that is not affine, are reported.
 
     >>> a, b = ring(["a", "b"]).gens()
@@ -38,7 +38,7 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
     >>> symmetries([Sweep(7, (2,), {(1,): points}, 49, True, 0)], lines, ["a", "b"])
     [('b', 'a'), ('a', '-b')]
     """
-    complete = [(one.prime, one.special) for one in sweeps if one.complete]
+    complete = [(sweep.prime, sweep.special) for sweep in sweeps if sweep.complete]
     if not complete or not components:
         return []
     generators: list[Change] = []

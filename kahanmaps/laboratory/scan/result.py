@@ -1,4 +1,4 @@
-"""The result of a scan: components of parameter space, and the part of it that was searched."""
+"""The result of a scan: components of parameter space, and which part of the space was searched."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ class Scan(PrintableResult):
         """The total degree up to which hypersurfaces with the same degrees of iterates are found."""
         count = len(self.over)
         degrees = [
-            degree_reached(0.75 * min(sweep.seen / sweep.prime for sweep in sweeps), count)
+            degree_reached(0.75 * min(sweep.measured / sweep.prime for sweep in sweeps), count)
             for sweeps in self._kinds
             if len(sweeps) > 2
         ]
@@ -167,7 +167,7 @@ class Scan(PrintableResult):
         parts = [f"all members with parameters modulo {complete}"] if complete else []
         for width, what, primes in ((1, "lines", lines), (2, "planes", planes)):
             if primes:
-                count = round(min(sweep.seen / sweep.prime**width for sweep in self._kinds[width]))
+                count = round(min(sweep.measured / sweep.prime**width for sweep in self._kinds[width]))
                 parts.append(
                     f"{'those' if parts else 'members'} on {count} random {what} of parameter space modulo {primes}"
                 )
@@ -238,10 +238,10 @@ class Scan(PrintableResult):
         if any(self.unassigned):
             counts = list(zip(self.unassigned, self.sweeps, strict=True))
             shown = [f"{n} modulo {sweep.prime}" for n, sweep in counts if n or len(counts) <= _MAX_LISTED]
-            missed_dimension = 0  # the largest dimension of a variety with so many members
+            missed_dimension = 0  # the largest dimension of a variety with this number of members
             for n, sweep in counts:
                 dimension = len(self.over) - 1
-                while dimension > missed_dimension and n < 0.5 * sweep.seen / sweep.prime ** (
+                while dimension > missed_dimension and n < 0.5 * sweep.measured / sweep.prime ** (
                     len(self.over) - dimension
                 ):
                     dimension -= 1
@@ -269,7 +269,7 @@ class Scan(PrintableResult):
             "symmetric": [list(images) for images in self.symmetric],
             "sweeps": [
                 {
-                    **attributes(sweep, "prime", "seen", "complete", "width", "accidents"),
+                    **attributes(sweep, "prime", "measured", "complete", "width", "false_alarms"),
                     "special": sum(map(len, sweep.classes.values())),
                     "unassigned": unassigned,
                 }

@@ -59,7 +59,7 @@ _FURTHER_PRIMES = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
 # of them: otherwise hypersurfaces that split over such a field would have no points to be found.
 _LINE_PRIMES = (107, 131, 139, 193, 241, 281)
 _LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
-_LINE_FACTOR = 4  # so many times as many lines if hypersurfaces were missed
+_LINE_FACTOR = 4  # factor for the number of lines if hypersurfaces were missed
 _MANY_LINES = (150, 60)
 _PLANES, _PLANE_PRIMES = (
     24,
@@ -132,8 +132,8 @@ def scan(
     ... parameters.g = 1
     ... [system]
     ... rhs = ["x*(x + 2*y)", "-y*((g + 1)*x + g*y)"]''')
-    >>> found = scan(lines, ["g"], terms=4, primes=[31, 37, 41])
-    >>> [one.text for one in found.components if one.growth.growth == "quadratic"]
+    >>> scanned = scan(lines, ["g"], terms=4, primes=[31, 37, 41])
+    >>> [component.text for component in scanned.components if component.growth.growth == "quadratic"]
     ['2', '1']
     """
     file, eps = as_file(system), resolve_eps(eps, time_step)
@@ -276,7 +276,7 @@ class _ScanRun:
         self.total += _count_members(len(self.family.names), plan)
 
         def on_progress(done: int, _: int) -> None:
-            self.report(f"scan: {done + sum(sweep.seen for sweep in self.sweeps)} of {self.total} members")
+            self.report(f"scan: {done + sum(sweep.measured for sweep in self.sweeps)} of {self.total} members")
 
         for k, (p, lines, width) in enumerate(plan):
             try:
@@ -309,20 +309,20 @@ class _ScanRun:
         it needs more than `most` members.
         """
         lines = [sweep for sweep in self.sweeps if sweep.on_lines]
-        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.seen / sweep.prime), 1) for sweep in lines]
-        is_lacking = any(_count_unassigned(sweep, known) >= 0.5 * sweep.seen / sweep.prime for sweep in lines)
+        plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in lines]
+        is_lacking = any(_count_unassigned(sweep, known) >= 0.5 * sweep.measured / sweep.prime for sweep in lines)
         if not is_lacking or _count_members(len(self.family.names), plan) > most:
             return []
         self.sweeps[:] = [sweep for sweep in self.sweeps if not sweep.on_lines]
         return plan
 
     def more_primes(self, known: Sequence[Component], primes: Sequence[int] | None, most: float) -> list[Choice]:
-        """Plan further primes, as far as all members together are at most `most`, if points were probably missed.
+        """Plan further primes if points were probably missed, with at most `most` members in total.
 
         Points are missed if there are unassigned members, but fewer than a curve has, or a hypersurface on random
         lines. The plan is empty if none were, or if the user gave the primes.
         """
-        sizes = ((sweep, sweep.prime if sweep.complete else sweep.seen / sweep.prime) for sweep in self.sweeps)
+        sizes = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
         if primes is not None or not any(0 < _count_unassigned(sweep, known) < 0.5 * size for sweep, size in sizes):
             return []
         plan: list[Choice] = [(p, None, 1) for p in _FURTHER_PRIMES.get(len(self.family.names), ())]
@@ -446,7 +446,7 @@ def _choose_terms(
     room = usual if terms is None else _MAX_ROOM
     degrees = family.degrees(members, eps, terms or _MAX_TERMS, room, rng).max(axis=0).tolist()
     if degrees[0] == NOWHERE:
-        raise InputError("the map is defined nowhere, whatever the parameters are")
+        raise InputError("the map is not defined at any point, for all parameters")
     measured = sum(degree >= 0 for degree in degrees)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")

@@ -21,9 +21,7 @@ from kahanmaps.maps.implicit import MapFamily
 
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
-Choice = tuple[
-    int, int | None, int
-]  # a prime, the number of random affine subspaces (None: all members), their dimension
+Choice = tuple[int, int | None, int]  # a prime, the number of affine subspaces (None: all members), their dimension
 
 _BATCH_SIZE = 512
 _MIN_LINES, _MAX_LINES = 3, 12  # on which a special member is measured
@@ -35,18 +33,19 @@ class TimeOver(Exception):
 
 @dataclass(frozen=True)
 class Sweep:
-    """The special members modulo one prime: `classes` maps degrees to points, and `seen` members were measured.
+    """The special members modulo one prime: `classes` maps degrees to points.
 
-    `generic` are the degrees of the other members. If not `complete`, only members on random affine subspaces of
-    dimension `width` were measured. `accidents` counts generic members that looked special on their first line.
+    `generic` are the degrees of all other members that were `measured` (their number). If not `complete`, only members
+    on random affine subspaces of dimension `width` were measured. `false_alarms` counts generic members that looked
+    special on their first line.
     """
 
     prime: int
     generic: Degrees
     classes: dict[Degrees, list[Point]]
-    seen: int
+    measured: int
     complete: bool
-    accidents: int
+    false_alarms: int
     width: int = 1
 
     @property
@@ -101,7 +100,7 @@ def sweep(
         room: as for `Family.degrees`.
         on: the number and the dimension of random affine subspaces of parameter space whose members are measured, or
             None for all members.
-        units: the work that one member counts as.
+        units: the units of work that are counted for one member.
         seed: the random seed.
         jobs: as for `Family.degrees`.
         check: called repeatedly; may raise TimeOver.
@@ -134,15 +133,16 @@ def sweep(
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
     generic = degrees.max(axis=0)
     if generic[0] < 0:
-        raise InputError("the map is defined nowhere, whatever the parameters are")
-    special, accidents = np.flatnonzero((degrees != generic).any(axis=1)), 0
+        raise InputError("the map is not defined at any point, for all parameters")
+    special, false_alarms = np.flatnonzero((degrees != generic).any(axis=1)), 0
     for line in range(1, _MAX_LINES):
         if not len(special):
             break
+        # The degree of an iterate is the largest on any line; a line in special position can only lower it.
         before, again = degrees[special], measure([points[i] for i in special])
         degrees[special] = np.maximum(before, again)
         still_special = special[(degrees[special] != generic).any(axis=1)]
-        accidents += len(special) - len(still_special)
+        false_alarms += len(special) - len(still_special)
         if line >= _MIN_LINES and (before == degrees[special]).all():
             break
         special = still_special
@@ -150,5 +150,11 @@ def sweep(
     for i in special:
         classes.setdefault(tuple(int(d) for d in degrees[i]), []).append(points[i])
     return Sweep(
-        prime, tuple(int(d) for d in generic), classes, len(points), on is None, accidents, 1 if on is None else on[1]
+        prime,
+        tuple(int(d) for d in generic),
+        classes,
+        len(points),
+        on is None,
+        false_alarms,
+        1 if on is None else on[1],
     )

@@ -1,1 +1,1 @@
-"""What a map contracts, and what becomes of it."""
+"""The hypersurfaces that a map contracts, and their images under the iterates."""

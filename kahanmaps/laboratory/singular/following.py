@@ -32,10 +32,10 @@ from kahanmaps.laboratory.singular.jets import (
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
-_FIRST_ALONG, _MOST_ALONG = 512, 2048  # where series are followed far: a step costs at least as much as their length
-_CONSTANT = 8  # so often at least is the same order repeated that goes on
-_CHECKED = 4  # further orders have to follow a recurrence than tell it
-_FREE_STEPS = 100  # for which a hypersurface is followed that is one again
+_FIRST_ALONG, _MOST_ALONG = 512, 2048  # terms of long series: the cost of a step is at least proportional to them
+_CONSTANT = 8  # a column is constant if its last entries, at least this number, are equal
+_CHECKED = 4  # number of orders that must satisfy a recurrence beyond those that determine it
+_FREE_STEPS = 100  # steps for which a confined hypersurface is followed
 
 
 _SHOWN = 6  # events in a sentence
@@ -47,23 +47,23 @@ class OrbitData:
     """A singularity pattern: the rows (mu, nu_1, nu_2, ...) of the steps 1, 2, ..., and their continuation.
 
     `is_settled`: the rows are known for all steps. There are three cases. The columns satisfy the `recurrences`, given
-    by their characteristic polynomials. Or `returns` is (T, j): after T steps the image is the j-th hypersurface, and
-    its pattern continues this one. Or all later rows are zero, as far as they were computed (`followed` steps), except
-    for the multiplicities of the hypersurfaces in `beyond`, in which the images lie again and again: these are not
-    known.
+    by their characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the j-th hypersurface,
+    and its pattern continues this one. Or all later rows are zero, as far as they were computed (`followed` steps),
+    except for the multiplicities of the hypersurfaces in `eventually_in`, in which the images lie again and again:
+    these are not known.
     """
 
     rows: tuple[tuple[int, ...], ...]
     recurrences: tuple[fmpz_poly, ...] = ()
     followed: int = 0
     is_settled: bool = False
-    returns: tuple[int, int] | None = None
-    beyond: tuple[int, ...] = ()
+    continues_as: tuple[int, int] | None = None
+    eventually_in: tuple[int, ...] = ()
 
     @property
     def known(self) -> tuple[object, ...]:
         """The data in which two points on one hypersurface have to agree."""
-        return self.rows[: 2 * self.settled_at], self.is_settled, self.returns, self.beyond
+        return self.rows[: 2 * self.settled_at], self.is_settled, self.continues_as, self.eventually_in
 
     @cached_property
     def settled_at(self) -> int:
@@ -83,8 +83,8 @@ class OrbitData:
             for j, nu in enumerate(row[1:], 1)
             if nu
         ]
-        if self.beyond:
-            names = ", ".join(f"C{k + 1}" for k in self.beyond)
+        if self.eventually_in:
+            names = ", ".join(f"C{k + 1}" for k in self.eventually_in)
             incidences.append(f"{names} at all later steps, which lowers no degree")
         lowers = f"lowers the degree by {_shortened(drops)}" if drops else "lowers no degree"
         return [lowers, f"its image lies in {_shortened(incidences) or 'no exceptional hypersurface'}"]
@@ -92,16 +92,18 @@ class OrbitData:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "divided": [row[0] for row in self.rows],
-            "met": [list(row[1:]) for row in self.rows],
+            "degree_drops": [row[0] for row in self.rows],
+            "incidences": [list(row[1:]) for row in self.rows],
             "recurrences": [[str(c) for c in characteristic.coeffs()] for characteristic in self.recurrences],
-            "settled": self.is_settled,
-            "beyond": [f"C{k + 1}" for k in self.beyond],
-            "returns": None if self.returns is None else {"after": self.returns[0], "as": f"C{self.returns[1] + 1}"},
+            "is_settled": self.is_settled,
+            "eventually_in": [f"C{k + 1}" for k in self.eventually_in],
+            "continues_as": None
+            if self.continues_as is None
+            else {"steps": self.continues_as[0], "hypersurface": f"C{self.continues_as[1] + 1}"},
         }
 
     def of(self, hypersurfaces: Sequence[int]) -> OrbitData:
-        """The same with the columns of these hypersurfaces only."""
+        """Return the data with the columns of these hypersurfaces only."""
         columns = [0, *(1 + k for k in hypersurfaces)]  # of orders without a return
         rows = tuple(tuple(row[k] for k in columns) for row in self.rows)
         return replace(self, rows=rows, recurrences=tuple(self.recurrences[k] for k in columns if self.recurrences))
@@ -130,19 +132,19 @@ NO_ORBIT_DATA = OrbitData(())
 
 
 class AlongCurves(Protocol):
-    """Functions whose orders are looked at along a curve, and what these make of its steps: the rows of `OrbitData`."""
+    """Functions whose orders are measured along a curve, and the rows of `OrbitData` that follow from these orders."""
 
     @property
     def functions(self) -> tuple[Function, ...]:
-        """What `images_of_curve` takes."""
+        """The functions in the form that `images_of_curve` takes."""
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """For each of the steps, or the first of them, what is divided out and the orders of hypersurfaces."""
+        """Return for each step, or the first steps, the power that is divided out and the orders of hypersurfaces."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """The functions whose orders are looked at along curves through a hypersurface.
+    """The functions whose orders are measured along curves through a hypersurface.
 
     `excess` are their exponents in the common factor of the minors of the equation, which is no part of the map;
     `first` are their orders on the hypersurface itself: 1 for its own, 0 for others. The first `critical` of them are
@@ -155,7 +157,7 @@ class Tracked:
     critical: int = 0
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """The rows of `OrbitData` for steps along a curve. Where nothing is tracked det M(x) stands for it."""
+        """Return the rows of `OrbitData` for steps along a curve; without tracked functions those of det M(x)."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
         pairs = zip(divided(run, self.first, self.excess), run, strict=True)
@@ -184,7 +186,7 @@ class Range:
     A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
     point of the image is followed, which is fast. Where it reaches the locus, series are needed, which are slow: for
     at most `along` steps, or `enough` if multiplicities repeat and each step uses up terms, so that series are long.
-    All of it stops when the `budget` is spent.
+    The computation stops when the `budget` is spent.
     """
 
     shown: int
@@ -212,7 +214,7 @@ class TestCurve:
     def steps(
         self, count: int, tangents: Sequence[Sequence[int]] = (), most: int = _MAX_PRECISION
     ) -> tuple[list[JetStep], bool]:
-        """`count` steps along series as long as needed, and whether the budget and the precision allowed all of them.
+        """Return `count` steps along series of sufficient length, and whether budget and precision allowed all of them.
 
         With tangents no function is tracked.
         """
@@ -233,7 +235,7 @@ class TestCurve:
                 precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
     def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[JetStep, ...]:
-        """`count` steps. Raises PrecisionTooLow if it ends early."""
+        """Return `count` steps. Raises PrecisionTooLow if fewer are possible."""
         run, is_complete = self.steps(count, tangents)
         if not is_complete:
             raise PrecisionTooLow
@@ -259,8 +261,8 @@ class TestCurve:
                 return OrbitData(rows[:up], (), reached, True)
             steps = hit
 
-    def orders(self, first: int) -> OrbitData:
-        """The orders along the curve, for as many steps as it takes until they are known for all, or the limits end it.
+    def orbit_data(self, first: int) -> OrbitData:
+        """Return the orbit data along the curve, with more steps until it is settled or the limits are reached.
 
         `first` is the number of steps to begin with. The image may move on a critical hypersurface until something
         happens, so that orders have to repeat for as long as curves are followed.
@@ -275,12 +277,15 @@ class TestCurve:
                 hit, reached = self._next_hit(run[-1].limit, len(run), limits.reach)
                 if hit is None:
                     return OrbitData(rows[:last], (), reached, True)
-            found = [find_recurrence(column) for column in zip(*rows, strict=True)]
-            repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
+            recurrences = [find_recurrence(column) for column in zip(*rows, strict=True)]
+            repeats = all(
+                recurrence is not None and len(rows) >= max(_CONSTANT, 2 * recurrence.order + _CHECKED)
+                for recurrence in recurrences
+            )
             is_cut = not is_complete and not limits.budget.is_spent  # by the precision
             is_far = len(run) >= min(limits.reach, limits.along)
             if rows and repeats and (is_far or (is_cut and (most == _MOST_ALONG or len(rows) >= limits.enough))):
-                laws = tuple(one.characteristic for one in found if one is not None)
+                laws = tuple(recurrence.characteristic for recurrence in recurrences if recurrence is not None)
                 kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
                 return OrbitData(rows[:kept], laws, len(run), True)
             if is_cut and most < _MOST_ALONG:
@@ -299,7 +304,8 @@ class TestCurve:
             steps = longest
 
     def _met_for_ever(self, point: Sequence[int]) -> tuple[int, ...] | None:
-        """The critical hypersurfaces on the later orbit of a point, if it closes and the map has a value on all of it.
+        """Return the critical hypersurfaces on the later orbit of a point; None unless it closes at points of
+        definition.
 
         Then no power of t is ever divided out again. None elsewhere. Lines in this direction show the value of the map.
         """

@@ -48,7 +48,7 @@ class Letters(tuple[Equation, ...]):
 
 
 def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
-    """Return the equations of the step 1, 2, ...: one letter of a word, else all."""
+    """Return the equations of the step 1, 2, ...: those of one map of a word, otherwise all."""
     return (equations[(step - 1) % len(equations)],) if isinstance(equations, Letters) else equations
 
 
@@ -82,7 +82,7 @@ class JetStep:
         rank: the rank of the differential of the map from the hypersurface to the limits of its points.
         limit: the limit of the point for t -> 0, after the step.
         orders: the valuations of the requested functions at the image.
-        curve: the image itself as far as it is known; empty if no functions were requested.
+        curve: the known terms of the image itself; empty if no functions were requested.
     """
 
     common: int
@@ -135,7 +135,7 @@ def images_of_curve(
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in curves[0])
         rank = 0
-        if tangents:  # at t = 0 in projective space: the direction of the limit itself does not count
+        if tangents:  # at t = 0 in projective space, where tangent vectors are modulo the limit point
             entries = [*limit, *(int(slope[shift]) for slope in slopes)]
             rank = int(nmod_mat(len(curves), len(limit), entries, prime).rank()) - 1
         valuations = tuple(order or 0 for order in orders)
@@ -260,7 +260,7 @@ def form_order(form: Any, field: PrimeField) -> Function:
         count(2 + len(terms) / 5)
         if int(reduced(*(int(entry[0]) for entry in X))):
             return 0
-        if precision > _LOW_PRECISION:
+        if precision > _LOW_PRECISION:  # most orders are small, and few terms show them
             low = order([entry.truncate(_LOW_PRECISION) for entry in X], _LOW_PRECISION)
             if low is not None:
                 return low

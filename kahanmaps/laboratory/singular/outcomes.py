@@ -48,7 +48,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapFamily
 
 _MAX_TANGENT_PRECISION = 1024
-_KEY_PRECISION = 64  # terms of the series by which points are told apart
+_KEY_PRECISION = 64  # terms of the series by which points are distinguished
 _TRIES = 40
 _MIN_LINES = 6  # on which critical points are searched, and more while a multiplicity has no point
 _POINTS = 2  # each modulo a prime of its own
@@ -75,9 +75,9 @@ def critical_points(
     """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
     `equations` are those of the factors of the map over the field, linear in the point, and `inverses` those of their
-    inverses; of several factors the product of their E is meant. Without inverses det M stands for E, and the points
-    are the poles that are not at infinity. Returns the points and, for each multiplicity, the number of zeros over the
-    closure of GF(p): there may be zeros without points in GF(p).
+    inverses; for several factors E is the product of those of the factors. Without inverses det M stands for E, and the
+    points are the poles that are not at infinity. Returns the points and, for each multiplicity, the number of zeros
+    over the closure of GF(p): there may be zeros without points in GF(p).
     """
     p = equations[0].over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equations[0].dim + 1)] for _ in range(2))
@@ -85,7 +85,7 @@ def critical_points(
     excluded = line[-1]
 
     def function(X: Sequence[nmod_poly], times: Product, is_line: bool = False) -> nmod_poly:
-        """E or det M; on the line from images without their common factors, which are no zeros to be found."""
+        """Return E or det M; on the line, images are taken without their common factors, whose zeros do not count."""
         nonlocal excluded
         total = X[0] * 0 + 1
         for k, equation in enumerate(equations):
@@ -108,14 +108,14 @@ def critical_points(
         value = value // shared
     if value.degree() < 1:
         return [], {}
-    found, degrees = [], dict[int, int]()
+    points, degrees = [], dict[int, int]()
     for part, exponent in value.factor_squarefree()[1]:
         power = int(exponent)
         degrees[power] = degrees.get(power, 0) + int(part.degree())
         for s in roots_modulo(part):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
             # The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is
-            # (t F_v + d F_w)^power G + ... A power of t above all those that count stands for d.
+            # (t F_v + d F_w)^power G + ... For d a power of t above all relevant ones is used.
             apart = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
             far = nmod_poly([0] * apart + [1], p)
@@ -129,8 +129,8 @@ def critical_points(
             here, *there = (int(function(X, times)[terms - 1]) for X in moved)
             gradient = [(c - here) % p for c in there]
             if any(gradient):
-                found.append(CriticalPoint(tuple(point), tuple(gradient), power))
-    return found, degrees
+                points.append(CriticalPoint(tuple(point), tuple(gradient), power))
+    return points, degrees
 
 
 def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> nmod_poly:
@@ -160,22 +160,22 @@ POINTS_DIFFER = "its multiplicities along two curves modulo different primes dif
 class Hypersurface:
     """An irreducible hypersurface over Q and its singularity pattern, at one exact eps.
 
-    `is_pole`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian determinant of
-    the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?" where it is
-    too large: then `degree` is that of all components of this multiplicity together. It is contracted by the step
-    `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not happen). `steps`
-    tells the first steps, at the first of two points, modulo the first of the `primes`.
+    `divides_denominator`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian
+    determinant of the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?"
+    where it is too large: then `degree` is that of all components of this multiplicity together. It is contracted by
+    the step `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not
+    happen). `steps` are the first steps, at the first of two points, modulo the first of the `primes`.
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
-    happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
-    cannot be said: its pattern has not settled. `orders` are those of this pattern. In a composition that is
-    followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
-    `generic` is its polynomial over Q[eps], empty where it is not known.
+    happened before: nothing, repetition, or growth by a linear recurrence. `settled_at` is None if its pattern has not
+    settled. `orbit_data` is this pattern. In a composition that is followed map by map all steps are those of single
+    maps, and the map of number `stage`, from 0, contracts it; otherwise `stage` is None.
+    `generic` is its polynomial over Q[eps], empty if it is not known.
     """
 
     polynomial: str = "?"
     degree: int = 0
-    is_pole: bool = False
+    divides_denominator: bool = False
     multiplicity: int | None = None
     status: SingularityOutcome = UNDECIDED
     contracted_at: int | None = None
@@ -185,39 +185,45 @@ class Hypersurface:
     note: str = ""
     followed: int = 0
     settled_at: int | None = None
-    orders: OrbitData = field(default=NO_ORBIT_DATA, repr=False)
+    orbit_data: OrbitData = field(default=NO_ORBIT_DATA, repr=False)
     stage: int | None = None
     generic: str = ""
 
     def sentence(self, at: str) -> str:
         """Describe its pattern: where its images lie, when they lower the degree, and whether it is confined.
 
-        `at` names the eps of the polynomial, where that is not the one over Q[eps].
+        `at` names the eps of the polynomial if this is not the one over Q[eps].
         """
         text, most = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
         cut = text if len(text) <= most else f"{text[:most]} ..."
         name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
-        if self.orders.returns:
-            after, other = self.orders.returns
+        if self.orbit_data.continues_as:
+            after, other = self.orbit_data.continues_as
             outcome = f"mapped onto C{other + 1} after {counted(after, 'step')}"
         elif self.confined_at is not None:
             outcome = f"confined after {counted(self.confined_at, 'step')}"
-        elif self.orders.recurrences:
-            outcome = f"its multiplicities satisfy a recurrence of order {self.orders.settled_at}"
+        elif self.orbit_data.recurrences:
+            outcome = f"its multiplicities satisfy a recurrence of order {self.orbit_data.settled_at}"
         else:
             outcome = f"not confined within {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
-        parts = [
-            f"{name}, degree {self.degree}{', a factor of the denominator' if self.is_pole else ''}: contracted{by}",
-            outcome,
-        ]
-        return "; ".join([", ".join(parts), *self.orders.sentences])
+        factor = ", a factor of the denominator" if self.divides_denominator else ""
+        parts = [f"{name}, degree {self.degree}{factor}: contracted{by}, {outcome}", *self.orbit_data.sentences]
+        return "; ".join(parts)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, without the first steps."""
-        names = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
-        found = attributes(self, *names, "followed", "settled_at", "note", "stage", "generic")
-        return {**found, "orders": self.orders.to_json()}
+        names = (
+            "polynomial",
+            "degree",
+            "divides_denominator",
+            "multiplicity",
+            "status",
+            "contracted_at",
+            "confined_at",
+        )
+        data = attributes(self, *names, "followed", "settled_at", "note", "stage", "generic")
+        return {**data, "orbit_data": self.orbit_data.to_json()}
 
 
 @dataclass(frozen=True)
@@ -229,7 +235,7 @@ class HypersurfaceForm:
     """
 
     form: Any
-    is_pole: bool
+    divides_denominator: bool
     multiplicity: int | None
     excess: int = 0
     stage: int = 0
@@ -237,7 +243,7 @@ class HypersurfaceForm:
 
 @dataclass(frozen=True)
 class Tracking:
-    """The forms whose orders are told along curves: those that are contracted, and those in a common factor of minors.
+    """The forms whose orders are measured along curves: contracted ones, and those in a common factor of minors.
 
     Where the maps of a composition are followed one by one, `stage` is the number of the one that contracts, from 0,
     and steps are single maps of a word of `period`.
@@ -249,21 +255,21 @@ class Tracking:
     period: int = 1
 
     def equations(self, map_: MapFamily, eps: fmpq, field: PrimeField) -> Sequence[Equation]:
-        """Those of the map modulo a prime, from the stage on."""
+        """Return the equations of the map modulo a prime, from the stage on."""
         equations: Sequence[Equation] = map_.at(eps, field).equations
         if self.stage is None:
             return equations
         letters = Letters([*equations[self.stage : self.period], *equations[: self.stage]])
-        letters.places = tuple(one.stage - self.stage for one in (*self.critical, *self.excess))
+        letters.places = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.excess))
         return letters
 
     def along(self, form: Any, field: PrimeField) -> Tracked:
-        """What is tracked along a curve through the hypersurface of a form."""
+        """Return the functions that are tracked along a curve through the hypersurface of a form."""
         forms, stage = [*self.critical, *self.excess], self.stage or 0
         return Tracked(
-            tuple(form_order(one.form, field) for one in forms),
-            tuple(one.excess for one in forms),
-            tuple(int(one.form == form and one.stage == stage) for one in forms),
+            tuple(form_order(tracked.form, field) for tracked in forms),
+            tuple(tracked.excess for tracked in forms),
+            tuple(int(tracked.form == form and tracked.stage == stage) for tracked in forms),
             len(self.critical),
         )
 
@@ -286,7 +292,7 @@ def outcome_of(
     followed. Source: grammaticos-ramani-papageorgiou-1991.
     """
     outcomes: dict[int, Hypersurface] = {}  # by the primes
-    found, note = _UNKNOWN, BUDGET_SPENT
+    outcome, note = _UNKNOWN, BUDGET_SPENT
     for _ in range(_TRIES):
         if len(outcomes) == _POINTS or limits.budget.is_spent:
             break
@@ -313,17 +319,23 @@ def outcome_of(
             note = BUDGET_SPENT if limits.budget.is_spent else "its series have too few terms"
             break
     if len(outcomes) == _POINTS:
-        first, second = ((h.status, h.contracted_at, h.confined_at, h.orders.known) for h in outcomes.values())
-        found, note = next(iter(outcomes.values())), ""
+        first, second = ((h.status, h.contracted_at, h.confined_at, h.orbit_data.known) for h in outcomes.values())
+        outcome, note = next(iter(outcomes.values())), ""
         if first != second:  # a spent budget may be the reason
-            found, note = Hypersurface(steps=found.steps), BUDGET_SPENT if limits.budget.is_spent else POINTS_DIFFER
-    known = replace(found, polynomial=text, degree=int(form.form.total_degree()), is_pole=form.is_pole, note=note)
+            outcome, note = Hypersurface(steps=outcome.steps), BUDGET_SPENT if limits.budget.is_spent else POINTS_DIFFER
+    known = replace(
+        outcome,
+        polynomial=text,
+        degree=int(form.form.total_degree()),
+        divides_denominator=form.divides_denominator,
+        note=note,
+    )
     return replace(known, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """As `unwritten`, with the poles and infinity; without any polynomial."""
-    found = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
+    """Follow the hypersurfaces as `unwritten` does, including the poles and infinity, all without polynomials."""
+    hypersurfaces = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))
         try:
@@ -335,8 +347,8 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: R
             continue
         except PrecisionTooLow:
             outcome = _UNKNOWN
-        return [*found, replace(outcome, polynomial="Z", degree=1, primes=(field.prime,))]
-    return found
+        return [*hypersurfaces, replace(outcome, polynomial="Z", degree=1, primes=(field.prime,))]
+    return hypersurfaces
 
 
 def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
@@ -345,11 +357,13 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
     At one exact `eps` (half the time step), on lines modulo random primes; the poles, or the others but for infinity.
     One with a multiplicity of which no point was found is undecided. Source: zander-2021.
     """
-    found: dict[tuple[Any, ...], Hypersurface] = {}
-    alike: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}  # the places in `found` of points with the same orders
+    hypersurfaces: dict[tuple[Any, ...], Hypersurface] = {}
+    alike: dict[
+        tuple[Any, ...], list[tuple[Any, ...]]
+    ] = {}  # the keys in `hypersurfaces` of points with the same orders
     degrees: dict[int, int] = {}
     for line in range(4 * _MIN_LINES):
-        if limits.budget.is_spent or (line >= _MIN_LINES and set(degrees) <= {key[0] for key in found}):
+        if limits.budget.is_spent or (line >= _MIN_LINES and set(degrees) <= {key[0] for key in hypersurfaces}):
             break
         field = GF(random_prime(rng))
         try:
@@ -367,9 +381,9 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             run, _ = TestCurve(equations, critical.point, direction, limits).steps(limits.shown, most=_KEY_PRECISION)
             orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
             known = alike.setdefault(orders, [])
-            if len(known) >= _POINTS and len(set(known)) == 1:  # a third one would tell nothing new
-                primes = dict.fromkeys((*found[known[0]].primes, field.prime))
-                found[known[0]] = replace(found[known[0]], primes=tuple(primes))
+            if len(known) >= _POINTS and len(set(known)) == 1:  # a third point would give no new information
+                primes = dict.fromkeys((*hypersurfaces[known[0]].primes, field.prime))
+                hypersurfaces[known[0]] = replace(hypersurfaces[known[0]], primes=tuple(primes))
                 continue
             try:
                 outcome = _outcome_at(equations, critical.point, tangents, rng, limits)
@@ -379,25 +393,27 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
                 outcome = _UNKNOWN
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
             known.append(key)
-            one = replace(outcome, degree=seen[key[0]], is_pole=poles, multiplicity=key[0], primes=(field.prime,))
-            if key in found:  # of two points with the same outcome the one that was followed less counts
-                before = found[key]
-                settled = [k for k in (before.settled_at, one.settled_at) if k is not None]
-                found[key] = replace(
+            hypersurface = replace(
+                outcome, degree=seen[key[0]], divides_denominator=poles, multiplicity=key[0], primes=(field.prime,)
+            )
+            if key in hypersurfaces:  # if two points have the same outcome, the shorter run counts
+                before = hypersurfaces[key]
+                settled = [k for k in (before.settled_at, hypersurface.settled_at) if k is not None]
+                hypersurfaces[key] = replace(
                     before,
-                    primes=tuple(dict.fromkeys((*before.primes, *one.primes))),
-                    followed=min(before.followed, one.followed),
+                    primes=tuple(dict.fromkeys((*before.primes, *hypersurface.primes))),
+                    followed=min(before.followed, hypersurface.followed),
                     settled_at=max(settled) if len(settled) == 2 else None,
                 )
             else:
-                found[key] = one
-    for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
-        found[(multiplicity,)] = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT)
-    return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
+                hypersurfaces[key] = hypersurface
+    for multiplicity in set(degrees) - {h.multiplicity for h in hypersurfaces.values()}:
+        hypersurfaces[(multiplicity,)] = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT)
+    return sorted(hypersurfaces.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
 
 def _by_ranks(ranks: Sequence[int], full: int) -> tuple[SingularityOutcome, int | None, int | None]:
-    """Status, the step that contracts and the step that ends it."""
+    """Return the status, the step that contracts the hypersurface, and the step after which it is confined."""
     down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
     if down is None:
         return NOT_CONTRACTED, None, None
@@ -423,35 +439,34 @@ def _outcome_at(
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
         return Hypersurface(status=status, steps=tuple(run), followed=len(run), settled_at=0)
-    orders = NO_ORBIT_DATA
+    data = NO_ORBIT_DATA
     if up is None:
-        orders = curve.orders(limits.shown)
-        # Beyond the steps that are shown it may be a hypersurface again, whose orders go on as those of another one do.
+        data = curve.orbit_data(limits.shown)
+        # After the steps that are shown the image may be a hypersurface again; then its orders are those of that one.
         longest = min(limits.along, limits.reach)
-        while up is None and is_complete and not orders.is_settled and len(run) < longest:
+        while up is None and is_complete and not data.is_settled and len(run) < longest:
             run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)
             status, down, up = _by_ranks([step.rank for step in run], full)
     if up is None:
-        if (
-            not is_complete and not orders.is_settled
-        ):  # what grows by a recurrence, as at superattracting points, is known
+        # At a superattracting point the multiplicities grow too fast for the precision, and yet satisfy a recurrence.
+        if not is_complete and not data.is_settled:
             raise PrecisionTooLow
     else:
-        orders = curve.orbit_data_until_return(up)
-    if is_complete and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = list(curve.all_steps(orders.settled_at + 2, tangents))
+        data = curve.orbit_data_until_return(up)
+    if is_complete and data.is_settled and not data.continues_as and len(run) < data.settled_at + 2 <= limits.reach:
+        run = list(curve.all_steps(data.settled_at + 2, tangents))
         status, down, up = _by_ranks([step.rank for step in run], full)
-    settled = max(up or 0, orders.settled_at) if orders.is_settled else None
+    settled = max(up or 0, data.settled_at) if data.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
-        orders = replace(NO_ORBIT_DATA, followed=orders.followed)
+        data = replace(NO_ORBIT_DATA, followed=data.followed)
     return Hypersurface(
         status=status,
         contracted_at=down,
         confined_at=up,
         steps=tuple(run),
-        followed=orders.followed,
+        followed=data.followed,
         settled_at=settled,
-        orders=orders,
+        orbit_data=data,
     )
 
 
@@ -460,7 +475,7 @@ def _tangents(point: Sequence[int], gradient: Sequence[int], field: PrimeField) 
     p, places = field.prime, range(len(point))
     pivot = next(k for k in places if gradient[k])
     inverse = pow(gradient[pivot], -1, p)
-    # The point itself is tangent to the cone: a basis vector that occurs in it makes room for it.
+    # The point itself is tangent to the cone: it replaces a basis vector that occurs in it.
     occurs = next((k for k in places if k != pivot and point[k]), None)
     free = [k for k in places if k not in (pivot, occurs)]
     basis = [[int(i == k) - (i == pivot) * gradient[k] * inverse for i in places] for k in free]

@@ -31,7 +31,7 @@ from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
-from kahanmaps.laboratory.singular.contracted import OrbitDataUnknown, contracted
+from kahanmaps.laboratory.singular.exceptional import OrbitDataUnknown, exceptional_hypersurfaces
 from kahanmaps.laboratory.singular.following import Fraction, Range
 from kahanmaps.laboratory.singular.outcomes import (
     CONFINED,
@@ -66,17 +66,17 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
 MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
-_DIGITS_A_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # by dimension: above 4 less is expanded
+_DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # of units, by dimension
 _FEW_DIGITS = 50
 _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
 _LEAST_ALONG = 40
-_ENOUGH = {1: 60, 2: 60}  # of these where series would have to be long and orders repeat
+_ENOUGH = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
 _MOST_SHOWN = 200
-_DRAWS = 2  # of two values of eps, where the first ones are special
+_DRAWS = 2  # of two values of eps, if the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
-_POINTS = 3  # random ones, where det dPhi is looked at
+_POINTS = 3  # random points at which det dPhi is evaluated
 _MAX_DEGREE = 20_000  # of a composition
 _STOPPED = "work limit reached before all singularities were traced; raise --effort"
 _DIFFERENT = "the singularities at the two values of eps differ; choose one with --eps"
@@ -108,9 +108,9 @@ class SingularityRun(PrintableResult):
     word: Word | None = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """A row for each hypersurface, for `pandas.DataFrame(run.rows())` and the like."""
+        """A row for each hypersurface, for example for `pandas.DataFrame(run.rows())`."""
         names = ("polynomial", "degree", "status", "contracted_at", "confined_at")
-        return [attributes(one, *names) for one in self.hypersurfaces]
+        return [attributes(hypersurface, *names) for hypersurface in self.hypersurfaces]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -159,7 +159,7 @@ class SingularityRun(PrintableResult):
     def shape(self) -> tuple[Any, ...]:
         """Data that are the same for all generic eps: degrees, kinds and patterns."""
         patterns = sorted(
-            (h.degree, h.is_pole, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
+            (h.degree, h.divides_denominator, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
             for h in self.hypersurfaces
         )
         return (self.is_undefined, self.is_dominant, *patterns)
@@ -179,11 +179,11 @@ def singularities(
 
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
-    modulo two random primes; "not confined" means within so many steps. Stops when the budget is spent, which doubles
-    with each more of `effort`, and at a TimeLimit, which ends a stage of something else, where `effort` is a Budget, as
-    a whole. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or
-    coefficients of more than 10,000 digits, or so long that writing formulas would exceed the budget.
-    Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+    modulo two random primes; "not confined" means within this number of steps. Stops when the budget is spent, which
+    doubles with each more of `effort`, and at a TimeLimit, which ends a stage of something else, where `effort` is a
+    Budget, as a whole. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and
+    an eps or coefficients of more than 10,000 digits, or so long that writing formulas would exceed the budget. Source:
+    grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, str(run.verdict)
@@ -210,7 +210,7 @@ def singularities(
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
         map_form = homogeneous_map(over)
         count(3 * sum(map(len, map_form.forms)))
-    except TooLarge:  # a composition: map by map, or hypersurfaces are told by random points
+    except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
         try:
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
@@ -253,7 +253,7 @@ def singularities(
             progress(f"following {text[:40]}")
             hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
-            if isinstance(effort, Budget):  # a stage of something else, which ends, too
+            if isinstance(effort, Budget):  # the budget of a larger computation, which is then charged, too
                 raise
             is_cut = True
             break
@@ -271,8 +271,8 @@ def _map_by_map(
 ) -> SingularityRun | None:
     """The run for a composition whose maps are followed one by one; None where one of them is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
-    found = followed_map_by_map(map_, run.eps, rng, limits, progress)
-    return found and replace(run, word=found[0], hypersurfaces=tuple(found[1]), stopped=limits.budget.is_spent)
+    followed = followed_map_by_map(map_, run.eps, rng, limits, progress)
+    return followed and replace(run, word=followed[0], hypersurfaces=tuple(followed[1]), stopped=limits.budget.is_spent)
 
 
 @dataclass(frozen=True)
@@ -284,7 +284,7 @@ class Patterns:
     after which patterns have settled; `searched` is the number of steps for which unconfined hypersurfaces were
     followed (None if all are confined); `some_confined` says whether others are confined (None: not known). `running`
     is empty, or the reason why the patterns are not known for all steps. `series` has the coefficients of the numerator
-    and the denominator of the generating function of the degrees, and is empty where it does not follow. `contracted`
+    and the denominator of the generating function of the degrees, and is empty where it does not follow. `exceptional`
     are the exceptional hypersurfaces `at` one of the eps that were tried. Steps are those of the map, except for the
     hypersurfaces of a `word` of maps that is followed map by map.
     """
@@ -294,14 +294,14 @@ class Patterns:
     some_confined: bool | None
     running: str = ""
     series: tuple[tuple[int, ...], ...] = ()
-    contracted: tuple[Hypersurface, ...] = field(default=(), compare=False, repr=False)
+    exceptional: tuple[Hypersurface, ...] = field(default=(), compare=False, repr=False)
     at: str = field(default="", compare=False)
     word: Word | None = field(default=None, compare=False)
 
     def terms_needed(self, order: int) -> int:
         """The number of terms, including d_0, that determine a recurrence of this order.
 
-        With two rational generating functions of degrees r and R that agree in r + R + 1 terms they are the same; R is
+        Two rational generating functions of degrees r and R are equal if they agree in r + R + 1 terms. Here R is
         at most 1 more than the sum of the lengths of different patterns (hypersurfaces of the same pattern count once).
         """
         return order + sum(self.lengths) + 2
@@ -314,7 +314,7 @@ class Patterns:
 
     @property
     def series_text(self) -> str:
-        """The generating function of the degrees as a formula in z; empty where it is not known."""
+        """The generating function of the degrees as a formula in z; empty if it is not known."""
         texts = []
         for part in self.series:
             text = ""
@@ -330,7 +330,7 @@ class Patterns:
     def sentences(self) -> list[str]:
         """A sentence on the singularity pattern of each exceptional hypersurface, where the degrees are derived."""
         at = f" at eps = {self.at}" if self.at else ""
-        return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
+        return [f"C{k}: {h.sentence(at)}" for k, h in enumerate(self.exceptional, 1) if self.series]
 
     @property
     def word_text(self) -> str:
@@ -355,18 +355,22 @@ class Patterns:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        found = attributes(self, "lengths", "searched", "some_confined", "running", "text")
+        data = attributes(self, "lengths", "searched", "some_confined", "running", "text")
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
-        contracted = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.contracted, strict=False)]
+        exceptional = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.exceptional, strict=False)]
         maps = self.word.length if self.word_text and self.word else None
-        known = {"generating_function": series or None, "contracted": contracted, "eps": self.at or None}
-        return {**found, **known, "maps_a_step": maps}
+        known = {
+            "generating_function": series or None,
+            "exceptional_hypersurfaces": exceptional,
+            "eps": self.at or None,
+        }
+        return {**data, **known, "maps_a_step": maps}
 
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
     """The patterns from runs at one eps, or at two that represent all; `at`: the map depends on eps."""
-    found = set()
+    settled = set()
     for run in runs:
         if not run.is_dominant:
             known = _not_dominant(run.eps)
@@ -374,8 +378,8 @@ def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
             known = _unknown(_STOPPED)
         else:
             known = _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
-        found.add(known)
-    return found.pop() if len(found) == 1 else _unknown(_DIFFERENT)
+        settled.add(known)
+    return settled.pop() if len(settled) == 1 else _unknown(_DIFFERENT)
 
 
 def patterns(
@@ -393,13 +397,13 @@ def patterns(
     """
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
-    found = _unknown("")
+    result = _unknown("")
     for again in range(_DRAWS if eps is None else 1):
-        if again and (not found.running or budget.is_spent):
+        if again and (not result.running or budget.is_spent):
             break
         values = default_eps(map_, seed + again) if eps is None else (eps,)
         stages = budget.share([1] * len(values))
-        # What random points stand for is known of equations that are linear in both points.
+        # Random points can be attributed to hypersurfaces only if the equations are linear in both points.
         is_short = map_.dim <= WRITTEN_DIMENSION or not map_.at(values[0]).is_bilinear
         if is_short and all(can_be_written(map_, value, budget.part(1 / len(values))) for value in values):
             try:
@@ -407,7 +411,7 @@ def patterns(
                 runs = [singularities(map_, value, steps=steps, seed=seed, effort=stage) for value, stage in given]
             except TooLongFormula:
                 return _unknown("the composition is too long for its singularities to be followed")
-            found = patterns_of(runs, map_.has_eps)
+            result = patterns_of(runs, map_.has_eps)
         else:
             several = set()
             for value, stage in zip(values, stages, strict=True):
@@ -420,13 +424,13 @@ def patterns(
                     known = _unknown(_STOPPED) if limits.budget.is_spent else _patterns(0, outcomes)
                 else:
                     try:
-                        degree, hypersurfaces = contracted(map_, value, rng, limits)
+                        degree, hypersurfaces = exceptional_hypersurfaces(map_, value, rng, limits)
                         known = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
                     except OrbitDataUnknown as error:
                         known = _unknown(_STOPPED if limits.budget.is_spent else str(error))
                 several.add(known)
-            found = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
-    return found
+            result = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
+    return result
 
 
 def _digits(map_: MapFamily, eps: fmpq) -> int:
@@ -435,7 +439,7 @@ def _digits(map_: MapFamily, eps: fmpq) -> int:
 
 def _most_digits(dim: int, budget: Budget) -> int:
     """The digits with which formulas are written within the budget; a few always are."""
-    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
+    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
 def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:
@@ -456,7 +460,7 @@ def _patterns(
     map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = "", word: Word | None = None
 ) -> Patterns:
     maps = 1 if word is None else word.length
-    # A pole of multiplicity 0 is no critical hypersurface: what it becomes lowers no degree.
+    # A pole of multiplicity 0 is no critical hypersurface: its images lower no degree.
     critical = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
     for h in critical:
         name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
@@ -467,13 +471,15 @@ def _patterns(
     lengths = {h.settled_at for h in critical if h.settled_at}
     open_ones = [h.followed for h in critical if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
-    if all(h.orders.is_settled and h.degree for h in critical) and map_degree > 0:
-        if needed([h.orders for h in critical]) is None:
+    if all(h.orbit_data.is_settled and h.degree for h in critical) and map_degree > 0:
+        if needed([h.orbit_data for h in critical]) is None:
             return _unknown(
                 "some images lie in a hypersurface that lowers the degree at all steps, with unknown multiplicities"
             )
         degrees = (map_degree,) if word is None else word.degrees
-        fraction = degree_series(degrees, [(h.degree, h.orders) for h in critical], [h.stage or 0 for h in critical])
+        fraction = degree_series(
+            degrees, [(h.degree, h.orbit_data) for h in critical], [h.stage or 0 for h in critical]
+        )
         if maps > 1:
             try:
                 fraction = every_nth(fraction, maps)
@@ -537,7 +543,7 @@ def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
     """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
     rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
     for _ in range(_POINTS):
-        field = GF(random_prime(rng))  # what is not 0 there is not 0 over Q
+        field = GF(random_prime(rng))  # a number that is not 0 modulo p is not 0 over Q
         try:
             if det(map_.at(eps, field).jacobian([rng.randrange(field.prime) for _ in range(map_.dim)])) != 0:
                 return True

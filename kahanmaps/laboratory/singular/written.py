@@ -1,8 +1,8 @@
 """The polynomials of the hypersurfaces that a map may contract; for a composition, those of each of its maps.
 
-A composition multiplied out has the hypersurfaces of all its maps, moved back by those before: long polynomials. Map by
-map they are as short as those of the maps. Curves through them are followed through the word of the maps, one map a
-step, and begin where the map stands that contracts them. Powers of a word repeat it.
+The exceptional hypersurfaces of a composition are preimages of those of its maps, under the maps applied before: long
+polynomials. Map by map the polynomials are short. Curves through the hypersurfaces are followed through the word of the
+maps, one map a step, starting with the map that contracts the hypersurface. Powers of a word repeat it.
 
 For every eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
 Hilbert's irreducibility theorem its factors stay irreducible at all but few eps, so that those at one eps are their
@@ -64,28 +64,28 @@ def written(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
     Where the determinant is too large the degree is None, and the list has only the poles and infinity.
     """
     forms, _, denominator = map_
-    found: dict[str, HypersurfaceForm] = {}
+    by_text: dict[str, HypersurfaceForm] = {}
     for factor, _ in factored(denominator):
         if not is_infinity(factor):
-            found[str(factor)] = HypersurfaceForm(factor, True, 0)
+            by_text[str(factor)] = HypersurfaceForm(factor, True, 0)
     if map_.degree <= 1:
-        return list(found.values()), 0
+        return list(by_text.values()), 0
     critical_degree = len(forms) * (map_.degree - 1)
     critical = _critical_factors(forms, critical_degree)
     if critical is None:
         infinity = forms[0].context().gens()[-1]
-        poles = [HypersurfaceForm(one.form, one.is_pole, None) for one in found.values()]
+        poles = [HypersurfaceForm(form.form, form.divides_denominator, None) for form in by_text.values()]
         return [*poles, HypersurfaceForm(infinity, False, None)], None
     for factor, multiplicity in critical:
-        found[str(factor)] = HypersurfaceForm(factor, str(factor) in found, multiplicity)
-    return list(found.values()), critical_degree
+        by_text[str(factor)] = HypersurfaceForm(factor, str(factor) in by_text, multiplicity)
+    return list(by_text.values()), critical_degree
 
 
 def followed_forms(
     map_: HomogeneousMap, among: list[HypersurfaceForm], stage: int = 0
 ) -> tuple[list[HypersurfaceForm], list[HypersurfaceForm]]:
     """The forms that a map contracts, and those in the common factor of the minors of its equation."""
-    contracted = [replace(one, stage=stage) for one in among if one.multiplicity]
+    contracted = [replace(form, stage=stage) for form in among if form.multiplicity]
     common = [] if map_.factor.is_constant() else factored(map_.factor)
     return contracted, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in common]
 
@@ -100,25 +100,28 @@ def followed_map_by_map(
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
-    letters = [homogeneous_map(one) for one in map_.at(eps).factors[:period]]
+    letters = [homogeneous_map(factor) for factor in map_.at(eps).factors[:period]]
     several = [written(letter) for letter in letters]
     if any(degree is None for _, degree in several):
         return None
     both = [
-        followed_forms(letter, found, k) for k, (letter, (found, _)) in enumerate(zip(letters, several, strict=True))
+        followed_forms(letter, hypersurfaces, k)
+        for k, (letter, (hypersurfaces, _)) in enumerate(zip(letters, several, strict=True))
     ]
     critical = [form for part, _ in both for form in part]
     excess = [form for _, part in both for form in part]
     limits = replace(limits, shown=min(limits.shown * period, limits.reach))
-    found = []
+    hypersurfaces = []
     for stage, (own, _) in enumerate(several):
-        for one in own:
-            if not one.multiplicity or limits.budget.is_spent:
+        for factor in own:
+            if not factor.multiplicity or limits.budget.is_spent:
                 continue
-            text = name_of(one.form, map_)
+            text = name_of(factor.form, map_)
             progress(f"following {text[:40]}")
-            found.append(outcome_of(map_, eps, one, text, rng, limits, Tracking(critical, excess, stage, period)))
-    return Word(tuple(letter.degree for letter in letters), len(equations) // period), found
+            hypersurfaces.append(
+                outcome_of(map_, eps, factor, text, rng, limits, Tracking(critical, excess, stage, period))
+            )
+    return Word(tuple(letter.degree for letter in letters), len(equations) // period), hypersurfaces
 
 
 def is_long(map_: Map) -> bool:
@@ -129,13 +132,13 @@ def is_long(map_: Map) -> bool:
 
 
 def _is_short(size: int, degree: int) -> bool:
-    """Whether a form in so many variables, of this degree, has few enough terms to be expanded."""
+    """Return whether a form in this number of variables, of this degree, has few enough terms to be expanded."""
     return comb(degree + size - 1, size - 1) <= _MAX_TERMS
 
 
 def period_of(equations: tuple[Equation, ...]) -> int:
     """The number of maps after which a word repeats itself, a divisor of its length."""
-    known = [(one.exponents, one.terms) for one in equations]
+    known = [(equation.exponents, equation.terms) for equation in equations]
     size = len(known)
     return next(k for k in range(1, size + 1) if size % k == 0 and known[k:] == known[: size - k])
 
@@ -153,13 +156,13 @@ def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | 
     finite = factors_at_finite_points(forms)
     if finite is None:
         return None
-    found = []
+    factors = []
     for factor, k in finite:
         total = degree_in(factor, size)
         terms = {(*m[: size - 1], total - sum(m[:size]), *m[size:]): c for m, c in factor.terms()}
-        found.append((context.from_dict(terms), k))
+        factors.append((context.from_dict(terms), k))
         degree -= k * total
-    return [*found, (infinity, degree)] if degree else found
+    return [*factors, (infinity, degree)] if degree else factors
 
 
 def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
@@ -200,6 +203,8 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
             raise TooLarge("the determinant of the affine map is too large")
 
     try:
+        # Shortest rows first: minors of the first rows are factors in all further products. The order changes the sign
+        # only, which no factor depends on.
         rows.sort(key=lambda row: sum(len(entry) for entry in row if entry is not None))
         determinant = kernel_minors(rows, counted_product, require_few)[-1]
     except TooLarge:
@@ -233,16 +238,16 @@ def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) 
     are multiplied out, where forms are large, and at an eps where a polynomial is reducible.
     """
     names: dict[int | None, dict[str, str]] = {}
-    found = []
-    for one in hypersurfaces:
-        if one.stage not in names:
-            names[one.stage] = _named(map_, eps, one.stage)
-        found.append(replace(one, generic=names[one.stage].get(one.polynomial, "")))
-    return tuple(found)
+    named = []
+    for hypersurface in hypersurfaces:
+        if hypersurface.stage not in names:
+            names[hypersurface.stage] = _named(map_, eps, hypersurface.stage)
+        named.append(replace(hypersurface, generic=names[hypersurface.stage].get(hypersurface.polynomial, "")))
+    return tuple(named)
 
 
 def _named(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
-    """The polynomials over Q[eps] of what a map, or that of this number in a word, contracts, by those at one eps."""
+    """Find the polynomials over Q[eps] of the hypersurfaces that a map contracts, from those at one eps."""
     variables = map_.variables
     if map_.symbols or "eps" in variables or "Z" in variables:
         return {}
@@ -258,7 +263,7 @@ def _named(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
     n, at_eps, forms = len(variables), ring((*variables, "Z")), forms_over_eps(rows)
     size = max(degree_in(form, n + 1) for form in forms) - 1
     factors = (_critical_factors(forms, (n + 1) * size) or []) if size > 0 else []
-    affine, found = ring((*variables, "eps")), {}
+    affine, named = ring((*variables, "eps")), {}
     for factor, _ in factors:
         if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
             continue
@@ -266,8 +271,8 @@ def _named(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
         parts = factored(value)
         if len(parts) == 1 and parts[0][1] == 1:
             text = format_polynomial(affine.from_dict({(*m[:n], m[-1]): c for m, c in factor.terms()}))
-            found[name_of(parts[0][0], map_)] = text
-    return found
+            named[name_of(parts[0][0], map_)] = text
+    return named
 
 
 def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None) -> list[fmpq_mpoly]:

@@ -296,6 +296,8 @@ class _Search:
         equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self.budget)
         equations = [*part.equations, *(normal_form(p, part.equations) for p in equations)]
         gens = part.values[0].context().gens()
+        # New coordinates in which the equations have few unknowns each. Only at the first level: later parts have
+        # equations of their own, which would have to be transformed as well.
         T = decoupling(equations, len(gens))
         if T is not None and level == 0:
             zero = gens[0].context().constant(0)
@@ -383,10 +385,10 @@ def find_commuting(
     Raises InputError for other maps, and where `commuting_systems` does.
 
     >>> from kahanmaps.documents.inline import System
-    >>> found = find_commuting(System("x' = a*x^2; y' = y^2", a="root of t^2 - 2").map)
-    >>> [g.rhs for g in found.solutions]
+    >>> systems = find_commuting(System("x' = a*x^2; y' = y^2", a="root of t^2 - 2").map)
+    >>> [g.rhs for g in systems.solutions]
     [['0', '0'], ['x^2*a', 'y^2'], ['-x^2*a', '-y^2']]
-    >>> [[g.rhs for g in family.directions] for family in found.families]
+    >>> [[g.rhs for g in family.directions] for family in systems.families]
     [[['x^2*a', 'y^2'], ['2*x^2', '0'], ['x^2*a', '0'], ['0', 'y^2*a']]]
     """
     options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "effort": effort, "progress": progress}
@@ -428,6 +430,6 @@ def find_commuting(
             replace(family, base=over_field(family.base), directions=tuple(map(over_field, family.directions)))
             for family in result.families
         ],
-        irrational=[],  # such solutions are not over the field either, but over extensions of it
+        irrational=[],  # such solutions are not over the field either, but over its extensions
         root=str(given.root),
     )

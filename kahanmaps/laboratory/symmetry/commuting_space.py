@@ -29,14 +29,14 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 SHAPES = ("linear", "quadratic")
 MAX_DIMENSION = 100  # of a space whose basis is kept and verified
-MAX_UNKNOWNS = 900  # a matrix of so many rows and columns takes seconds
+MAX_UNKNOWNS = 900  # a square matrix of this size takes seconds
 
 # A vector of power series in eps: series[k][i] is the coefficient of eps^k in coordinate i.
 Series = list[list[Any]]
 
 
 def coefficients_of(system: QuadraticSystem) -> list[list[fmpq]]:
-    """For each component the coefficients of x_j x_k (j <= k), of x_j, and the constant, in this order.
+    """Return for each component the coefficients of x_j x_k (j <= k), of x_j, and the constant, in this order.
 
     >>> coefficients_of(QuadraticSystem.from_text(["x", "y"], ["x*y", "x - 2"]))
     [[0, 1, 0, 0, 0, 0], [0, 0, 0, 1, 0, -2]]
@@ -79,11 +79,12 @@ def commutator_equations(
     rng: random.Random,
     budget: Budget,
 ) -> list[fmpq_mpoly]:
-    """Equations that hold for b if the Kahan maps of f and g = sum `weights[i]` `basis[i]` commute for every eps.
+    """Return equations that hold for b if the Kahan maps of f and g = sum `weights[i]` `basis[i]` commute for every
+    eps.
 
     `weights` are polynomials in b. Exact: coefficients of eps^2, ..., eps^order of the commutator at small random
-    integer points, as many until two in a row bring nothing new, or the `budget` is spent. Returns linearly independent
-    polynomials in b. Source: kahan-1993.
+    integer points, until two consecutive points give no new equation or the `budget` is spent. Returns linearly
+    independent polynomials in b. Source: kahan-1993.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
@@ -93,17 +94,17 @@ def commutator_equations(
     n = f.dim
     of_f = _Terms(coefficients_of(f), n)
     of_g = _Terms(combination(basis, weights, weights[0].context().constant(0)), n)
-    found: list[fmpq_mpoly] = []
+    equations: list[fmpq_mpoly] = []
     idle = 0
     while idle < 2 and not budget.is_spent:
         point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
         x: Series = [point, *([fmpq(0)] * n for _ in range(order))]
         left, right = of_f.step(of_g.step(x)), of_g.step(of_f.step(x))
         new = [a - b for u, v in zip(left, right, strict=True) for a, b in zip(u, v, strict=True)]
-        spanned = independent([*found, *(p for p in new if isinstance(p, fmpq_mpoly))])
-        idle = idle + 1 if len(spanned) == len(found) else 0
-        found = spanned
-    return found
+        spanned = independent([*equations, *(p for p in new if isinstance(p, fmpq_mpoly))])
+        idle = idle + 1 if len(spanned) == len(equations) else 0
+        equations = spanned
+    return equations
 
 
 class _Terms:
@@ -116,6 +117,8 @@ class _Terms:
 
     def step(self, y: Series) -> Series:
         """y + 2 eps v with v = g(y) + eps g'(y) v, order by order."""
+        # A further coordinate 1 makes g homogeneous. In eps g'(y) v only lower orders of v occur, so that v is computed
+        # without solving a linear system.
         y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
         v: Series = []
         terms_of = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
@@ -151,13 +154,14 @@ class CommutingSpace:
 
 
 def unknowns(system: QuadraticSystem, shape: str) -> int:
-    """How many coefficients the space is looked for in."""
+    """The number of coefficients among which the space is computed."""
     n = system.dim
     return n * len(_independent_components(system)) if shape == "linear" else n * (n + 1) * (n + 2) // 2
 
 
 def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat | None = None) -> CommutingSpace:
-    """All g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"). Exact; f is not zero.
+    """Compute all g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"). Exact; f is not
+    zero.
 
     With a matrix C, for which C f' = f' C, only those g with C g' = g' C.
 
@@ -228,10 +232,10 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
             flat = fmpq_mat([[e for row in coefficients_of(g) for e in row] for g in [*fields, f]]).transpose()
             (relation,) = nullspace(QQ, flat)
             replaced = max(k for k in range(len(fields)) if relation[k] != 0)
-            rest = [k for k in range(len(fields)) if k != replaced]
+            other_indices = [k for k in range(len(fields)) if k != replaced]
             identity = [QQ.identity(n)] if matrices else []
-            found = (f, *(fields[k] for k in rest))
-            return CommutingSpace(found, (*identity, *(matrices[k] for k in rest if matrices)), len(found))
+            basis = (f, *(fields[k] for k in other_indices))
+            return CommutingSpace(basis, (*identity, *(matrices[k] for k in other_indices if matrices)), len(basis))
         needed = len(rows) + 2 * n
 
 
@@ -255,5 +259,5 @@ def _independent_components(f: QuadraticSystem) -> list[int]:
 
 
 def field_at(space: CommutingSpace, weights: Sequence[fmpq]) -> QuadraticSystem:
-    """The field sum weights[i] fields[i]."""
+    """Return the field sum_i weights[i] fields[i]."""
     return system_of(space.fields[0].variables, combination(space.fields, weights, fmpq(0)))

@@ -122,10 +122,10 @@ class Symmetries(PrintableResult):
 
     @property
     def reversing_order(self) -> int:
-        """How many elements of the group take the map to its inverse."""
+        """The number of elements of the group that take the map to its inverse."""
         if self.group_of != MATRICES:
             return sum(t.reversing for t in self.signed)
-        # f is not 0 here, so that none is both, and those that commute with the map are all or half of them
+        # f is not 0, so that no element is of both kinds; all of the group or half of it commutes with the map
         return (self.order or 0) // 2 if any(t.reversing for t in self.generators) else 0
 
     @property
@@ -137,16 +137,16 @@ class Symmetries(PrintableResult):
 
     @property
     def symmetries(self) -> list[Symmetry]:
-        """All finite ones that commute with the map."""
+        """The known symmetries of finite order that commute with the map."""
         return [t for t in (*self.signed, *self.others) if not t.reversing]
 
     @property
     def reversing(self) -> list[Symmetry]:
-        """All finite ones that take the map to its inverse."""
+        """The known symmetries of finite order that take the map to its inverse."""
         return [t for t in (*self.signed, *self.others) if t.reversing]
 
     def rows(self) -> list[dict[str, str]]:
-        """A row for each finite symmetry that is known, for `pandas.DataFrame(symmetries.rows())` and the like."""
+        """A row for each known finite symmetry, for example for `pandas.DataFrame(symmetries.rows())`."""
         return [{"kind": t.kind, "action": t.text} for t in (*self.symmetries, *self.reversing)]
 
     def to_json(self) -> dict[str, Any]:
@@ -232,7 +232,7 @@ def _add_infinitesimal(symmetries: Symmetries) -> None:
 
     symmetries.infinitesimal = [infinitesimal([fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
     scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
-    if f.is_homogeneous:  # S = I, rather than another one
+    if f.is_homogeneous:  # prefer S = I
         symmetries.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
     elif scalings:
         vector = min(scalings, key=lambda v: sum(e != 0 for e in v))
@@ -265,7 +265,7 @@ def _add_signed(symmetries: Symmetries, budget: Budget) -> None:
         )
         return
     symmetries.searched.append("signed permutations, with a translation: all")
-    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 each is both kinds
+    symmetries.order = len({_key(t.S) for t in symmetries.signed})  # for f = 0 each element is of both kinds
     if any(abs(entry) not in (0, 1) for t in symmetries.signed for entry in t.S.entries()):
         symmetries.group_of = SCALED
     symmetries.generators = _generators(symmetries.signed)
@@ -287,9 +287,9 @@ def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
             generators.append(element)
             group = _generated([t.S for t in generators], len(element.r))
     for element in list(generators):
-        rest = [t for t in generators if t is not element]
-        if len(_generated([t.S for t in rest], len(element.r))) == len(group):
-            generators = rest
+        others = [t for t in generators if t is not element]
+        if len(_generated([t.S for t in others], len(element.r))) == len(group):
+            generators = others
     return generators
 
 
@@ -309,7 +309,7 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
 
 
 def _add_general(symmetries: Symmetries, budget: Budget) -> None:
-    """All rational S with f(S x) = sign S f(x), by its polynomial equations."""
+    """Add all rational S with f(S x) = sign S f(x), from the polynomial equations of S."""
     f = symmetries.system
     n = f.dim
     if any(x.is_linear for x in symmetries.infinitesimal):
@@ -400,14 +400,14 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
     solved = solve_system([*equations, gens[-1]], r, budget)
     if not solved.components:
         return None
-    found = solved.components[0].point
-    return found if is_symmetry(f, S, found, sign) else None
+    point = solved.components[0].point
+    return point if is_symmetry(f, S, point, sign) else None
 
 
 def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:
-    """Polynomials in the entries of S that vanish where f(S x) = sign S f(x) for all x.
+    """Return polynomials in the entries of S that vanish if S is invertible and f(S x) = sign S f(x) for all x.
 
-    `S` holds the generators of a ring, row by row. The divergence of f must go along with an invertible S as well:
+    `S` holds the generators of a ring, row by row. The divergence of f must be invariant under an invertible S as well:
     this follows, and is linear in S.
 
     >>> s = ring(["s"]).gens()[0]
@@ -431,7 +431,7 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
 
 
 def is_singular(part: SolutionComponent, n: int) -> bool:
-    """Whether det S = 0 on the whole linear family of n x n matrices, its entries row by row.
+    """Return whether det S = 0 on the complete linear family of n x n matrices, given by its entries row by row.
 
     >>> a = ring(["a"]).gens()[0]
     >>> is_singular(SolutionComponent((a, a, a, a)), 2), is_singular(SolutionComponent((a, a, a, -a)), 2)

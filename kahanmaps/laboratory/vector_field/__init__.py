@@ -1,1 +1,1 @@
-"""What a vector field tells by itself, before its map is looked at: fixed points, and which system it is."""
+"""Properties of a vector field that do not depend on its map: fixed points, and equivalent catalogue systems."""

@@ -33,7 +33,7 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 MAX_DIMENSION = 6  # 720 permutations
 MAX_SCALED = 5  # the largest dimension with scaled permutations; in higher ones Groebner bases may take a minute
-MAX_ORDERS = 24  # tried of the permutations that the monomials allow: these may be all 720
+MAX_ORDERS = 24  # of the permutations that the monomials allow, which may be all 720
 MAX_FRAMES = 6
 _MAX_DEPTH = 4  # unknowns that are set to numbers one after the other if there are infinitely many solutions
 
@@ -93,7 +93,7 @@ def equivalent_system(
     f = file.system
     if f.degree < 2 or f.dim > MAX_DIMENSION or f.digits > LONG_COEFFICIENTS:
         return None
-    if file.name in names():  # it may be one of the catalogue itself
+    if file.name in names():  # the system may be from the catalogue itself
         values = file.parameters if load(file.name).parameters.keys() == file.parameters.keys() else {}
         if load(file.name, values).system.rhs == file.system.rhs:
             return None

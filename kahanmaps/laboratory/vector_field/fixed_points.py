@@ -52,14 +52,14 @@ class FixedPoints:
 
     @property
     def where(self) -> str:
-        """As a phrase: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
+        """A phrase: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
         point = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
         kind = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
         if not self.equations:
             return f"{kind} of fixed points {point}" if self.dimension else f"fixed point {point}"
         size = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""
         size = size or counted(self.count or 0, "fixed point")
-        if len(self.equations) > len(self.coordinates):  # a basis that is not shorter than f = 0
+        if len(self.equations) > len(self.coordinates):  # the basis is not shorter than the equations f = 0
             return f"{size} {point} with f = 0{'' if self.count is None else ', not rational'}"
         return f"{size} {point} with {', '.join(f'{format_polynomial(p)} = 0' for p in self.equations)}"
 
@@ -80,14 +80,14 @@ class FixedPoints:
             eps: an exact number, or None for all but finitely many.
 
         >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
-        >>> [one.are_fixed_by_map(fmpq(1)) for one in fixed_points(pendulum).found]
+        >>> [points.are_fixed_by_map(fmpq(1)) for points in fixed_points(pendulum).found]
         [False, True]
         >>> line = fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "0"])).found[0]
         >>> line.where, line.are_fixed_by_map(None)
         ('line of fixed points (0, y)', None)
         """
         if eps is None:
-            # At one point few eps are zeros of det(I - eps f'); on a set of points with one polynomial as well.
+            # At one point, or on conjugate points, det(I - eps f') = 0 only for a few eps.
             alike = self.dimension == 0 or not any(any(m[1:]) for m in self.eigenvalues.monoms())
             return True if alike else None
         context = self.coordinates[0].context()
@@ -130,9 +130,9 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     >>> print(fixed_points(pendulum))
     fixed point (0, 0), eigenvalues of f': (lambda - 1)*(lambda + 1) = 0
     fixed point (1, 0), eigenvalues of f': lambda^2 + 1 = 0
-    >>> [one.where for one in fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "x^2 - 2*x"])).found]
+    >>> [points.where for points in fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "x^2 - 2*x"])).found]
     ['fixed point (2, 0)', 'line of fixed points (0, y)']
-    >>> [one.text for one in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"])).found]
+    >>> [points.text for points in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"])).found]
     ["2 fixed points (x) with x^2 - 2 = 0, eigenvalues of f': lambda - 2*x = 0"]
     """
     system = as_system(system)
@@ -141,21 +141,21 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     context = ring(system.variables)
     budget = budget_for("fixed points", effort)
     solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), budget)
-    found, undecided = [_on(system, part, []) for part in solved.components], ""
+    components, undecided = [_on(system, part, []) for part in solved.components], ""
     for part in (*solved.conjugate, *solved.unsolved):
         basis = None if part in solved.without_basis else groebner(part.equations, budget)
         if basis is None:
             undecided = solved.reason or (SPENT if budget.is_spent else "a Groebner basis would be too large")
         elif not any(p.is_constant() for p in basis):
-            found.append(_on(system, part, basis))
-    return FixedPointSearch(tuple(found), undecided)
+            components.append(_on(system, part, basis))
+    return FixedPointSearch(tuple(components), undecided)
 
 
 def _on(system: QuadraticSystem, part: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
     """The points of one part, whose equations have this Groebner basis."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     free = sorted({*part.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
-    # As large as the largest set of variables of which no power product is a leading monomial.
+    # The dimension is the largest number of variables of which no power product is a leading monomial.
     sizes = [
         len(some)
         for size in range(len(free) + 1)

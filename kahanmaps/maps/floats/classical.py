@@ -96,6 +96,8 @@ class ClassicalOrbit:
             except np.linalg.LinAlgError:
                 return None
             y = y + change
+            # Corrections stop decreasing at the rounding error, which may exceed the tolerance. A correction that no
+            # longer decreases is accepted if it is small enough.
             size, scale = np.abs(change).max(), np.abs(y).max()
             if size <= _ROUND_OFF * scale or (size >= last and size <= _STALLED * scale):
                 image: FloatArray = x + h * f(y)

@@ -318,7 +318,7 @@ class FloatEnsemble:
         count, _, n = record.shape
         if self._blocks is None:
             return np.ascontiguousarray(record.transpose(0, 2, 1))
-        if n == 1:  # contiguous numbers are multiplied fastest
+        if n == 1:  # multiplying contiguous numbers is fastest
             record = np.ascontiguousarray(record[:, :, 0].T)[None]
         x = _product(self._blocks.out, record)
         return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(count, n, self.system.dim)

@@ -109,7 +109,7 @@ class FloatOrbit:
 
     @property
     def kernel(self) -> str:
-        """Kernel and method: "numpy generic", "numba normal form, 1 thread"."""
+        """A phrase for kernel and method: "numpy generic", "numba normal form, 1 thread"."""
         return self._ensemble.kernel
 
     @property

@@ -138,8 +138,8 @@ def lyapunov_exponents(
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> oscillator = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
-    >>> found = lyapunov_exponents(oscillator, [1, 0], "1/10", 100)
-    >>> bool(np.abs(found.mean).max() < 1e-12), found.ended
+    >>> exponents = lyapunov_exponents(oscillator, [1, 0], "1/10", 100)
+    >>> bool(np.abs(exponents.mean).max() < 1e-12), exponents.ended
     (True, 0)
     """
     eps, steps, transient = (

@@ -79,10 +79,10 @@ loop:
   br i1 %all, label %stepped, label %careful, !prof !0
 careful:
   $careful
-  %asked = xor $m %fine, $true
-  %zero = and $m %asked, $singular
-  %over = and $m %asked, $overflow
-  %close = and $m %asked, $near
+  %repeat = xor $m %fine, $true
+  %zero = and $m %repeat, $singular
+  %over = and $m %repeat, $overflow
+  %close = and $m %repeat, $near
   %ended = or $m %zero, %over
   %dead.more = or $m %dead, %ended
   %code = select $m %zero, $w $codes_singular, $w $codes_overflow

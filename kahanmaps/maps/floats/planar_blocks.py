@@ -76,7 +76,7 @@ class PlanarBlocks:
 
     @property
     def rows(self) -> int:
-        """2m, the number of rows of a state."""
+        """The number of rows of a state, 2m."""
         return len(self.into)
 
     @property
@@ -172,6 +172,7 @@ class _Blocks:
             kappas.append(complex(*_round_to_doubles([kappa.real, kappa.imag])))
             for row, column in zip(into_uv, out_uv, strict=True):
                 into.append(_round_to_doubles([entry.real for entry in row]))
+                # A complex block stands for two conjugate ones, whose sum is twice the real part.
                 out.append(_round_to_doubles([entry.real if real else 2 * entry.real for entry in column]))
                 if not real:
                     into.append(_round_to_doubles([entry.imag for entry in row]))
@@ -312,7 +313,7 @@ def _value(polynomial: fmpq_poly, at: acb) -> acb:
 
 
 def _round_to_doubles(row: Sequence[arb]) -> list[float]:
-    """Round the entries to doubles; entries surely negligible compared with the largest become 0."""
+    """Round the entries to doubles; entries that are certainly negligible compared with the largest become 0."""
     largest = max((abs(entry) for entry in row), key=lambda entry: entry.mid())
     doubles = []
     for entry in row:

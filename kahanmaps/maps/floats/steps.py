@@ -50,8 +50,8 @@ Write = Callable[[Sequence[Any], StepChecks], Sequence[Any]]
 class FloatStep:
     """A step of states with the given number of rows: `write` writes the image of a state, and the checks.
 
-    `careful` maps the rows of a state (arrays) to those of its image and three more, which tell in which orbits the
-    step is near-singular, singular, or an overflow. `fast` has one more row, which tells in which orbits it is valid.
+    `careful` maps the rows of a state (arrays) to those of its image and three more, which say in which orbits the
+    step is near-singular, singular, or an overflow. `fast` has one more row, which says in which orbits it is valid.
     If the fast program has too many operations, there is none; if the careful one has too many (row exchanges fill in
     zeros), `in_arrays` takes its place. Machine code requires both programs.
     """
@@ -321,6 +321,7 @@ def advance_by_numpy(step: FloatStep, batch: BatchState, first: int, steps: int,
                         *image, good = step.fast(*x)
                 except ZeroDivisionError:  # arrays would contain an infinity here
                     image, good = x, False
+                # Orbits for which the fast program does not guarantee the image repeat the step with the careful one.
                 if good is not True and not np.all(good | has_ended):
                     repeat = np.flatnonzero(~(good | has_ended))
                     points_before, points_after = (

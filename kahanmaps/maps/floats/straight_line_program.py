@@ -347,6 +347,7 @@ def solve(rows: Sequence[Sequence[Any]], bound: Callable[[], Any], checks: StepC
 
 def solve_two(rows: Sequence[Sequence[Any]], checks: StepChecks) -> list[Any]:
     """Write the solution of two equations by Cramer's rule; the entries may be complex (`ComplexPair`)."""
+    # The bound for the pivot grows with b c: digits are lost where a d and b c cancel, however large they are.
     (a, b, r), (c, d, s) = rows
     product = b * c
     det = a * d - product

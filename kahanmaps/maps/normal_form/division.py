@@ -16,7 +16,7 @@ from flint import fmpq, fmpq_poly, fmpz_poly
 from kahanmaps.algebra.printing import format_univariate
 from kahanmaps.errors import InputError
 
-MAX_PERIOD = 60  # psi_N has degree about N^2/12
+MAX_PERIOD = 60  # largest N: psi_N has degree about N^2/12
 _GAMMA = fmpz_poly([0, 1])
 
 
@@ -55,7 +55,8 @@ class PeriodicLevels:
         return tuple(sorted(root for root in roots if root != 0 and root != 1))
 
     def squares(self, discriminant: fmpq, eps: fmpq) -> tuple[fmpq, ...]:
-        """For each of `gammas` the square of the value of h/(1 + eps^2 D) on that level, in a plane with this disc(h).
+        """Return for each of `gammas` the square of the value of h/(1 + eps^2 D) on that level, in a plane with this
+        disc(h).
 
         The levels are real where it is positive. Raises InputError for disc(h) = 0 or eps = 0.
 
@@ -63,7 +64,7 @@ class PeriodicLevels:
         (5/729,)
         """
         if discriminant == 0 or eps == 0:
-            raise InputError("found disc(h) = 0 or eps = 0, expected a plane with smooth levels and a step")
+            raise InputError("found disc(h) = 0 or eps = 0, expected a plane with smooth levels and a nonzero eps")
         return tuple((1 - gamma) / (64 * eps**6 * discriminant) for gamma in self.gammas)
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.planes_point import PlanesPoint
     from kahanmaps.maps.normal_form.rational_iterate import OrbitInPlanes
 
-_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is walked around
+_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is iterated completely
 
 
 class NthIterate:
@@ -39,11 +39,11 @@ class NthIterate:
         self.normal_form, self.field = normal_form, field
         self.eps = field.convert(eps)
         if field.characteristic == 2:
-            raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): take another prime", 2)
+            raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): use another prime", 2)
         from kahanmaps.maps.normal_form.splitting import Splitting
 
         self.splitting = Splitting(normal_form.form, field, self.eps, normal_form.T)
-        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last one, with what it is of
+        self._rational: tuple[Any, OrbitInPlanes] | None = None  # the last orbit, with its arguments
 
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
@@ -86,11 +86,11 @@ class NthIterate:
         from kahanmaps.maps.normal_form.planar_block import same_point
         from kahanmaps.maps.normal_form.rational_iterate import stepped_over
 
-        # Over a small finite field orbits soon come back or meet a pole.
+        # Over a small finite field orbits soon close or meet a pole.
         point = start
         for k in range(1, n + 1):
             if k > _CYCLE:
-                raise InputError(f"the iterate {n} cannot be reached directly here: take fewer steps or another prime")
+                raise InputError(f"the iterate {n} cannot be reached directly here: use fewer steps or another prime")
             point = stepped_over(block, point, 1)
             if same_point(point, start):
                 return stepped_over(block, start, n % k)

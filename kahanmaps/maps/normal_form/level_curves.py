@@ -37,11 +37,11 @@ class Jacobian:
 
     @staticmethod
     def negative(P: AffinePoint | None) -> AffinePoint | None:
-        """-P."""
+        """Return -P."""
         return None if P is None else (P[0], -P[1])
 
     def add(self, P: AffinePoint | None, Q: AffinePoint | None) -> AffinePoint | None:
-        """P + Q."""
+        """Return P + Q; None is the point at infinity, the zero of the group."""
         if P is None or Q is None:
             return Q if P is None else P
         if P[0] != Q[0]:
@@ -60,15 +60,15 @@ class Jacobian:
 
 
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
-    """The order of T over GF(q), or the field of q elements that is given; gamma is not 0 or 1.
+    """Return the order of T over GF(q), or over the field `context` of q elements; gamma is not 0 or 1.
 
-    A number k with k T = 0 is sought among those |k - q - 1| <= 2 sqrt(q), one of which is the number of points. In a
-    large field that is found modulo a product of small primes first (schoof.py). Then k is freed of the primes that it
-    can do without.
+    A number k with k T = 0 is searched among those with |k - q - 1| <= 2 sqrt(q); the number of points is one of them
+    (Hasse). In a large field the number of points is computed modulo a product of small primes first (schoof.py).
+    Finally k is divided by all prime factors that the order of T does not need.
     """
     curve = Jacobian(gamma)
     radius, middle, unit = isqrt(4 * q), q + 1, 1
-    if q < 1000:
+    if q < 1000:  # adding T until it vanishes is faster than a search, and needs no Hasse interval
         point, order = curve.add(curve.T, None), 1
         while point is not None:
             point, order = curve.add(point, curve.T), order + 1
@@ -77,6 +77,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
         field = fq_default_ctx(q, 1) if context is None else context
         a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, 64 * gamma * gamma))
         trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
+        # The representative of the trace that is closest to 0: then all candidates are near `middle`.
         middle -= trace if 2 * trace <= unit else trace - unit
     k = _annihilator(curve, middle, unit, radius // unit + 2)
     for factor, exponent in fmpz(k).factor():
@@ -88,9 +89,9 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
 
 
 def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
-    """Some k > 0 with k T = 0, where one is `middle` + m `unit`, |m| <= `radius`.
+    """Return some k > 0 with k T = 0; one of them must be `middle` + m `unit` with |m| <= `radius`.
 
-    m is sought as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
+    m is written as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
     """
     babies, step = isqrt(radius) + 2, curve.multiple(unit, curve.T)
     index: dict[Any, tuple[int, Any]] = {}
@@ -115,7 +116,7 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
 
 
 class LevelCubic:
-    """A smooth level cubic above h - below W (W^2 + D), as a group with a point of it for its zero.
+    """A smooth level cubic denominator h - numerator W (W^2 + D), as a group with one of its points as zero.
 
     The sum of points comes from chords and tangents, with no normal form. Its points are triples, not normalised.
     """
@@ -125,7 +126,7 @@ class LevelCubic:
         self._opposite = self.third(zero, zero)
 
     def gradient(self, P: Triple) -> Triple:
-        """The three derivatives at P of F = below h - above W (W^2 + D)."""
+        """Return the three derivatives at P of F = denominator h - numerator W (W^2 + D)."""
         (U, V, W), (p, q, r), block = P, self.block.D, self.block
         along = self.numerator * W
         return (
@@ -138,6 +139,8 @@ class LevelCubic:
 
     def third(self, P: Triple, Q: Triple) -> Triple:
         """The third point of the cubic on the line through P and Q, on the tangent where they are the same."""
+        # The cubic form on a line has four coefficients. With zeros at P and Q two are left, and these are derivatives;
+        # no equation has to be solved.
         if not same_point(P, Q):
             s, t = _dot(self.gradient(P), Q), _dot(self.gradient(Q), P)
             return t * P[0] - s * Q[0], t * P[1] - s * Q[1], t * P[2] - s * Q[2]
@@ -150,11 +153,11 @@ class LevelCubic:
         return t * P[0] - s * X[0], t * P[1] - s * X[1], t * P[2] - s * X[2]
 
     def add(self, P: Triple, Q: Triple) -> Triple:
-        """P + Q."""
+        """Return P + Q."""
         return self.third(self.zero, self.third(P, Q))
 
     def subtract(self, P: Triple, Q: Triple) -> Triple:
-        """P - Q."""
+        """Return P - Q."""
         return self.add(P, self.third(Q, self._opposite))
 
     def multiple(self, n: int, P: Triple) -> Triple:
@@ -174,7 +177,7 @@ class LevelCubic:
         """
         if not self.is_zero(self.multiple(order, P)):
             return False
-        # The number of points of the curve, where T of this order leaves no choice in the Hasse interval.
+        # The number of points of the curve, if the Hasse interval contains only one multiple of the order of T.
         radius = isqrt(4 * q)
         points = -(-(q + 1 - radius) // order) * order
         if points + order <= q + 1 + radius:
@@ -191,7 +194,7 @@ class LevelCubic:
             part, base = self.multiple(order // power, P), self.multiple(order // power, T)
             top, unit = self.multiple(power // prime, base), 1
             while unit < power:
-                # The part is unit (...) and what has been taken off, so far.
+                # `part` is reduced by the digits found so far; `step` runs through the multiples of `top`.
                 cofactor, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
                 while not same_point(cofactor, step):
                     digit, step = digit + 1, self.add(step, top)

@@ -6,7 +6,7 @@ points of a level. Over a field of q elements a multiple of it lies in the Hasse
 steps and giant steps find it, about q^(1/4) of each; in large fields Schoof's algorithm narrows the interval first. The
 period of the orbit is the least common multiple.
 
-The translation goes on where the map does not: through poles, where W = 0. Whether an orbit meets one is decided too.
+The translation is defined also at the poles of the map, where W = 0. Whether an orbit meets a pole is decided too.
 On a smooth level the poles are the points (U : V : 0) with h(U, V) = 0. Without a root of h in the field there are
 none; otherwise the question is whether P - (U : V : 0) is a multiple of T.
 
@@ -35,9 +35,9 @@ from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, transl
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.splitting import Splitting
 
-LARGEST_FIELD = 1 << 192  # of so many elements: it takes a minute or two
-_WALK = 1 << 16  # steps taken where no theorem helps
-_AGREEMENTS = 8
+LARGEST_FIELD = 1 << 192  # elements; a period over such a field takes a minute or two
+_MAX_WALK = 1 << 16  # steps taken where no theorem gives the answer
+_AGREEMENTS = 8  # primes modulo which T has the same order, before this order is tested over the field itself
 
 
 class PeriodKind(StrEnum):
@@ -49,8 +49,8 @@ class PeriodKind(StrEnum):
     TRIANGLE = "a level with delta = 1, three lines"  # Psi^3 multiplies by -8 along a line: 3 ord(-8), over Q none
     VERTEX = "a vertex of the three lines"  # period 3
     AT_POLE = "a pole at the start"  # W (W^2 + D) = 0, a conic and a line: period 4
-    NO_VALUE = "an initial point where the map is not defined"  # a base point of the levels, or disc(h) = 0 there: none
-    STEPPED = "characteristic 2 or 3"  # walked
+    UNDEFINED = "an initial point where the map is not defined"  # a base point of the levels, or disc(h) = 0: no period
+    STEPPED = "characteristic 2 or 3"  # by iteration
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class OrbitPeriod(PrintableResult):
 
     `status` is "periodic", "aperiodic" (proved), "undefined" (the map is not defined at the initial point of a plane
     and cannot be continued there) or "undecided". If `meets_pole` is False, `period` is the exact period of the map
-    itself; if True, the orbit of the map ends at the pole; None: not known.
+    itself; if it is True, the orbit of the map ends at the pole; None: not known.
     """
 
     period: int | None
@@ -126,17 +126,17 @@ def orbit_period(
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
     >>> form = normal_form(random_member_with_eigenvalues([1, -2], seed=7))
-    >>> found = orbit_period(form, "1/10", ["1/2", "-1/3", 0, 1], 2**31 - 1)
-    >>> found.period, found.meets_pole
+    >>> period = orbit_period(form, "1/10", ["1/2", "-1/3", 0, 1], 2**31 - 1)
+    >>> period.period, period.meets_pole
     (85400488827489215, True)
     """
     return period_of(form, eps, start, prime, largest=largest)
 
 
-# Of the kinds for which neither depends on the field: status, period, and whether a pole is met.
+# Status, period, and whether a pole is met, for the kinds for which these do not depend on the field.
 _KNOWN = {
     PeriodKind.FIXED: ("periodic", 1, False),
-    PeriodKind.NO_VALUE: ("undefined", None, True),
+    PeriodKind.UNDEFINED: ("undefined", None, True),
     PeriodKind.AT_POLE: ("periodic", 4, True),
     PeriodKind.VERTEX: ("periodic", 3, False),
 }
@@ -151,7 +151,7 @@ def plane_period(
     name: str = "the plane",
     largest: int = LARGEST_FIELD,
 ) -> PlanePeriod:
-    """The period of (U : V : 1) under Psi of a block over GF(p), or over the extension of it that is given.
+    """Compute the period of (U : V : 1) under Psi of a block over GF(p), or over its extension `context`.
 
     >>> from flint import nmod
     >>> block = PlanarBlock(*(nmod(c, 10007) for c in (1, 0, 2, 1)))
@@ -159,17 +159,18 @@ def plane_period(
     'the plane: period 3347 (a smooth level cubic)'
     """
     q = prime if context is None else int(context.order())
-    if prime <= 3:  # the first return, poles passed over where the formula leads on
+    if prime <= 3:  # the theory of the level cubic excludes 2 and 3: iterate in homogeneous coordinates, through poles
         kind, image, passed = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
-        for step in range(1, min(q * q + q + 1, _WALK) + 1):
+        for step in range(1, min(q * q + q + 1, _MAX_WALK) + 1):
             image = block.image(image)
             if all(entry == 0 for entry in image):
                 return PlanePeriod(name, q, kind, "undefined", None, True, f"not defined after {step} steps")
             passed = passed or bool(image[2] == 0)
             if same_point(image, point):
                 return PlanePeriod(name, q, kind, "periodic", step, passed)
-        return PlanePeriod(name, q, kind, "undecided", None, passed or None, "the start did not come back")
-    kind, gamma = _classify(block, point)
+        reason = f"no return to the initial point within {_MAX_WALK} steps"
+        return PlanePeriod(name, q, kind, "undecided", None, passed or None, reason)
+    kind, gamma = classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
     if kind is PeriodKind.ADDITIVE:
@@ -182,7 +183,7 @@ def plane_period(
         return PlanePeriod(name, q, kind, "periodic", prime, meets_pole)
     at_infinity = poles(block, prime, context)
     if kind is PeriodKind.TRIANGLE:
-        order = prime - 1  # that of -8, when it is freed of what it can do without
+        order = prime - 1  # a multiple of the order of -8; then prime factors that it does not need are removed
         for factor, exponent in fmpz(order).factor():
             for _ in range(exponent):
                 if pow(-8, order // int(factor), prime) != 1:
@@ -195,7 +196,8 @@ def plane_period(
         reason = f"its field has {size} elements, more than {bound}"
         return PlanePeriod(name, q, kind, "undecided", None, None if at_infinity else False, reason)
     order = translation_order(gamma, q, context)
-    # With a pole as zero of the group, T is its image, and the question is whether the point is a multiple.
+    # If a pole is the zero of the group, T is the image of the pole, and the orbit meets the pole if and only if the
+    # point is a multiple of T.
     answers: list[bool | None] = []
     for pole in at_infinity:
         answers.append(LevelCubic(block, *block.level(point), pole).is_multiple(point, block.image(pole), order, q))
@@ -206,14 +208,14 @@ def plane_period(
     return PlanePeriod(name, q, kind, "periodic", order, answers[-1])
 
 
-def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
-    """The kind of a point (U : V : 1) outside characteristics 2 and 3, and gamma if the level is smooth."""
+def classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
+    """Return the kind of a point (U : V : 1) in characteristic 0 or at least 5, and gamma if the level is smooth."""
     numerator, denominator = block.level(point)
     if block.is_zero or (point[0] == 0 and point[1] == 0):
         return PeriodKind.FIXED, None
     disc = block.discriminant
     if denominator == 0:
-        return (PeriodKind.NO_VALUE if numerator == 0 or disc == 0 else PeriodKind.AT_POLE), None
+        return (PeriodKind.UNDEFINED if numerator == 0 or disc == 0 else PeriodKind.AT_POLE), None
     delta = disc * numerator * numerator / (denominator * denominator)
     if delta == 0:
         return (PeriodKind.FIXED if same_point(block.image(point), point) else PeriodKind.ADDITIVE), None
@@ -222,17 +224,14 @@ def _classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
         image = point
         for _ in range(3):
             image = block.image(image)
-        # A base point is no vertex, so that the vertices have images, and (0, 0, 0) is none.
+        # (0, 0, 0) is no point, but `same_point` would accept it: it is the image of a base point, never of a vertex.
         vertex = any(entry != 0 for entry in image) and same_point(image, point)
         return (PeriodKind.VERTEX if vertex else PeriodKind.TRIANGLE), None
     return PeriodKind.SMOOTH, gamma
 
 
-# Poles.
-
-
 def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None) -> list[Triple]:
-    """The points (U : V : 0) with h(U, V) = 0 over GF(p), or over the extension of it that is given.
+    """Return the points (U : V : 0) with h(U, V) = 0 over GF(p), or over its extension `context`.
 
     >>> from flint import nmod
     >>> sorted(poles(PlanarBlock(*(nmod(c, 7) for c in (1, 0, 0, 6))), 7), key=str)
@@ -254,14 +253,11 @@ def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None)
 def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
     """Return whether an orbit reaches a pole, by iteration if the period is not long."""
     image = point
-    for _ in range(min(period, _WALK)):
+    for _ in range(min(period, _MAX_WALK)):
         image = block.image(image)
         if image[2] == 0:
             return True
-    return None if period > _WALK else False
-
-
-# Over the rationals.
+    return None if period > _MAX_WALK else False
 
 
 def period_of(
@@ -274,8 +270,8 @@ def period_of(
 ) -> OrbitPeriod:
     """Compute the period of the orbit of `start`, in the coordinates of the system, modulo a prime or (None) over Q.
 
-    `normal_form` is that of the system (family.system_normal_form) or, where the coordinates are its own, of a member;
-    otherwise like `orbit_period` and `period_over_rationals`.
+    `normal_form` is that of the system (family.system_normal_form) or, where the coordinates are its own, of a member.
+    The other arguments and the results are those of `orbit_period` and `period_over_rationals`.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
@@ -293,7 +289,7 @@ def period_of(
             planes.append(plane_period_over_rationals(plane.block, triple, name=plane.name))
         else:
             planes.append(plane_period(plane.block, triple, prime, plane.context, name=plane.name, largest=largest))
-    # Of the planes, the worst speaks.
+    # The orbit is periodic only if it is in every plane; otherwise the worst status of a plane is that of the orbit.
     statuses, poles_met = [plane.status for plane in planes], [plane.meets_pole for plane in planes]
     worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
     return OrbitPeriod(
@@ -307,7 +303,7 @@ def period_of(
 def period(
     system: SystemLike, start: Sequence[Any], eps: Any = None, prime: int | None = None, *, time_step: Any = None
 ) -> OrbitPeriod:
-    """The period of an orbit of the Kahan map of a system that has a normal form: see `period_of`.
+    """Compute the period of an orbit of the Kahan map of a system that has a normal form: see `period_of`.
 
     Raises InputError where it has none, with the reason.
 
@@ -322,7 +318,7 @@ def period(
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:
-    """The period over Q of the orbit of `start` under the Kahan map at `eps` (the time step is 2 eps), or a proof
+    """Compute the period over Q of the orbit of `start` under the Kahan map at `eps` (the time step is 2 eps), or prove
     that there is none.
 
     Reduction modulo an unramified odd prime of good reduction is injective on torsion. So T has infinite order if it
@@ -344,7 +340,7 @@ def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str 
     >>> plane_period_over_rationals(block, (fmpq(-1, 3), fmpq(-1, 3), fmpq(1))).text
     'the plane: period 5 (a smooth level cubic; 5 T = 0)'
     """
-    kind, gamma = _classify(block, point)
+    kind, gamma = classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, 0, kind, *_KNOWN[kind])
     if kind is not PeriodKind.SMOOTH:
@@ -381,7 +377,7 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
 
 
 def _reductions(gamma: Any) -> Iterator[tuple[int, Any, fq_default_ctx | None]]:
-    """Unramified primes above 100 with gamma modulo each, in the smallest residue field there is above the prime."""
+    """Yield unramified primes above 100 with gamma modulo each, in the smallest residue field above the prime."""
     modulus = None if isinstance(gamma, fmpq) else gamma.field.chi
     element = gamma if modulus is None else gamma.polynomial
     denominator = element.q if modulus is None else element.denom() * modulus.denom()

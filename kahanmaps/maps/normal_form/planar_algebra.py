@@ -6,7 +6,7 @@ root of g and long at another. So a value is multiplied by a short element of th
 bad part; LLL finds such an element, with the lengths at the roots as weights. The choice is arbitrary, since the
 product of value and scale is exact.
 
-A point (U : V : W) is converted to rational numbers as U W'/N and V W'/N with N = W W', the norm of W.
+A point (U : V : W) has the rational coordinates U W'/N and V W'/N, where N = W W' is the norm of W.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, content, over_
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
-_SHORT = 1 << 20  # bad parts below it stay, and so do lengths that differ by less
-_LEAST = arb(2) ** -50  # of the lengths at the roots, against the greatest
+_SHORT = 1 << 20  # a value with a smaller bad part, and lengths at the roots within this factor, counts as short
+_LEAST = arb(2) ** -50  # smallest length at a root that is used, relative to the greatest
 
 
 class AlgebraBlock(LevelBlock):
@@ -36,7 +36,7 @@ class AlgebraBlock(LevelBlock):
 
     @cached_property
     def bad(self) -> fmpz:
-        """An integer with all primes at which the lifts of start and image may not be primitive, and all small ones."""
+        """An integer with all primes at which lifts of start and image may be imprimitive, and all small primes."""
         assert self.level is not None
         cubic, g = self.block, self.algebra.chi
         disc = cubic.discriminant
@@ -60,7 +60,7 @@ class AlgebraBlock(LevelBlock):
 
     @property
     def primes(self) -> list[fmpz]:
-        """Numbers with primes at which a sum of coordinates may cancel that does not elsewhere."""
+        """Numbers whose prime factors include all those at which a sum of coordinates may cancel."""
         return [self.bad]
 
     def bits(self, triple: Triple) -> tuple[int, int]:
@@ -78,10 +78,11 @@ class AlgebraBlock(LevelBlock):
         return int(self.algebra.degree**2 * (largest.bit_length() + self.algebra.degree + 3))
 
     def fraction(self, triple: Triple) -> tuple[list[fmpz], fmpz, fmpz]:
-        """Numerators of the coefficients of U/W and V/W, the denominator, and an integer whose primes may cancel.
+        """Return numerators of the coefficients of U/W and V/W, the denominator, and an integer whose primes may
+        cancel.
 
-        Outside the bad primes and those of the third number there is one prime ideal of degree 1 above a prime of the
-        denominator. Where W is no number, the start has to have a level.
+        A prime of the denominator that is neither bad nor a divisor of the third number has exactly one prime ideal of
+        degree 1 above it that divides W. If W is not rational, the start must have a level.
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
@@ -100,15 +101,15 @@ class AlgebraBlock(LevelBlock):
             shifted = shifted * algebra.generator
         numerators = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
         coprime_part, part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
-        common = common_part(
-            [norm.p, *numerators], self.bad**4 * part
-        )  # taken out once rather than from every coordinate
+        # One common factor for all coordinates: reducing each fraction on its own would cost as many gcds.
+        common = common_part([norm.p, *numerators], self.bad**4 * part)
         return [entry // common for entry in numerators], norm.p // common, coprime_part
 
     def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
-        """A number with the primes at which form and denominator may cancel; None if they may at all.
+        """Return a number whose primes are those at which form and denominator may cancel; None if all primes may.
 
-        The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K.
+        The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K: the elements of the dual basis of
+        1, t, ..., t^(n-1) with respect to the trace have the denominator g'(t) (Euler).
         """
         g, degree = self.algebra.chi, self.algebra.degree
         dual = [self.algebra.convert(fmpq_poly([g[j] for j in range(k + 1, degree + 1)])) for k in range(degree)]
@@ -124,14 +125,14 @@ class AlgebraBlock(LevelBlock):
 
     @staticmethod
     def shortest(triple: Triple) -> Triple:
-        """The triple with W = 1."""
+        """Return the triple divided by W; unchanged if W = 0."""
         U, V, W = triple
         return triple if W == 0 else (U / W, V / W, W / W)
 
     integral = shortest  # of a triple over K
 
     def residue_map(self, prime: int) -> Callable[[EtaleElement], nmod] | None:
-        """A homomorphism to the residues modulo a prime, None where g has no root there."""
+        """Return a homomorphism from K to GF(p) (denominators without p); None if g has no root modulo p."""
         g = nmod_poly([int(c.p) for c in self.algebra.chi.coeffs()], prime)
         root = next((-factor[0] / factor[1] for factor, _ in g.factor()[1] if factor.degree() == 1), None)
         if root is None:
@@ -155,23 +156,23 @@ class ShortElements:
     def __init__(self, algebra: EtaleAlgebra, bad: fmpz) -> None:
         self._algebra, self._power = algebra, bad**3
         roots: Any = algebra.chi.complex_roots()
-        # Balls: roots may be beyond the range of doubles.
+        # Complex balls and no floating-point numbers: roots may exceed their range.
         self._powers = [[root**k for k in range(algebra.degree)] for root, _ in roots if not root.imag < 0]
 
     def split(self, value: EtaleElement) -> tuple[EtaleElement, EtaleElement]:
-        """A value, not zero: short element and scale."""
+        """Write a value that is not zero as the product of a short element and a scale."""
         multiplier = self._multiplier(value)
         return (value, self._algebra.one) if multiplier is None else (value * multiplier, 1 / multiplier)
 
     @staticmethod
     def divisor(value: EtaleElement) -> EtaleElement:
-        """Return the divisor for `difference` and `combined`."""
+        """Return the inverse, by which `difference` and `combined` divide."""
         return 1 / value
 
     def difference(
         self, s: EtaleElement, left: EtaleElement, t: EtaleElement, right: EtaleElement, inverse: Any = None
     ) -> tuple[EtaleElement, EtaleElement]:
-        """s left - t right, times the inverse if there is one: short element and scale."""
+        """Return s left - t right, times `inverse` unless it is None, as (short element, scale)."""
         if inverse is not None:
             s, t = s * inverse, t * inverse
         # One reduction modulo g for both products.
@@ -182,7 +183,7 @@ class ShortElements:
         return (value, self._algebra.one) if value == 0 else self.split(value)
 
     def lifts(self, points: Sequence[Triple]) -> tuple[fmpz_mat, fmpz]:
-        """The matrix of (a_1, a_2, a_3) -> sum of a_i P_i on coefficients, times a number; that number."""
+        """Return the integer matrix c M and c, where M maps the coefficients of (a_1, a_2, a_3) to sum a_i P_i."""
         degree = self._algebra.degree
         blocks = [[point[i].matrix.tolist() for point in points] for i in range(3)]
         rows = [[entry for block in row for entry in block[k]] for row in blocks for k in range(degree)]
@@ -191,9 +192,10 @@ class ShortElements:
     def combined(
         self, scales: Sequence[Any], terms: Sequence[Any], lifts: tuple[fmpz_mat, fmpz], inverse: EtaleElement
     ) -> Triple:
-        """The sum of scale times term times lift, times the inverse, times a number that makes it integral.
+        """Return the sum of scale times term times lift, times `inverse` and a number that makes it integral.
 
-        Terms are in Z[t], and so is the triple; its coefficients have nothing in common with the denominators left.
+        Terms and result have coefficients in Z[t]; the coefficients of the result and the remaining denominator are
+        coprime.
         """
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]
@@ -202,9 +204,9 @@ class ShortElements:
         for (factor, denominator), term in zip(factors, terms, strict=True):
             column = fmpz_mat(degree, 1, [entry.p for entry in term.coefficients])
             scaled += (factor * (common_denominator // denominator) * column).entries()
-        matrix, below_lifts = lifts
+        matrix, lifts_denominator = lifts
         entries = (matrix * fmpz_mat(3 * degree, 1, scaled)).entries()
-        common = common_denominator * below_lifts
+        common = common_denominator * lifts_denominator
         for entry in entries:
             common = common.gcd(entry % common)
         integers = [entry // common for entry in entries] if common != 1 else entries
@@ -219,7 +221,7 @@ class ShortElements:
         integers = [(entry * denominator).p for entry in value.coefficients]
         residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))
         part = self._power.gcd(self._algebra.norm(residue).p % self._power)
-        # About the absolute values at the roots.
+        # Midpoints suffice: the lengths only weight the lattice, and the result is multiplied exactly.
         smallest = max(abs(entry) for entry in integers) * _LEAST
         sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
         lengths = [max(smallest, abs(value).mid()) for value in sums]
@@ -251,7 +253,7 @@ class ShortElements:
 
 @lru_cache
 def _signs(count: int) -> list[tuple[int, ...]]:
-    """Vectors of up to four 1 and -1, else 0, up to sign, those with few entries first."""
+    """Return the vectors with at most four entries 1 or -1 and zeros otherwise, up to sign, fewest entries first."""
     vectors = []
     for entries in range(1, min(count, 4) + 1):
         for positions in combinations(range(count), entries):

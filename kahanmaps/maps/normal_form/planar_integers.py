@@ -30,7 +30,7 @@ class LevelBlock(ABC):
 
     block: PlanarBlock
     start: Triple
-    table: Any = None  # of tau functions, for points that are taken one after the other
+    table: Any = None  # of tau functions, for consecutive points
 
     @property
     def is_constant(self) -> bool:
@@ -99,7 +99,7 @@ class IntegerBlock(LevelBlock):
 
     @cached_property
     def power(self) -> fmpz:
-        """A power of `bad` with its primes mostly as often as they are in numbers."""
+        """A power of `bad` whose primes have exponents that numbers rarely exceed."""
         return self.bad**3
 
     @cached_property

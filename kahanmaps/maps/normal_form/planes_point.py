@@ -89,7 +89,7 @@ class Assembly:
             forms_by_plane, factor = dict(zip(row.support, row.forms, strict=True)), self.denominator // row.denominator
             table_rows += [entry * factor for i, zero in enumerate(zeros) for entry in forms_by_plane.get(i, zero)]
         self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, over one denominator
-        # By so many bits numerators may be longer than the products of the triples they are made of.
+        # Bits by which numerators may be longer than the products of the triples from which they are computed.
         largest = max(map(abs, table_rows))
         self.excess = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
         self.excess += sum(block.slack for block in blocks)
@@ -152,7 +152,7 @@ class PlanesPoint:
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Return numerator and denominator of each coordinate in lowest terms, denominators positive."""
         planes = [(numerator, W) for numerator, W, _ in self._fractions]
-        suspects = fmpz(1)  # with all primes that divide two of the W
+        suspects = fmpz(1)  # divisible by all primes that divide two of the W
         *others, product = sorted((W for _, W in planes), key=fmpz.bit_length)  # the longest is only reduced
         while others:
             number = others.pop()
@@ -194,7 +194,7 @@ class PlanesPoint:
         return pairs
 
     def _fractions_of(self, planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> list[tuple[fmpz, fmpz]]:
-        """Numerator and denominator of each coordinate, from numerators and W of the planes, or residues of these."""
+        """Return numerators and denominators of all coordinates, from those of the planes or residues."""
         fractions: dict[int, tuple[fmpz, fmpz]] = {}
         rows = self._assembly.rows
         for support, (numbers, forms) in self._assembly.by_support.items():
@@ -220,7 +220,7 @@ def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fm
 
 
 def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
-    """Return a common factor of two numbers and the modulus: all of it, except high powers of primes."""
+    """Return a common factor of two numbers and the modulus: the greatest one, except for high powers of primes."""
     common = modulus.gcd(numerator % modulus)
     return common if common == 1 else common.gcd(denominator % common)
 

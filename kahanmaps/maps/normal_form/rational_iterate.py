@@ -67,7 +67,7 @@ class OrbitInPlanes:
         for step, value in enumerate(steps.points(x)):
             bits = value.exceeding(self._limit)
             if step == 0 or not bits:
-                self._walked.append(value)  # the start is given: the budget is for what is computed
+                self._walked.append(value)  # not charged to the budget, since the initial point is given
             if bits:
                 self._end = OverBudget(step, bits)
                 break
@@ -77,24 +77,24 @@ class OrbitInPlanes:
             if step == _EXACT_STEPS or value.bits > _EXACT_BITS:
                 break
         else:
-            self._end = _no_value(len(self._walked) - 1)
+            self._end = _undefined_step(len(self._walked) - 1)
         self._far = len(self._walked) - 1  # the last step that is known to be within the budget and before all poles
 
     def value(self, n: int) -> PlanesPoint:
-        """Phi^n(start). Raises SingularStep or OverBudget, whichever an orbit that is stepped comes to first."""
+        """Return Phi^n(start). Raises SingularStep or OverBudget, whichever occurs at an earlier step."""
         if n < len(self._walked):
             return self._walked[n]
         if self._end is not None:
             raise self._end
         if self._period is not None:
             return self._walked[n % self._period]
-        step, value, bits = self._sighted(n)
+        step, value, bits = self._step_within_budget(n)
         pole = self._first_pole(step, value)
         if pole is not None:
             preimage = self._point(pole - 1)
             if excess_bits := preimage.exceeding(self._limit):
                 raise OverBudget(pole - 1, excess_bits)
-            raise _no_value(pole - 1)
+            raise _undefined_step(pole - 1)
         if bits != 0:
             raise OverBudget(step, bits)
         if value is None:
@@ -102,8 +102,8 @@ class OrbitInPlanes:
         self._far = max(self._far, n)
         return value
 
-    def _sighted(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
-        """Step n, its value and 0; or a step before it that is over the budget, and the bits there (None: not known).
+    def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
+        """Return (n, value, 0), or for an earlier step over the budget that step, None and its bits (None: not known).
 
         The value is None if it was not computed, or is at a pole.
         """
@@ -120,29 +120,29 @@ class OrbitInPlanes:
                 return target, value, bits
             current = target, value.bits
             if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
-                # At four times the budget, by a line, it certainly is over.
+                # Linear extrapolation: at four times the budget it is certainly exceeded.
                 beyond = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
                 if beyond <= min(n - target, _MAX_MODULAR_STEPS):
                     return target + beyond, None, None
             previous = current
-            # Four times the size is borne, but not more: heights may grow like n^2.
+            # Heights may grow like n^2: the step is doubled only if four times the size is within the limit.
             target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
 
     def _point(self, n: int) -> PlanesPoint:
         """Return Phi^n(start), ignoring poles at earlier steps. Raises SingularStep if step n is a pole."""
         triples = [_reached(block, plane.reduced(n)) for block, plane in zip(self._blocks, self._planes, strict=True)]
         if any(W == 0 for _, _, W in triples):
-            raise _no_value(n - 1)
+            raise _undefined_step(n - 1)
         return PlanesPoint(self._assembly, triples)
 
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
         """Return the first undefined step up to n; `value` is the n-th point, to be compared modulo a prime."""
         known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
-        busy = [i for i, plane in enumerate(self._planes) if not plane.lazy]
+        undecided_planes = [i for i, plane in enumerate(self._planes) if not plane.lazy]
         generator = random.Random()
         for _ in range(_PRIMES):
             poles: list[int] = []
-            for i in busy:
+            for i in undecided_planes:
                 block, residue = self._blocks[i], None
                 while residue is None:  # a homomorphism to the residues modulo a random prime
                     residue = block.residue_map(random_prime(generator))
@@ -170,7 +170,7 @@ def _halved(n: int, step: int) -> int:
     return n
 
 
-def _no_value(step: int) -> SingularStep:
+def _undefined_step(step: int) -> SingularStep:
     return SingularStep(f"the map is not defined at step {step}")
 
 
@@ -184,9 +184,9 @@ class _Plane:
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
         period = plane_period_over_rationals(block, start)
         self.period = period.period
-        self.lazy = period.period is not None or period.kind in (PeriodKind.ADDITIVE, PeriodKind.NO_VALUE)
+        self.lazy = period.period is not None or period.kind in (PeriodKind.ADDITIVE, PeriodKind.UNDEFINED)
         self.pole: int | None = None
-        if period.kind is PeriodKind.NO_VALUE:
+        if period.kind is PeriodKind.UNDEFINED:
             self.pole = 1
         elif period.kind is PeriodKind.ADDITIVE:
             r = translation.parabolic_ratio(block, start)
@@ -228,7 +228,7 @@ def _reached(block: Block, n: int) -> Triple:
     if n <= _SINGLE_STEPS or block.is_constant or block.level is None:
         points = list(islice(tau.triples(block), n + 1))
         if len(points) <= n:
-            raise _no_value(len(points) - 1)
+            raise _undefined_step(len(points) - 1)
         return points[n]
     point = tau.iterate(block, n)
     if point is not None:

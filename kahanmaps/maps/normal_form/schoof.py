@@ -3,7 +3,7 @@
 For a curve y^2 = c(x) over q elements with q + 1 - t points the Frobenius map F, (x, y) -> (x^q, y^q), satisfies
 F^2 - t F + q = 0. This holds on the points of order l, whose x are the roots of the division polynomial f of degree
 (l^2 - 1)/2: one computes with (x, y) modulo f and y^2 = c, and tries t = 0, ..., l - 1. A number that has no inverse
-modulo f gives a divisor of f, which serves as well. FLINT's polynomials make it fast enough as it is.
+modulo f gives a divisor of f, which replaces f. With FLINT's polynomials this is fast enough.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ class _Torsion:
         elif (Y + T) % f == 0 * f:
             return None
         else:
+            # The points agree modulo some factors of f and are opposite modulo the others: f splits.
             raise _Divisor((Y - T).gcd(f))
         x_sum = (slope * slope % f * self.c - X - Z) % f
         return x_sum, (slope * (X - x_sum) - Y) % f
@@ -66,7 +67,7 @@ def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> A
 
 
 def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int) -> tuple[int, int]:
-    """(t, M): the trace t modulo M of y^2 = x^3 + a2 x^2 + a4 x + a6, M the first product 2 3 5 7 ... >= `bound`.
+    """Return (t, M): the trace t modulo M of y^2 = x^3 + a2 x^2 + a4 x + a6, where M = 2 3 5 7 ... is at least `bound`.
 
     The field has characteristic at least 5.
 
@@ -89,7 +90,7 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
             continue
         f, residue = divisions[prime], None
         while residue is None:
-            torsion = _Torsion(f, c, A)  # which trace fits on the torsion points where f is 0?
+            torsion = _Torsion(f, c, A)  # find the trace that fits on the torsion points with f = 0
             try:
                 once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
                 twice = (pow(once[0], q, f), once[1] * pow(once[1], q, f) % f)
@@ -102,7 +103,7 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
                         break
                 else:
                     if target is not None:
-                        raise AssertionError("no trace of Frobenius fits: it would be a mistake of ours")
+                        raise AssertionError("no trace of Frobenius fits: please report this")
                     residue = 0
             except _Divisor as smaller:
                 f = smaller.divisor
@@ -131,6 +132,8 @@ class _DivisionPolynomials:
     def __getitem__(self, n: int) -> Poly:
         if n not in self._known:
             m, odd = divmod(n, 2)
+            # Psi with an even index is stored without its factor 2 y. In the recurrence of an odd index one of the two
+            # products has four such factors, 16 y^4 = 16 c^2.
             if odd:
                 first_product = self[m + 2] * self[m] * self[m] * self[m]
                 second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]

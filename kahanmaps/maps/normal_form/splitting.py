@@ -28,7 +28,7 @@ class Plane:
 
     `residue` takes the coefficients of an element of K (elements of the field of x) to its value in the plane, and
     `coefficients` takes a value in the plane to `degree` elements of the field of x (two for a complex pair). `context`
-    is FLINT's field of the plane where that is an extension of GF(p), since elements do not tell it.
+    is FLINT's field of the plane where that is an extension of GF(p), since it cannot be read off its elements.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Splitting:
             self.eps = field.convert(eps)
             self._scale = 2 * self.eps
             if self.eps == 0:
-                raise BadPrime(f"eps = 0 in {field}: take another prime", field.characteristic)
+                raise BadPrime(f"eps = 0 in {field}: use another prime", field.characteristic)
             self._inverse = field.convert_matrix(S.inv())
             # The planes, and for each the coefficients in K of the elements that its own coefficients stand for.
             if field is QQ or isinstance(field, PrimeField):
@@ -125,7 +125,7 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
             ring([fmpz(int(field.convert(c))) for c in f.coeffs()] or [0]) for f in (form.chi, *form.coefficients)
         )
         if any(exponent > 1 for _, exponent in chi.factor()[1]):
-            raise BadPrime(f"chi has a repeated root modulo {p}: take another prime", p)
+            raise BadPrime(f"chi has a repeated root modulo {p}: use another prime", p)
         factors = sorted((f for f, _ in chi.factor()[1]), key=lambda f: (f.degree(), [int(c) for c in f.coeffs()]))
     else:
         chi, elements, factors = form.chi, form.coefficients, rational_factors(form.chi)

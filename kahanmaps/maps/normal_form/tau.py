@@ -32,13 +32,13 @@ from kahanmaps.maps.somos import Terms
 
 _BASES = 3
 _FIRST = 2  # below it psi_{n-1} would be zero
-_SHARED = 8  # so many points are taken from one table, which holds some ten times the digits of a point then
+_SHARED = 8  # points taken from one table, which then holds about ten times the digits of a point
 
 
 def triples(block: Any) -> Iterator[Triple]:
     """Yield P_0, P_1, ... like `IntegerBlock.triples`, up to signs, but three times as fast.
 
-    What has to be remembered is less than the points between n/2 and n themselves.
+    The memory needed is less than that of the points between n/2 and n.
     """
     table = table_near(block)
     if table is None:
@@ -113,7 +113,7 @@ class TauTable:
         self._one = gamma * 0 + 1
         self.psi = Terms([self._one * n for n in (1, 2, 3, 4)], self._numbers, gamma=gamma)
         self.chi = Terms([chi[n] for n in (1, 2, 3, 4)], self._numbers, self.psi, gamma)
-        # The three points that span all others, times what the formula multiplies them by.
+        # The three points of which all others are combinations, times the constant factors of the formula.
         self._lifts = self._numbers.lifts([tuple(-2 * entry for entry in P[0]), P[1], P[-1]])
         self._divisor = self._numbers.divisor(self._numbers.split(chi[0])[0])
         self._product: tuple[int, Any] = (0, None)  # n and psi_{n-1} psi_n of the next point

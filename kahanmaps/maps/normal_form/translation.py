@@ -24,9 +24,9 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.tau import first_chi
 
-# Base points that are tried until no small value vanishes that has to be divided by.
+# Base points that are tried until no divisor vanishes.
 _BASES = 12
-_STEPPED = 16  # up to this n one steps
+_STEPPED = 16  # up to this n the point is computed by single steps
 
 
 class NoTranslation(Exception):
@@ -39,7 +39,7 @@ def iterate(
     """Return P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
     `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep where a
-    pole is met before `n`, as far as the orbit is stepped (a few points from the start); NoTranslation where it meets
+    pole is met among the first points, which are stepped one by one; NoTranslation where it meets
     too many special positions.
 
     >>> from kahanmaps.algebra.fields import GF
@@ -59,9 +59,10 @@ def iterate(
         return _parabolic(block, start, n)
     level = numerator / denominator
     gamma = 1 - block.discriminant * level * level
-    if is_zero(gamma):
+    if is_zero(gamma):  # three lines, permuted by Psi: every third point is on the same line
         points = _first_points(block, points, n % 3 + 10, is_zero)
         return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
+    # The formulas divide by values that vanish at special points: then the next base point is tried.
     for base in range(3, _BASES + 3):
         points = _first_points(block, points, base + 3 if inexact else base + 1, is_zero)
         if not inexact:
@@ -128,7 +129,7 @@ def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]
     P, Q = points[0], points[1]
     if same_point(P, Q):
         return P
-    # Coordinates (x, y) stand for x P + y Q, found from two entries of the triples that tell P and Q apart.
+    # Coordinates (x, y) are those of x P + y Q; two entries of the triples in which P and Q are independent give them.
     i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
     determinant = P[i] * Q[j] - P[j] * Q[i]
     (a, b), (c, d) = (
@@ -218,7 +219,7 @@ def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
 
 @lru_cache(maxsize=16)
 def _digits(n: int) -> list[tuple[int, int]]:
-    """Odd digits from -3 to 3 of n > 0, from the highest on, each with the number of binary places to the next.
+    """Yield odd digits from -3 to 3 of n > 0, highest first, each with the number of binary places to the next.
 
     >>> _digits(100)
     [(3, 3), (1, 2)]
@@ -237,7 +238,7 @@ def _doubled(
     block: PlanarBlock, points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[Any], bool]
 ) -> Triple | None:
     """Return P_n relative to the fourth of seven consecutive points, n >= 8; None if a divisor vanishes."""
-    # Lifts that are natural around this base point: the first two of them decide the rest.
+    # Natural lifts around this base point: the first two determine the others.
     P = {-3: points[0], -2: points[1]}
     for k in range(-2, 3):
         denominator = P[k - 1][2]

@@ -80,6 +80,7 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
     rows = [table[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
     solved: list[_Row] = []
     remaining = list(range(n))
+    # The first row with a single new unknown is always a good choice: a row that is solvable now stays solvable.
     while remaining:
         solved_unknowns = {row.unknown for row in solved}
         used = {i: [j for j in range(n) if any(rows[i][j])] for i in remaining}

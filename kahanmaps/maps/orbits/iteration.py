@@ -52,13 +52,13 @@ class OrbitEnd:
     period: int | None = None
 
     @property
-    def is_whole(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether all requested steps were taken."""
         return self.status in ("completed", "periodic")
 
     @property
     def text(self) -> str:
-        """Status and message, without repetition."""
+        """The status with the message, unless the message repeats it."""
         return self.message if self.message.startswith(self.status) else f"{self.status}: {self.message}"
 
     def to_json(self) -> dict[str, Any]:

@@ -27,7 +27,7 @@ class Method:
 
     @property
     def text(self) -> str:
-        """Method and reason in one line."""
+        """A line with the method and the reason for it."""
         return f"method {self.name}: {self.reason}"
 
 
@@ -59,7 +59,7 @@ def choose_method(
     if requested == "doubling" and (at is None or arithmetic == "float"):
         raise InputError("the method doubling is for --at N1,N2,... in exact, mod:P or ball arithmetic")
     if requested == "normal-form" and arithmetic == "mod":
-        raise InputError("modulo P there are the methods generic and doubling")
+        raise InputError("arithmetic mod:P has the methods generic and doubling only")
     if requested is not None:
         return Method(requested, normal_form.text)
     if arithmetic == "float":

@@ -204,8 +204,8 @@ class Trajectory:
     them. `integrals` are functions of x and eps (PhaseFunction) by name, whose values are added to tables and files.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
-    >>> found = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
-    >>> len(found), found[-1].x, found.rows()[0]
+    >>> result = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
+    >>> len(result), result[-1].x, result.rows()[0]
     (4, (1/2,), {'step': 0, 'x': '1/5'})
     """
 
@@ -238,7 +238,7 @@ class Trajectory:
         if self.orbit.end is None:
             _ = self.points
         end: OrbitEnd = self.orbit.end
-        return OrbitEnd("precision", end.steps, self._remark) if self._remark and end.is_whole else end
+        return OrbitEnd("precision", end.steps, self._remark) if self._remark and end.is_complete else end
 
     @cached_property
     def points(self) -> list[OrbitPoint]:
@@ -500,7 +500,7 @@ def _normal_form(
     """Return the normal form, or the reason why none is used."""
     map_, eps = request.map, request.eps
     if method == "generic":
-        return NoNormalForm("not looked for")
+        return NoNormalForm("not computed")
     if not isinstance(map_, KahanFamily) or map_.system.symbols:
         return NoNormalForm(f"it is {map_.kind}")
     if method is None:  # no search for a normal form where it would take longer than the orbit
@@ -509,9 +509,9 @@ def _normal_form(
         if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
             max_steps = max(max_steps, 24)
         if request.steps <= max_steps:
-            return NoNormalForm("not looked for, for so few steps")
+            return NoNormalForm("not computed for so few steps")
         if member is None and map_.dim > _MAX_SEARCH_DIMENSION:
-            return NoNormalForm(f"not looked for in dimension {map_.dim}")
+            return NoNormalForm(f"not computed in dimension {map_.dim}")
     normal_form = system_normal_form(map_.system, hamiltonian, member)
     if isinstance(normal_form, NoNormalForm):
         return normal_form

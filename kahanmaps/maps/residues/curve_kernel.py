@@ -5,7 +5,7 @@ polynomial is an array (2, length). Sums of products stay below 2^53 by the choi
 that they are exact, and are reduced by a product with 1/p: floor((x + 1/2)/p) is right where x/p < 2^36, since
 (x + 1/2)/p is at least 1/(2 p) away from an integer.
 
-The functions are ordinary ones until `kernel` puts what numba makes of them in their place.
+The functions are ordinary Python until `kernel` replaces them by functions compiled by numba.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def kernel() -> Any:
 
 
 def _reduce(x: Any, length: int, p: float) -> None:
-    """Residues, in place."""
+    """Reduce the entries modulo p, in place."""
     r = 1.0 / p
     for part in range(2):
         row = x[part]
@@ -60,13 +60,13 @@ def _add_product(total: Any, a: Any, length_a: int, b: Any, length_b: int, sign:
 
 
 def _clear(a: Any, length: int) -> None:
-    """Zeros, as far as the length."""
+    """Set the first `length` coefficients to zero."""
     for i in range(length):
         a[0, i] = a[1, i] = 0.0
 
 
 def _copy(a: Any, b: Any, length: int) -> None:
-    """b becomes a, as far as the length."""
+    """Copy the first `length` coefficients of a to b."""
     for i in range(length):
         b[0, i], b[1, i] = a[0, i], a[1, i]
 
@@ -85,6 +85,8 @@ def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: flo
     c1 = (u * inverse[1] + v * inverse[0]) % p
     first, d, r = length_a - length_b, nu * c1, 1.0 / p
     b0, b1, x, y = b[0], b[1], a[0], a[1]
+    # s mod p without a division: s is an integer, so that (s + 1/2)/p is at least 1/(2p) away from all integers, more
+    # than the rounding error. Without the 1/2 a multiple of p could be rounded below its quotient.
     for j in range(length_b - 1):
         s = x[first + j] - c0 * b0[j] - d * b1[j]
         t = y[first + j] - c0 * b1[j] - c1 * b0[j]
@@ -155,7 +157,7 @@ def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: fl
 
 
 def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
-    """Minors of the first rows for all sets of columns; those of all rows have the length that is returned."""
+    """Compute the minors of the first rows for all sets of columns; return the length of those of all rows."""
     n = M.shape[0]
     for j in range(n + 1):
         _copy(M[0, j], minors[1 << j], length)
@@ -181,7 +183,7 @@ def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
 
 
 def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, work: Any) -> int:
-    """Divides the polynomials of the curve by their gcd, in place; the length that they have then, 0 for none."""
+    """Divide the polynomials of the curve by their gcd, in place; return their length, 0 if all are zero."""
     a, b, c, common = work[0], work[1], work[2], work[3]
     count = X.shape[0]
     _clear(a, length)

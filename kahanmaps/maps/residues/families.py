@@ -36,7 +36,7 @@ Members = NDArray[np.int64]
 class Family:
     """A map with symbols modulo an odd prime p < 2^13, every coefficient a table over monomials in symbols and eps.
 
-    Raises InputError for what is out of range, BadPrime where the prime divides a denominator.
+    Raises InputError for values out of range, BadPrime if the prime divides a denominator.
     """
 
     def __init__(self, map_: MapFamily, prime: int) -> None:
@@ -126,7 +126,7 @@ class Family:
             step = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
         elif eps is None:
             step = draw.integers(0, p, (2, count))
-            step[0, ~step.any(axis=0)] = 1
+            step[0, ~step.any(axis=0)] = 1  # eps = 0 would be the identity
         else:
             step = np.zeros((2, count), dtype=np.int64)
             step[0] = int(GF(p).convert(eps))
@@ -151,7 +151,7 @@ def _walk_in_flint(
     start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
     degrees: Any,
 ) -> None:  # fmt: skip
-    """Do the same as `walk` of curve_kernel.py, without numba."""
+    """Measure degrees as `walk` of curve_kernel.py does, without numba."""
     modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
     field: Any = fq_default_ctx(modulus=modulus, var="w")
     context: Any = fq_default_poly_ctx(field)

@@ -19,7 +19,7 @@ def matrices_of_associated_fields(o: PaperObjects) -> Pairs:
 
 @claim("Def. 4", "def assoc", "J A f", blockwise=True)
 def associated_field(o: PaperObjects) -> Pairs:
-    """The associated vector field in its three forms
+    """The three forms of the associated vector field agree
     g = J B nabla H_0 = B^T J nabla H_0 = B^T f_0"""
     for B in o.associates():
         g = o.value(o.g(B), o.x)
@@ -30,7 +30,7 @@ def associated_field(o: PaperObjects) -> Pairs:
 
 @claim("Def. 4", "def assoc", "H A", least_m=2)
 def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
-    """The associated field is Hamiltonian, with the combination K of the H_i
+    """The associated field is Hamiltonian with a linear combination K of the H_i
     g = J nabla K, K = alpha H_0 + beta H_1 + gamma H_2"""
     v = o.vector("v")
     for signs in o.all_signs():
@@ -77,7 +77,7 @@ def squares_of_jacobians_agree(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 5, proof", "", "B H", blockwise=True)
 def squares_step_by_step(o: PaperObjects) -> Pairs:
-    """The chains of equalities that prove (31) and (32)
+    """The equalities of the proofs of (31) and (32) hold
     g'g = g'B^T f_0 = B^T g' f_0 = (B^T)^2 f_0' f_0 = f_0' f_0, the same for (g')^2"""
     for B in o.associates():
         BT, gx, dg = B.transpose(), o.value(o.g(B), o.x), o.jac(o.g(B), o.x)
@@ -133,7 +133,7 @@ def A_is_diagonalisable(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 7, proof", "", "A", kind=ClaimKind.EXISTS, distinct_roots=True, symplectic=False)
 def symplectic_normal_form_of_A(o: PaperObjects) -> Pairs:
-    """A is symplectically similar to diag(W, W^T), here over the same field with W a companion matrix
+    """A is symplectically similar to diag(W, W^T), over the same field with W a companion matrix
     A = S diag(W, W^T) S^{-1}, S^T J S = J"""
     S, W = o.symplectic_normal_form()
     yield o.A * S, S * o.doubled(W)
@@ -197,14 +197,14 @@ def characteristic_polynomial_of_B(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 7 (37)", "B sum", "B")
 def sum_of_matrices(o: PaperObjects) -> Pairs:
-    """The sum of the B_i; I for m = 3
+    """The sum of the B_i is (m-2) I, that is I for m = 3
     sum B_i = (m-2) I"""
     yield o.sum([o.B(i) for i in o.each]), o.I * o.number(o.m - 2)
 
 
 @claim("Lemma 7 (38)", "", "B")
 def sums_of_coefficients(o: PaperObjects) -> Pairs:
-    """The same for the coefficients
+    """The sums of the coefficients of the B_i are those of (m-2) I
     sum alpha_i = m-2, sum beta_i = sum gamma_i = 0"""
     for k in range(o.m):
         yield o.sum([o.lagrange(i)[k] for i in o.each]), o.number(o.m - 2 if k == 0 else 0)
@@ -212,7 +212,7 @@ def sums_of_coefficients(o: PaperObjects) -> Pairs:
 
 @claim("(39)", "abc", "A roots")
 def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
-    """The coefficients of chi from traces of powers of A (Newton's identities; every eigenvalue counts half)
+    """The coefficients of chi follow from traces of powers of A (Newton's identities with half the traces)
     a, b, c elementary symmetric: chi = t^3 - a t^2 + b t - c"""
     half = o.number(1, 2)
     sums = [o.trace(o.A_to(k)) * half for k in range(1, o.m + 1)]
@@ -228,7 +228,7 @@ def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
 
 @claim("(40)", "B constr", "B")
 def interpolation(o: PaperObjects) -> Pairs:
-    """The values of the interpolation polynomials
+    """The interpolation polynomials have these values
     B_i(lambda_i) = -1, B_i(lambda_j) = 1"""
     for i in o.free:
         for j in o.each:
@@ -240,7 +240,7 @@ def interpolation(o: PaperObjects) -> Pairs:
 
 @claim("(41)-(43)", "alpha", "B", only_m=3)
 def lagrange_coefficients(o: PaperObjects) -> Pairs:
-    """The coefficients alpha, beta, gamma through the eigenvalues
+    """The eigenvalues determine the coefficients alpha, beta, gamma
     alpha_i = (lambda_i^2 - b)/((l_i - l_j)(l_i - l_k)), ..."""
     b = o.chi[1]
     for i in o.free:
@@ -255,7 +255,7 @@ def lagrange_coefficients(o: PaperObjects) -> Pairs:
 
 @claim("(41)-(43)", "alpha", "B")
 def lagrange_coefficients_for_every_m(o: PaperObjects) -> Pairs:
-    """The general form, with Horner's polynomials C_k of chi
+    """For every m the coefficients are given by Horner's polynomials C_k of chi
     coefficient k of B_i = delta_k0 - 2 C_k(lambda_i)/chi'(lambda_i)"""
     for i in o.free:
         slope, C = o.K.zero, [o.K.zero] * o.m
@@ -269,7 +269,7 @@ def lagrange_coefficients_for_every_m(o: PaperObjects) -> Pairs:
 
 @claim("(44)", "", "B", only_m=3)
 def products_of_matrices(o: PaperObjects) -> Pairs:
-    """The products of the B_i for m = 3
+    """The B_i have these products for m = 3
     B_1 B_2 = B_2 B_1 = -B_3, and cyclic"""
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         yield o.B(i) * o.B(j), -o.B(k)
@@ -278,7 +278,7 @@ def products_of_matrices(o: PaperObjects) -> Pairs:
 
 @claim("(44)", "", "roots A", least_m=2)
 def products_of_matrices_for_every_m(o: PaperObjects) -> Pairs:
-    """The products of the B_i for every m; for m = 3 the right-hand side is -B_k by (37)
+    """The B_i have these products for every m; for m = 3 the right-hand side is -B_k by (37)
     B_i B_j = B_i + B_j - I (i != j)"""
     for i in o.free:
         for j in o.each:
@@ -288,7 +288,7 @@ def products_of_matrices_for_every_m(o: PaperObjects) -> Pairs:
 
 @claim("(45)", "assoc triple", "B", only_m=3)
 def fields_associated_to_an_associated_one(o: PaperObjects) -> Pairs:
-    """The triple of fields associated to g_i, for m = 3
+    """These three fields are associated to g_i for m = 3
     B_1^T g_1 = f_0, B_2^T g_1 = -g_3, B_3^T g_1 = -g_2"""
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         g = o.value(o.g_(i), o.x)
@@ -319,7 +319,7 @@ def trace_part(o: PaperObjects) -> Pairs:
 
 @claim("(48)", "qi", "f")
 def mixed_traces(o: PaperObjects) -> Pairs:
-    """q_i in its two forms
+    """The two forms of q_i agree
     q_i = 1/8 tr (B_i^T f_0'^2) = 1/8 tr (f_0' g_i')"""
     for i in o.free:
         yield o.q(i, o.x), o.trace(o.df * o.jac(o.g_(i), o.x)) * o.number(1, 8)
@@ -342,7 +342,7 @@ def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 8 (50)", "pol f'-g'", "f roots")
 def cayley_hamilton(o: PaperObjects) -> Pairs:
-    """The theorem of Cayley and Hamilton for f_0' - g_i'
+    """f_0' - g_i' satisfies its characteristic equation (Cayley-Hamilton)
     (f_0'-g_i')^{2m} - 1/2 (f_0'-g_i')^{2m-2} tr (f_0'-g_i')^2 = 0"""
     for i in o.free:
         difference = o.df - o.jac(o.g_(i), o.x)
@@ -353,7 +353,7 @@ def cayley_hamilton(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 8, proof", "", "H B", only_m=3)
 def sixth_powers(o: PaperObjects) -> Pairs:
-    """The equation that (50) turns into, and the one after division by f'^4
+    """(50) implies this equation and, after division by f'^4, the next one
     32 f'^6 - 32 B_i^T f'^6 - (8 f'^4 - 8 B_i^T f'^4)(tr f'^2 - tr B_i^T f'^2) = 0"""
     square = o.df * o.df
     fourth = square * square
@@ -366,7 +366,7 @@ def sixth_powers(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 8, proof", "", "H B")
 def sum_of_the_squares(o: PaperObjects) -> Pairs:
-    """The sum over i, equivalent to (46); for m = 3 as printed
+    """The sum over i is equivalent to (46); for m = 3 it is as printed
     64 f'^2 - 8(4-m) tr(f'^2) I - 8 sum tr(B_i^T f'^2) B_i^T = 0"""
     square = o.df * o.df
     right = o.I * (o.number(8 * (4 - o.m)) * o.trace(square))

@@ -32,10 +32,10 @@ Slot = tuple[str, tuple[int, ...]]  # "H" with exponents, "J" with a pair of coo
 def beyond_table(m: int = 3, settings: Settings | None = None) -> Report:
     """Return all statements for all variations in dimension 2m: proved if they hold, refuted if they fail.
 
-    Refuted cells are expected to be, and count as controls. Returns a Report with one Finding a cell; raises InputError
-    as `verify` does.
+    Refuted cells are expected, and count as controls. Returns a Report with one Finding for each cell; raises
+    InputError as `verify` does.
 
-    >>> cells = {found.claim: found for found in beyond_table(1).findings}
+    >>> cells = {result.claim: result for result in beyond_table(1).findings}
     >>> cells["eps^{-1} x^T J^{-1} x~ is conserved by f: H inhomogeneous"].evidence.summary
     'fails for m = 1, H = u1^3 + v1'
     """
@@ -72,12 +72,17 @@ def table(report: Report) -> str:
         if finding.witness is not None:
             left, right = finding.witness.left[0], finding.witness.right[0]
             point = ", ".join(finding.witness.point)
-            lines.append(f"* {finding.claim}: {finding.evidence.summary} at x = ({point}), eps = 1: {left} and {right}")
+            data = finding.evidence.summary.removeprefix("fails for ")
+            variation = VARIATIONS[finding.place["variation"]].title
+            # Formulas are code: * and _ of plain text would become emphasis in Markdown.
+            case = f"`{data}` at `x = ({point})`, `eps = 1`"
+            statement = finding.place["statement"]
+            lines.append(f"* `{statement}`, {variation}: fails for {case}; the sides are `{left}` and `{right}`")
     return "\n".join(lines)
 
 
 def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[str, Witness] | None:
-    """The data in words, and the point with both sides; None where there is none with at most seven ones."""
+    """Return the data as text, and the point with both sides; None if no data with at most seven ones refute it."""
     m, roots, slots, extras = _SMALL[variation]
     for count in range(2, _MAX_ONES + 1):
         for ones in itertools.combinations(slots, count):

@@ -12,14 +12,14 @@ from kahanmaps.systems.quadratic import SystemOver
 
 
 def associated_pairs(o: PaperObjects) -> Iterator[tuple[Any, SystemOver, Any]]:
-    """B, g and x^ for every associated system that is looked at."""
+    """Yield B, g and x^ for every associated system that is tested."""
     for B in o.associates():
         yield B, o.g(B), o.step(o.g(B), o.x)
 
 
 @claim("Theorem 9 (51), (52)", "eq: Phi1", "eps inhomogeneous", blockwise=True)
 def both_maps(o: PaperObjects) -> Pairs:
-    """Both maps in the forms of Section 2
+    """Both maps have the forms of Section 2
     x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, the same for g"""
     yield o.x_tilde, o.solve(o.minus_eps_jac(o.f, o.x), o.x)
     yield o.x_tilde, o.plus_eps_jac(o.f, o.x_tilde) * o.x
@@ -30,7 +30,7 @@ def both_maps(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 9", "th commute", "B H map", blockwise=True)
 def commutativity(o: PaperObjects) -> Pairs:
-    """The Kahan maps of associated vector fields commute, all pairs of the class
+    """The Kahan maps of any two associated vector fields commute
     Phi_f o Phi_g = Phi_g o Phi_f"""
     fields = [(o.f, o.x_tilde), *((g, x_hat) for _, g, x_hat in associated_pairs(o))]
     if len(fields) > 8:  # pairs (f_s, f_t) are pairs (f, f_{st}) of another member: f with all, and neighbours
@@ -44,7 +44,7 @@ def commutativity(o: PaperObjects) -> Pairs:
 
 @claim("(53), (54)", "eq: hat tilde", "map eps inhomogeneous", blockwise=True)
 def compositions(o: PaperObjects) -> Pairs:
-    """The two compositions as products of matrices
+    """The two compositions are products of these matrices
     Phi_g(Phi_f(x)) = (I - eps g'(x~))^{-1} (I + eps f'(x~)) x"""
     for _, g, x_hat in associated_pairs(o):
         first = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde) * o.x)
@@ -55,7 +55,7 @@ def compositions(o: PaperObjects) -> Pairs:
 
 @claim("(55)", "det", "B H", blockwise=True)
 def matrix_equation(o: PaperObjects) -> Pairs:
-    """Commutativity as an identity of matrices, stronger than that of vectors
+    """Commutativity holds as an identity of matrices, which is stronger than that of vectors
     (I - eps g'(x~))^{-1} (I + eps f'(x~)) = (I - eps f'(x^))^{-1} (I + eps g'(x^))"""
     for _, g, x_hat in associated_pairs(o):
         left = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde))
@@ -64,7 +64,7 @@ def matrix_equation(o: PaperObjects) -> Pairs:
 
 @claim("(56)", "det 1", "B H", blockwise=True)
 def matrix_equation_sorted(o: PaperObjects) -> Pairs:
-    """The matrix equation sorted by points
+    """The matrix equation holds with the points sorted
     (I - eps f'(x^)) (I - eps g'(x~))^{-1} = (I + eps g'(x^)) (I + eps f'(x~))^{-1}"""
     for _, g, x_hat in associated_pairs(o):
         left = o.minus_eps_jac(o.f, x_hat) * o.inverse(o.minus_eps_jac(g, o.x_tilde))
@@ -73,7 +73,7 @@ def matrix_equation_sorted(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 9, proof", "", "B H", blockwise=True)
 def inverses(o: PaperObjects) -> Pairs:
-    """The inverses through I - eps^2 f'^2, for g' and for f'
+    """(I - eps^2 f'^2)^{-1} gives the inverses for g' and for f'
     (I - eps g'(x~))^{-1} = (I + eps g'(x~)) (I - eps^2 f'(x~)^2)^{-1}"""
     common = o.inverse(o.one_minus_square(o.f, o.x_tilde))
     yield o.inverse(o.plus_eps_jac(o.f, o.x_tilde)), o.minus_eps_jac(o.f, o.x_tilde) * common
@@ -83,7 +83,7 @@ def inverses(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 9, proof", "", "B H", blockwise=True)
 def matrix_equation_without_inverses(o: PaperObjects) -> Pairs:
-    """The matrix equation without inverses
+    """The matrix equation holds without inverses
     (I - eps f'(x^)) (I + eps g'(x~)) = (I + eps g'(x^)) (I - eps f'(x~))"""
     for _, g, x_hat in associated_pairs(o):
         left = o.minus_eps_jac(o.f, x_hat) * o.plus_eps_jac(g, o.x_tilde)
@@ -107,7 +107,7 @@ def quadratic_terms_cancel(o: PaperObjects) -> Pairs:
 
 @claim("(57)", "aux", "B H", blockwise=True)
 def linear_terms(o: PaperObjects) -> Pairs:
-    """The terms linear in eps
+    """The terms linear in eps agree
     -f'(x^) + g'(x~) = g'(x^) - f'(x~)"""
     for _, g, x_hat in associated_pairs(o):
         left = o.jac(g, o.x_tilde) - o.jac(o.f, x_hat)
@@ -116,7 +116,7 @@ def linear_terms(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 9, proof", "", "eps", blockwise=True)
 def jacobians_at_the_images(o: PaperObjects) -> Pairs:
-    """f' and g' at x^ and at x~, through the constant tensors f'' and g''
+    """The constant tensors f'' and g'' determine f' and g' at x^ and at x~
     f'(x^) = f'(x) + f''(x^ - x) = f'(x) + 2 eps f''(I - eps g')^{-1} g, ..."""
     two_eps = o.number(2) * o.eps
     for _, g, x_hat in associated_pairs(o):
@@ -129,7 +129,7 @@ def jacobians_at_the_images(o: PaperObjects) -> Pairs:
 
 @claim("(58)", "aux2", "B H", blockwise=True)
 def equation_for_the_second_derivatives(o: PaperObjects) -> Pairs:
-    """The linear terms through f'' and g''
+    """f'' and g'' determine the linear terms
     f''(I - eps g')^{-1} g + g''(I - eps g')^{-1} g = f''(I - eps f')^{-1} f + g''(I - eps f')^{-1} f"""
     for B in o.associates():
         g = o.g(B)
@@ -140,7 +140,7 @@ def equation_for_the_second_derivatives(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 10 (59)", "g''", "H B", blockwise=True)
 def second_derivatives_agree(o: PaperObjects) -> Pairs:
-    """The second derivatives of associated fields
+    """The second derivatives of associated fields satisfy this relation
     g'' v = f'' (B^T v), f'' v = g'' (B^T v)"""
     v = o.vector("v")
     for B in o.associates():
@@ -150,7 +150,7 @@ def second_derivatives_agree(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 10 (60)", "Af''", "H A", least_m=2, blockwise=True)
 def second_derivatives_commute_with_B(o: PaperObjects) -> Pairs:
-    """The equivalent form of Lemma 10; in components, its proof (the print lacks the square of d^2 f_i/dx_j dx_k)
+    """The equivalent form of Lemma 10 and its proof in components hold (the print has d f_i for d^2 f_i)
     B^T (f'' v) = f'' (B^T v), B^T (g'' v) = g'' (B^T v)"""
     v = o.vector("v")
     for B in o.associates():
@@ -160,7 +160,7 @@ def second_derivatives_commute_with_B(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 9, proof", "", "B H", blockwise=True)
 def last_displays(o: PaperObjects) -> Pairs:
-    """The matrices on both sides of (58), computed with the help of Lemma 10
+    """The matrices on both sides of (58) are those that Lemma 10 gives
     f''(I - eps g')^{-1} g = f''(I - eps^2 f'^2)^{-1} (g + eps g'g), and seven more"""
     common = o.one_minus_square(o.f, o.x)
     f, fx, df = o.f, o.fx, o.df

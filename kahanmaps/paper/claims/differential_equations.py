@@ -36,7 +36,7 @@ def second_order_equations_of_the_integrals(o: PaperObjects) -> Pairs:
 
 @claim("(95), (96)", "tH", "eps f", blockwise=True)
 def integrals_by_the_inverse_tensor(o: PaperObjects) -> Pairs:
-    """The integrals through the inverse of the Poisson tensor
+    """The inverse of the Poisson tensor gives the integrals
     H~ = -2 x^T Pi^{-1} f, K~_i = -2 x^T Pi^{-1} g_i"""
     Pi = o.Pi(o.x)
     for g in [o.f, *(o.g(B) for B in o.associates())]:
@@ -45,7 +45,7 @@ def integrals_by_the_inverse_tensor(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 16 (97)", "Pi inv", "H B")
 def inverse_tensor(o: PaperObjects) -> Pairs:
-    """The inverse of the Poisson tensor
+    """The inverse of the Poisson tensor has this form
     Pi^{-1} = -P_0 J - eps^2 sum Q_i B_i J"""
     right = -(o.J * o.P0(o.x))
     for i in o.each:
@@ -56,7 +56,7 @@ def inverse_tensor(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 16 (98)-(101)", "P0", "B", only_m=3)
 def functions_P_and_Q(o: PaperObjects) -> Pairs:
-    """P_0 and Q_i as printed for m = 3, with s_0 = 1 and the s_i taken as eigenvalues of I - eps^2 f'^2
+    """P_0 and Q_i are as printed for m = 3, with s_0 = 1 and the s_i the eigenvalues of I - eps^2 f'^2
     P_0 = (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4, Q_1 = (-1/s_0 - 1/s_1 + 1/s_2 + 1/s_3)/(4 eps^2), ..."""
     one, squared = o.K.one, o.eps * o.eps
     reciprocal = [one / (one - squared * o.eigenvalue_of_square(i, o.x)) for i in o.each]
@@ -76,14 +76,14 @@ def function_s0(o: PaperObjects) -> Pairs:
 
 @claim("(102)", "s0", "B")
 def sum_of_the_q(o: PaperObjects) -> Pairs:
-    """The linear relation between p_0 and the q_i for every m
+    """p_0 and the q_i satisfy this linear relation for every m
     p_0 = (4-m) tr f'^2/8, sum q_i = (m-2) tr f'^2/8"""
     yield o.sum([o.q(i, o.x) for i in o.each]), o.eighth_of_trace(o.x) * o.number(o.m - 2)
 
 
 @claim("(103)-(105)", "s1", "B", only_m=3)
 def functions_s(o: PaperObjects) -> Pairs:
-    """s_1, s_2, s_3 in both forms
+    """The two forms of s_1, s_2, s_3 agree
     s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ..."""
     squared = o.eps * o.eps
     q = [o.q(i, o.x) for i in o.each]
@@ -95,7 +95,7 @@ def functions_s(o: PaperObjects) -> Pairs:
 
 @claim("(103)-(105)", "s1", "B")
 def functions_s_are_eigenvalues(o: PaperObjects) -> Pairs:
-    """What the s_i are: the eigenvalues of I - eps^2 f'^2
+    """The s_i are the eigenvalues of I - eps^2 f'^2
     s_i = 1 - eps^2 (eigenvalue of f'^2 on the eigenspace of lambda_i)"""
     for i in o.free:
         yield o.s(i, o.x), o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, o.x)
@@ -103,7 +103,7 @@ def functions_s_are_eigenvalues(o: PaperObjects) -> Pairs:
 
 @claim("(106)", "tH thru H K", "H B inhomogeneous")
 def H_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
-    """H~ through H and the K_i, all three lines
+    """H and the K_i give H~; all three lines hold
     H~ = 2 P_0 x^T J f + 2 eps^2 sum Q_i x^T B_i J f = ... = -6 P_0 H - 6 eps^2 sum Q_i K_i"""
     squared = o.eps * o.eps
     P0, Q = o.P0(o.x), [o.Q(i, o.x) for i in o.each]
@@ -120,7 +120,7 @@ def H_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
 
 @claim("(107)", "tK thru H K", "B", only_m=3)
 def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
-    """K~_i through H and the K_i, for m = 3
+    """H and the K_i give K~_i for m = 3
     K~_1 = -6 P_0 K_1 - 6 eps^2 Q_1 H + 6 eps^2 Q_2 K_3 + 6 eps^2 Q_3 K_2"""
     six = o.number(6) * o.eps * o.eps
     K = [o.Kf(o.B(i), o.x) for i in o.each]
@@ -133,7 +133,7 @@ def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
 
 @claim("(107)", "tK thru H K", "H B")
 def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
-    """The general form of K~_i
+    """K~_i has this form for every m
     K~_i = -6 P_0 K_i - 6 eps^2 sum_j Q_j K_ij, nabla K_ij = B_i B_j nabla H"""
     six = o.number(6) * o.eps * o.eps
     for i in o.free:
@@ -145,7 +145,7 @@ def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 17 (108)", "grads PQ", "H B")
 def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
-    """The gradients of P_0 and Q_i; for m = 3 the factor is eps^2
+    """The gradients of P_0 and Q_i are proportional; for m = 3 the factor is eps^2
     nabla P_0 = (4-m) eps^2 B_i nabla Q_i"""
     v = o.vector("v")
     left = o.slope(lambda o, x: o.P0(x), o.x, v)
@@ -158,7 +158,7 @@ def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 15, proof", "", "H B")
 def gradient_of_H_tilde(o: PaperObjects) -> Pairs:
-    """The gradient of (106)
+    """The gradient of H~ is that of (106)
     -nabla H~/6 = P_0 nabla H + H nabla P_0 + eps^2 sum (Q_i nabla K_i + K_i nabla Q_i)"""
     v = o.vector("v")
     left = o.slope(lambda o, x: o.H_tilde(x), o.x, v) * o.number(-1, 6)
@@ -167,7 +167,7 @@ def gradient_of_H_tilde(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 15, proof", "", "B H", only_m=3)
 def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
-    """The five lines that prove (94), for each i
+    """The five lines of the proof of (94) hold for each i
     -B_1 nabla H~/6 = P_0 nabla K_1 + eps^2 H nabla Q_1 + eps^2 Q_1 nabla H + K_1 nabla P_0 - ... = -nabla K~_1/6"""
     v = o.vector("v")
     squared = o.eps * o.eps
@@ -192,7 +192,7 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 15, proof", "", "B", only_m=3)
 def relations_of_gradients(o: PaperObjects) -> Pairs:
-    """The relations used on the way
+    """The relations used in the proof hold
     B_1 nabla K_2 = B_1 B_2 nabla H = -B_3 nabla H = -nabla K_3"""
     gradient = o.grad(o.x)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -201,7 +201,7 @@ def relations_of_gradients(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 16, proof", "", "B J", only_m=3)
 def products_with_J(o: PaperObjects) -> Pairs:
-    """The products of the matrices of the ansatz
+    """The matrices of the ansatz have these products
     B_i^T J B_i J = B_i^T B_i^T J^2 = -I, B_i^T J B_j J = B_i^T B_j^T J^2 = B_k^T"""
     for i in o.free:
         B = o.B(i).transpose()
@@ -220,14 +220,14 @@ def products_with_J(o: PaperObjects) -> Pairs:
     misprint="the entry (2,3) is eps^2 q_3: the matrix is symmetric and its entries have the same order in eps",
 )
 def linear_system_as_printed(o: PaperObjects) -> Pairs:
-    """The linear system for P_0 and Q_i, as printed
+    """P_0 and Q_i solve the linear system as printed
     4 x 4 system with entry (2,3) = eps^3 q_3"""
     yield from _linear_system(o, o.eps * o.eps * o.eps)
 
 
 @claim("Lemma 16, proof", "", "B", only_m=3)
 def linear_system(o: PaperObjects) -> Pairs:
-    """The linear system for P_0 and Q_i, as mended; its solution is unique
+    """P_0 and Q_i are the unique solution of the linear system as corrected
     4 x 4 system with entry (2,3) = eps^2 q_3"""
     yield from _linear_system(o, o.eps * o.eps)
     matrix, unknown, right = _system_matrix(o, o.eps * o.eps)
@@ -261,7 +261,7 @@ def non_degenerate_tensor(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 16, proof", "", "B", only_m=3)
 def determinant_of_the_linear_system(o: PaperObjects) -> Pairs:
-    """The factorization of the determinant of the linear system, with s_0 = 1
+    """The determinant of the linear system factors, with s_0 = 1
     determinant of the 4 x 4 system = s_0 s_1 s_2 s_3"""
     matrix, _, _ = _system_matrix(o, o.eps * o.eps)
     yield o.det(matrix), o.s(0, o.x) * o.s(1, o.x) * o.s(2, o.x)
@@ -269,7 +269,7 @@ def determinant_of_the_linear_system(o: PaperObjects) -> Pairs:
 
 @claim("(109)", "", "H B")
 def factorization_of_the_determinant(o: PaperObjects) -> Pairs:
-    """The factorization of the determinant, for every m into m factors
+    """The determinant has m factors, for every m
     det(I - eps f') = s_1 s_2 s_3"""
     product = o.K.one
     for i in o.each:
@@ -279,7 +279,7 @@ def factorization_of_the_determinant(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 17, proof", "", "B")
 def gradients_through_s(o: PaperObjects) -> Pairs:
-    """The gradients of P_0 and Q_i through those of the s_i, which are eigenvalues
+    """The gradients of the eigenvalues s_i determine those of P_0 and Q_i
     nabla P_0 = -(4-m)/4 sum nabla s_i/s_i^2, nabla Q_1 = (nabla s_1/s_1^2 - nabla s_2/s_2^2 - ...)/(4 eps^2)"""
     v = o.vector("v")
     weighted = []
@@ -295,7 +295,7 @@ def gradients_through_s(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 17, proof", "", "H B")
 def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
-    """B_i changes the sign of nabla s_i and keeps the others
+    """B_i changes the sign of nabla s_i and fixes the other nabla s_j
     B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ..."""
     v = o.vector("v")
     for i in o.free:

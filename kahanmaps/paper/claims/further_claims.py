@@ -1,4 +1,4 @@
-"""Beyond the paper: what lies behind its theorems, how far they reach, and where they end."""
+"""Claims beyond the paper: the structure behind its theorems, generalizations, and counterexamples."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, ClaimKind, Pairs, claim, entries
 from kahanmaps.paper.variations import VARIATIONS, jordan_block, varied
 
-_ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
+_ITERATES = 4  # the first iterate whose degree distinguishes a planar Hamiltonian map from others
 
 
 @claim("Structure", "", "H eps")
@@ -73,7 +73,7 @@ def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
 
 @claim("Tensor theorem", "", "A", symplectic=False, theorem="the tensor theorem (docs/mathematics.md)")
 def map_over_the_algebra(o: PaperObjects) -> Pairs:
-    """The Kahan map of a system over Q[A^T] is one over Q[A^T]
+    """The Kahan map of a system over Q[A^T] is a map over Q[A^T]
     A^T dPhi = dPhi A^T, for any quadratic f over Q[A^T]"""
     jacobian = o.jacobian_of_step(o.arbitrary_system_over_the_algebra(), o.x)
     yield o.AT * jacobian, jacobian * o.AT
@@ -91,7 +91,7 @@ def commuting_systems_over_the_algebra(o: PaperObjects) -> Pairs:
 
 @claim("Tensor theorem", "", "H map", distinct_roots=True, blockwise=True)
 def poisson_map_for_each_power(o: PaperObjects) -> Pairs:
-    """Not one invariant Poisson tensor but m, one for each element of a basis of the algebra
+    """The map has m invariant Poisson tensors, one for each element of a basis of the algebra
     dPhi (A^T)^k Pi(x) dPhi^T = (A^T)^k Pi(x~), k < m"""
     jacobian = o.jacobian_of_step(o.f, o.x)
     for k in range(o.m):
@@ -115,14 +115,14 @@ def compatible_poisson_tensors(o: PaperObjects) -> Pairs:
     distinct_roots=True,
 )
 def dimension_of_the_cubics_for_a_jordan_block(o: PaperObjects) -> Pairs:
-    """For A that is not diagonalisable, but not derogatory, the cubics form a space of dimension 4m as well
+    """The cubics also form a space of dimension 4m if A is neither diagonalisable nor derogatory
     dim of the cubics = 4m, lambda_1 double, chi the minimal polynomial"""
     yield comb(o.n + 2, 3) - jordan_block(o).rank_of_cubic_equations(), 4 * o.m
 
 
 @claim("Maximality", "", "roots", least_m=2, blockwise=True)
 def commutativity_for_idempotents(o: PaperObjects) -> Pairs:
-    """B may have the eigenvalue 0 as well: the map of the part of f on one block commutes with that of f
+    """The map of the part of f on one block commutes with that of f: B may have the eigenvalue 0 as well
     Phi_f o Phi_g = Phi_g o Phi_f for g = B^T f, B^3 = B"""
     for i in o.each:
         g = o.g(o.projector(i))
@@ -131,7 +131,7 @@ def commutativity_for_idempotents(o: PaperObjects) -> Pairs:
 
 @claim("Maximality", "", "linear", kind=ClaimKind.DIFFERENT, in_general=True)
 def only_cube_roots_commute(o: PaperObjects) -> Pairs:
-    """The maps of f and l f, so those of f at eps and at l eps, commute for l^3 = l only; hence those of f and B^T f
+    """The maps of f and l f (those of f at eps and at l eps) commute only for l^3 = l; the same holds for f and B^T f
     Res(N_1, N_2) != 0, (l^3 - l) N_i(l) the components of Phi_f o Phi_{l f} - Phi_{l f} o Phi_f on a block"""
     for i in o.each:
         x = o.projector(i).transpose() * o.x
@@ -154,7 +154,7 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
 
 @claim("Periodic levels", "", "H f", blockwise=True)
 def division_polynomials(o: PaperObjects) -> Pairs:
-    """Determinants [ijk] of points of an orbit in a plane: T has order 5 where g = 32/27, and 6 where g = 28/27
+    """T has order 5 where g = 32/27, and 6 where g = 28/27 ([ijk] are determinants of points of a planar orbit)
     32 [015] [234] = (32 - 27 g) [024] [135],  (32 - 27 g) [016] [235] = (28 - 27 g) [025] [136]"""
     for i in o.free:
         E = o.projector(i).transpose()
@@ -241,9 +241,9 @@ def formula(o: PaperObjects) -> Pairs:
     yield o.modified_H(o.x), right
 
 
-# What is asked of every variation: the formula, the controls of what holds, how it is proved, and an answer for each of
-# VARIATIONS in turn: + holds, - fails, and a blank where it is not asked: of a variation that concerns g nothing is
-# asked that concerns f alone.
+# The statements that are tested for the variations: the formula, the controls where it holds, how it is proved, and a
+# sign for each of VARIATIONS: + holds, - fails, blank not tested, since the variation changes g and the statement is
+# about f alone.
 _ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
 STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
     (commuting, "Phi_f o Phi_g = Phi_g o Phi_f", "B map", _BOTH, "++--++"),

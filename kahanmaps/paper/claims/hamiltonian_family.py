@@ -16,7 +16,7 @@ from kahanmaps.paper.registry import ClaimKind, Pairs, claim
     misprint="the indices belong to different dimensions; with J of (13) it is {x1,x4} = {x2,x5} = {x3,x6} = 1",
 )
 def brackets_as_printed(o: PaperObjects) -> Pairs:
-    """The brackets of the coordinate functions, as printed
+    """The coordinate functions have these brackets, as printed
     {x1,x3} = {x2,x4} = {x3,x6} = 1"""
     for i, j in ((0, 2), (1, 3), (2, 5)):
         yield o.dot(o.unit(i), o.J * o.unit(j)), o.K.one
@@ -24,7 +24,7 @@ def brackets_as_printed(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 3", "", "J", symplectic=False)
 def brackets(o: PaperObjects) -> Pairs:
-    """The brackets of the coordinate functions, as mended: {x1,x4} = {x2,x5} = {x3,x6} = 1 for m = 3
+    """The coordinate functions have these brackets, as corrected: {x1,x4} = {x2,x5} = {x3,x6} = 1 for m = 3
     {x_i, x_{m+i}} = 1, all others 0"""
     for i in range(o.n):
         for j in range(o.n):
@@ -44,7 +44,7 @@ def equations_of_motion(o: PaperObjects) -> Pairs:
 
 @claim("(14), (15)", "grad K", "H", least_m=2, pairwise=True)
 def gradients_of_the_chain(o: PaperObjects) -> Pairs:
-    """The chain starts with H_1 and, for m > 2, H_2
+    """The gradients of H_1 and, for m > 2, H_2 follow from that of H_0
     nabla H_1 = A nabla H_0, nabla H_2 = A nabla H_1"""
     for i in range(1, min(o.m, 3)):
         yield o.gradient_of_chain(i, o.x), o.A * o.gradient_of_chain(i - 1, o.x)
@@ -108,7 +108,7 @@ def independence_for_cyclic_A(o: PaperObjects) -> Pairs:
 
 @claim("(17)", "cond2", "A", symplectic=False)
 def blocks(o: PaperObjects) -> Pairs:
-    """The block form of a skew-Hamiltonian matrix
+    """The blocks of a skew-Hamiltonian matrix satisfy these relations
     A_1^T = A_4, A_2^T = -A_2, A_3^T = -A_3"""
     m = o.m
     for i in range(m):
@@ -120,7 +120,7 @@ def blocks(o: PaperObjects) -> Pairs:
 
 @claim("(18)", "A elem", "A", only_m=3, symplectic=False)
 def matrix_written_out(o: PaperObjects) -> Pairs:
-    """The 15 parameters of A where the paper writes them
+    """The 15 parameters of A are the entries where the paper writes them
     A with entries a_1, ..., a_15"""
     A, zero = o.A, o.K.zero
     a = [zero, *(A[i, j] for i in range(3) for j in range(3))]
@@ -155,7 +155,7 @@ def solvability(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 3", "", "H", least_m=2)
 def solvability_backwards(o: PaperObjects) -> Pairs:
-    """The condition for H_1 with A replaced by its inverse (for a singular A: A plus a multiple of I, same space)
+    """H_1 satisfies the condition with the inverse of A (for a singular A: of A + c I, which has the same space)
     A^{-1} nabla^2 H_1 = nabla^2 H_1 (A^{-1})^T"""
     A, shift = o.A, 0
     while o.K.is_zero(o.det(A)):

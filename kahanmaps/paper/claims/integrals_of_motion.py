@@ -48,7 +48,7 @@ def shared_integrals_are_independent(o: PaperObjects) -> Pairs:
 
 @claim("(61), (62)", "tH", "eps inhomogeneous", blockwise=True)
 def two_forms_of_H_tilde(o: PaperObjects) -> Pairs:
-    """H~ and K~ through the image and through the inverse matrix
+    """H~ and K~ are given by the image and by the inverse matrix
     H~ = eps^{-1} x^T J x~ = eps^{-1} x^T J (I - eps f')^{-1} x"""
     yield o.H_tilde(o.x), o.dot(o.x, o.J * o.solve(o.minus_eps_jac(o.f, o.x), o.x)) / o.eps
     for B in o.associates():
@@ -58,7 +58,7 @@ def two_forms_of_H_tilde(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 7", "", "f J")
 def terms_of_the_series(o: PaperObjects) -> Pairs:
-    """The matrices in the series of H~; so the terms with even k vanish
+    """The matrices in the series of H~ are symmetric or skew; hence the terms with even k vanish
     J f'^k = -(nabla^2 H J ... J nabla^2 H), symmetric for odd k, skew for even k"""
     hessian = o.hess(o.x)
     word, power = hessian, o.df
@@ -72,7 +72,7 @@ def terms_of_the_series(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 7", "", "eps f inhomogeneous", blockwise=True)
 def series_of_the_integrals(o: PaperObjects) -> Pairs:
-    """The series of H~ and K~ to every order up to the requested one, with the exact remainder
+    """H~ and K~ have these series up to the requested order, with the exact remainder
     H~ = sum_{k<N} eps^{2k} x^T J f'^{2k+1} x + O(eps^{2N})"""
     for g in [o.f, *(o.g_(i) for i in o.each)]:
         jacobian = o.jac(g, o.x)
@@ -87,7 +87,7 @@ def series_of_the_integrals(o: PaperObjects) -> Pairs:
 
 @claim("(63), (64)", "tH alt", "f eps inhomogeneous", blockwise=True)
 def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
-    """H~ and K~ as even functions of eps
+    """H~ and K~ are even functions of eps
     H~ = x^T J (I - eps^2 f'^2)^{-1} f' x = 2 x^T J (I - eps^2 f'^2)^{-1} f"""
     for g in [o.f, *(o.g(B) for B in o.associates())]:
         square = o.one_minus_square(g, o.x)
@@ -98,7 +98,7 @@ def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 7", "", "f inhomogeneous", blockwise=True)
 def leading_terms(o: PaperObjects) -> Pairs:
-    """The leading terms of H~ and K~
+    """The leading terms of H~ and K~ are -6 H and -6 K
     2 x^T J f = -2 x^T nabla H = -6 H, the same for K"""
     yield o.dot(o.x, o.J * o.fx) * o.number(2), o.dot(o.x, o.grad(o.x)) * o.number(-2)
     yield o.dot(o.x, o.grad(o.x)) * o.number(-2), o.H(o.x) * o.number(-6)
@@ -110,7 +110,7 @@ def leading_terms(o: PaperObjects) -> Pairs:
 
 @claim("(65)", "", "f eps inhomogeneous", blockwise=True)
 def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
-    """The computation of H~(x~)
+    """The equalities of the computation of H~(x~) hold
     H~(x~) = eps^{-1} x^T J (I - eps f'(x~)) (I - eps f'(x~))^{-1} (I - eps f'(x))^{-1} x"""
     start = o.solve(o.minus_eps_jac(o.f, o.x), o.x)
     after = o.solve(o.minus_eps_jac(o.f, o.x_tilde), start)
@@ -126,7 +126,7 @@ def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
 
 @claim("(66)", "aux3", "B H inhomogeneous", blockwise=True)
 def K_tilde_at_the_image(o: PaperObjects) -> Pairs:
-    """The computation of K~(x~)
+    """The equalities of the computation of K~(x~) hold
     K~(x~) = x^T J g'(x~) x"""
     for B in o.associates():
         g = o.g(B)
@@ -143,7 +143,7 @@ def K_tilde_at_the_image(o: PaperObjects) -> Pairs:
 
 @claim("(67)", "aux4", "eps map", blockwise=True)
 def jacobian_of_g_at_the_image(o: PaperObjects) -> Pairs:
-    """g'(x~) through f at x
+    """f at x determines g'(x~)
     g'(x~) = g'(x) + 2 eps g'' (I - eps^2 f'^2)^{-1} (I + eps f') f"""
     increment = o.solve(o.one_minus_square(o.f, o.x), o.plus_eps_jac(o.f, o.x) * o.fx) * (o.number(2) * o.eps)
     for B in o.associates():
@@ -154,7 +154,7 @@ def jacobian_of_g_at_the_image(o: PaperObjects) -> Pairs:
 
 @claim("(68)", "aux5", "A f", blockwise=True)
 def odd_terms_vanish(o: PaperObjects) -> Pairs:
-    """The odd terms in eps vanish: a skew-symmetric matrix between equal vectors
+    """The odd terms in eps vanish, since a skew-symmetric matrix stands between equal vectors
     x^T J (g'' (I - eps^2 f'^2)^{-1} f) x = 0, through -2 nabla H^T (B^T (..)^{-1} J) nabla H"""
     square = o.one_minus_square(o.f, o.x)
     inner = o.solve(square, o.fx)
@@ -176,7 +176,7 @@ def odd_terms_vanish(o: PaperObjects) -> Pairs:
 
 @claim("(69)", "aux7", "inhomogeneous", blockwise=True)
 def second_derivative_along_x(o: PaperObjects) -> Pairs:
-    """Homogeneity of g', for any vector v
+    """g' is homogeneous: this holds for any vector v
     (g'' v) x = g'(x) v"""
     v = o.vector("v")
     for g in [o.f, *(o.g(B) for B in o.associates())]:
@@ -190,7 +190,7 @@ def second_derivative_along_x(o: PaperObjects) -> Pairs:
     "first component it fails",
 )
 def even_terms_as_printed(o: PaperObjects) -> Pairs:
-    """The even terms of K~(x~), as printed
+    """The even terms of K~(x~) have this form, as printed
     K~(x~) = x^T J g' x + 2 eps^2 g'' (I - eps^2 f'^2)^{-1} f' f x"""
     inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
     for B in o.associates():
@@ -201,7 +201,7 @@ def even_terms_as_printed(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 11, proof", "", "B H eps", blockwise=True)
 def even_terms(o: PaperObjects) -> Pairs:
-    """The even terms, as mended, and the four lines that end the proof
+    """The even terms, as corrected, and the last four lines of the proof hold
     K~(x~) = x^T J g' x + 2 eps^2 x^T J g'' (I - eps^2 f'^2)^{-1} f' f x = ... = K~(x)"""
     inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
     twice = o.number(2) * o.eps * o.eps
@@ -222,6 +222,6 @@ def even_terms(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 7", "", "B H")
 def sum_of_the_integrals(o: PaperObjects) -> Pairs:
-    """The sum rule; for m = 3 the sum of the three K~_i is H~
+    """The K~_i satisfy the sum rule; for m = 3 their sum is H~
     sum K~_i = (m-2) H~"""
     yield o.sum([o.integral(o.g_(i), o.x) for i in o.each]), o.H_tilde(o.x) * o.number(o.m - 2)

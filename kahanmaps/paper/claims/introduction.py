@@ -6,7 +6,7 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimKind, Pairs, claim
 
 
-@claim("(1)", "skew", "J", at_most="the block form (17) has so many parameters", symplectic=False)
+@claim("(1)", "skew", "J", at_most="the block form (17) has m(2m-1) parameters", symplectic=False)
 def dimension_of_skew_hamiltonian_matrices(o: PaperObjects) -> Pairs:
     """Skew-Hamiltonian matrices form a space of dimension m(2m-1)
     dim { A : A^T J = J A } = m(2m-1)"""

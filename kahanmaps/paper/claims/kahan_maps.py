@@ -13,7 +13,7 @@ from kahanmaps.paper.registry import Pairs, claim
 
 @claim("(4)", "eq: diff eq gen", "f''")
 def derivatives_of_the_system(o: PaperObjects) -> Pairs:
-    """What is called f', f'', nabla H and nabla^2 H is obtained by differentiation, for any quadratic f and cubic H
+    """f', f'', nabla H and nabla^2 H are the derivatives of f and H, for any quadratic f and cubic H
     f = Q + Bx + c, f' and f'' its derivatives, nabla^2 H that of nabla H"""
     v, w = o.vector("v"), o.vector("w")
     p = o.inhomogeneous()
@@ -26,7 +26,7 @@ def derivatives_of_the_system(o: PaperObjects) -> Pairs:
 
 @claim("(5)-(7)", "eq: Kahan gen", "map", symplectic=False, formal=formal_proofs.map_of_any_quadratic_system)
 def any_quadratic_system(o: PaperObjects) -> Pairs:
-    """A quadratic system without any structure: the equation, the explicit form, reversibility
+    """Every quadratic system satisfies Kahan's equation, the explicit form of the map and reversibility
     Kahan's equation, its solution and its inverse, for any quadratic f"""
     f = o.arbitrary_system()
     x_tilde = o.step(f, o.x)
@@ -39,7 +39,7 @@ def any_quadratic_system(o: PaperObjects) -> Pairs:
 
 @claim("(8), (9)", "eq: Phi hom", "map eps", symplectic=False, formal=formal_proofs.map_of_any_homogeneous_system)
 def any_homogeneous_system(o: PaperObjects) -> Pairs:
-    """A homogeneous quadratic system without any structure
+    """The map of every homogeneous quadratic system has both homogeneous forms
     x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, for any homogeneous f"""
     f = o.arbitrary_system(homogeneous=True)
     x_tilde = o.step(f, o.x)
@@ -49,7 +49,7 @@ def any_homogeneous_system(o: PaperObjects) -> Pairs:
 
 @claim("(10)", "Jac", "map eps", symplectic=False, formal=formal_proofs.jacobian_of_any_map)
 def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
-    """The Jacobi matrix of the map of a system without any structure: M(x + t v) x~(x + t v) differentiated
+    """The Jacobi matrix of the map has this form for every quadratic system
     dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~)), for any quadratic f"""
     f, v = o.arbitrary_system(), o.vector("v")
     x_tilde = o.step(f, o.x)
@@ -62,7 +62,7 @@ def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
 
 @claim("(11)", "eq: CMOQ integral", "map eps", symplectic=False, formal=formal_proofs.integral_of_any_cubic)
 def integral_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
-    """An arbitrary cubic H, with terms of all degrees, and an arbitrary skew J
+    """The map of every cubic H, homogeneous or not, and every skew J conserves the modified Hamiltonian
     H + (2 eps/3) nabla H^T (I - eps f')^{-1} f is conserved, for any cubic H and any skew J"""
     p = o.arbitrary_hamiltonian()
     yield p.modified_H(p.step(p.f, p.x)), p.modified_H(p.x)
@@ -70,7 +70,7 @@ def integral_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
 
 @claim("(12)", "eq: CMOQ measure", "map eps", symplectic=False, formal=formal_proofs.measure_of_any_hamiltonian_map)
 def measure_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
-    """The invariant measure for an arbitrary cubic H and an arbitrary skew J
+    """The map of every cubic H and every skew J has the invariant measure
     dx/det(I - eps f') is invariant, for any cubic H and any skew J"""
     p = o.arbitrary_hamiltonian()
     x_tilde = p.step(p.f, p.x)
@@ -99,7 +99,7 @@ def polarisation(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 2", "", "eps map", blockwise=True)
 def second_order(o: PaperObjects) -> Pairs:
-    """The map approximates the time 2 eps shift along solutions, to second order, with this remainder
+    """The map approximates the time 2 eps shift along solutions to second order, with this remainder
     x~ = x + 2 eps f + 2 eps^2 f'f + O(eps^3)"""
     for system in (o, o.inhomogeneous()):
         f = system.f
@@ -111,7 +111,7 @@ def second_order(o: PaperObjects) -> Pairs:
 
 @claim("(6)", "eq: reversible", "map", blockwise=True)
 def reversibility(o: PaperObjects) -> Pairs:
-    """The map with -eps undoes the map with eps
+    """The inverse of the map with eps is the map with -eps
     Phi_f^{-1}(x, eps) = Phi_f(x, -eps)"""
     for system in (o, o.inhomogeneous()):
         yield system.step(system.f, system.step(system.f, o.x), times=-1), o.x
@@ -119,7 +119,7 @@ def reversibility(o: PaperObjects) -> Pairs:
 
 @claim("(7)", "eq: Phi gen", "eps map", blockwise=True)
 def explicit_form(o: PaperObjects) -> Pairs:
-    """The explicit form of the map
+    """The map has this explicit form
     x~ = x + 2 eps (I - eps f')^{-1} f"""
     for system in (o, o.inhomogeneous()):
         f = system.f
@@ -129,14 +129,14 @@ def explicit_form(o: PaperObjects) -> Pairs:
 
 @claim("(8)", "eq: Phi hom", "eps inhomogeneous", blockwise=True)
 def homogeneous_form(o: PaperObjects) -> Pairs:
-    """The explicit form for homogeneous f
+    """The map of a homogeneous f has this explicit form
     x~ = (I - eps f'(x))^{-1} x"""
     yield o.x_tilde, o.solve(o.minus_eps_jac(o.f, o.x), o.x)
 
 
 @claim("(9)", "eq: Phi hom alt", "eps inhomogeneous", blockwise=True)
 def homogeneous_form_backwards(o: PaperObjects) -> Pairs:
-    """The form of the inverse for homogeneous f, and x~ through f'(x~)
+    """The inverse has this form for homogeneous f, and x~ is also expressed by f'(x~)
     x = (I + eps f'(x~))^{-1} x~,  x~ = (I + eps f'(x~)) x"""
     matrix = o.plus_eps_jac(o.f, o.x_tilde)
     yield o.x, o.solve(matrix, o.x_tilde)
@@ -145,7 +145,7 @@ def homogeneous_form_backwards(o: PaperObjects) -> Pairs:
 
 @claim("(10)", "Jac", "eps map", blockwise=True)
 def jacobi_matrix_of_the_map(o: PaperObjects) -> Pairs:
-    """The Jacobi matrix of the map
+    """The Jacobi matrix of the map has this form
     dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~))"""
     v = o.vector("v")
     for system in (o, o.inhomogeneous()):
@@ -157,7 +157,7 @@ def jacobi_matrix_of_the_map(o: PaperObjects) -> Pairs:
 
 @claim("(11)", "eq: CMOQ integral", "f eps inhomogeneous", blockwise=True)
 def two_forms_of_the_integral(o: PaperObjects) -> Pairs:
-    """Both forms of the integral of a Hamiltonian system agree (homogeneous H)
+    """Both forms of the integral of a Hamiltonian system with homogeneous H agree
     x^T J^{-1} x~/(6 eps) = H + (2 eps/3) nabla H^T (I - eps f')^{-1} f"""
     yield o.dot(o.x, o.solve(o.J, o.x_tilde)) / (o.number(6) * o.eps), o.modified_H(o.x)
 

@@ -25,14 +25,14 @@ def tensor(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 12 (71)", "Pi long", "H B")
 def tensor_by_B(o: PaperObjects) -> Pairs:
-    """The tensor through the B_i
+    """The tensor is a combination of the B_i^T J
     Pi = (1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J"""
     yield o.Pi(o.x), _long_form(o, o.x)
 
 
 @claim("Theorem 12 (72)", "Pi medium", "H B")
 def tensor_by_A(o: PaperObjects) -> Pairs:
-    """The tensor through the powers of A; for m = 3 with p, q, r
+    """The tensor is a combination of the (A^T)^k J; for m = 3 with p, q, r
     Pi = (1 - eps^2 p) J - eps^2 q A^T J - eps^2 r (A^T)^2 J"""
     right = o.J
     for k in range(o.m):
@@ -69,7 +69,7 @@ def poisson_map_of_g(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 12, proof", "", "H f", distinct_roots=True, blockwise=True)
 def poisson_property_without_inverses(o: PaperObjects) -> Pairs:
-    """The property (76) without inverses, then multiplied by J. It holds for any two points, not only for x and x~
+    """(76) holds without inverses and after multiplication by J, for any two points, not only for x and x~
     (I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T = (I - eps f'(x)) Pi(x~) (I - eps f'(x))^T"""
     plus, minus = o.plus_eps_jac(o.f, o.x_tilde), o.minus_eps_jac(o.f, o.x)
     before, after = o.Pi(o.x), o.Pi(o.x_tilde)
@@ -88,7 +88,7 @@ def tensor_commutes_with_jacobians(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 12, proof", "", misprint="the factor of both squares is eps^2, not eps")
 def last_display_as_printed(o: PaperObjects) -> Pairs:
-    """The last display of the proof of (76), as printed
+    """The last display of the proof of (76) holds as printed
     (I - eps f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps f'(x)^2)"""
     after, before = o.jac(o.f, o.x_tilde), o.df
     left = (o.I - after * after * o.eps) * _long_form(o, o.x) * o.J
@@ -97,7 +97,7 @@ def last_display_as_printed(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 12, proof", "", "H B")
 def last_display(o: PaperObjects) -> Pairs:
-    """The last display of the proof of (76), as mended, with Pi in the form (71)
+    """The last display of the proof of (76) holds as corrected, with Pi in the form (71)
     (I - eps^2 f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps^2 f'(x)^2)"""
     left = o.one_minus_square(o.f, o.x_tilde) * _long_form(o, o.x) * o.J
     yield left, _long_form(o, o.x_tilde) * o.J * o.one_minus_square(o.f, o.x)
@@ -105,7 +105,7 @@ def last_display(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 13 (77), (78)", "grad qr", "H", least_m=2)
 def gradient_conditions(o: PaperObjects) -> Pairs:
-    """The gradients of the coefficients: nabla pi_k = C_k(A) nabla pi_{m-1}
+    """The gradients of the coefficients satisfy nabla pi_k = C_k(A) nabla pi_{m-1}
     nabla q = C_1 nabla r, nabla p = C_2 nabla r"""
     v = o.vector("v")
     for k in range(o.m - 1):
@@ -117,7 +117,7 @@ def gradient_conditions(o: PaperObjects) -> Pairs:
 
 @claim("(79)-(81)", "C1", "A", only_m=3)
 def matrices_C(o: PaperObjects) -> Pairs:
-    """C_1, C_2 and a, b through traces of A and A^2
+    """Traces of A and A^2 determine C_1, C_2 and a, b
     C_1 = A - aI, C_2 = A^2 - aA + bI"""
     a = o.trace(o.A) * o.number(1, 2)
     b = o.trace(o.A) * o.trace(o.A) * o.number(1, 8) - o.trace(o.A * o.A) * o.number(1, 4)
@@ -127,7 +127,7 @@ def matrices_C(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 13 (82)", "Jacobi id", "H f", least_m=2, pairwise=True, distinct_roots=True)
 def jacobi_identity(o: PaperObjects) -> Pairs:
-    """Pi is a Poisson tensor: the Jacobi identity for all triples of coordinates
+    """Pi satisfies the Jacobi identity for all triples of coordinates
     {x_i,{x_j,x_k}} + cyclic = 0"""
     yield from jacobi_identity_of(o, o.I)
 
@@ -185,7 +185,7 @@ def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 14 (83)", "grads pq", "H B")
 def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
-    """The gradients of p_0 and q_i; for m = 3 the factor is 1
+    """The gradients of p_0 and q_i are proportional; for m = 3 the factor is 1
     nabla p_0 = (4-m) B_i nabla q_i"""
     v = o.vector("v")
     left = o.slope(lambda o, x: o.p0(x), o.x, v)
@@ -198,7 +198,7 @@ def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
 
 @claim("Theorem 12, proof", "", "H", least_m=2)
 def gradients_through_p0(o: PaperObjects) -> Pairs:
-    """The gradients of p, q, r through nabla tr f'^2/8, which is nabla p_0 for m = 3
+    """nabla tr f'^2/8, which is nabla p_0 for m = 3, determines the gradients of p, q, r
     nabla p = (I + sum alpha_i B_i) nabla p_0, nabla q = sum beta_i B_i nabla p_0, ..."""
     v = o.vector("v")
     for k in range(o.m):
@@ -215,7 +215,7 @@ def gradients_through_p0(o: PaperObjects) -> Pairs:
 
 @claim("(84), (85)", "", "B", least_m=2)
 def sums_with_coefficients(o: PaperObjects) -> Pairs:
-    """The matrix identities behind the gradient conditions
+    """The matrix identities for the gradient conditions hold
     sum beta_i B_i = (A - aI) sum gamma_i B_i, I + sum alpha_i B_i = (A^2 - aA + bI) sum gamma_i B_i"""
     last = o.sum([o.B(i) * o.lagrange(i)[o.m - 1] for i in o.each])
     for k in range(o.m - 1):
@@ -249,7 +249,7 @@ def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
 
 @claim("(88), (89)", "Af' comp", "H A", least_m=2)
 def components(o: PaperObjects) -> Pairs:
-    """B^T f' = f' B^T in components, and its derivative by x_l
+    """B^T f' = f' B^T and its derivative by x_l hold in components
     sum_k B_kj d_m f_k = sum_k d_k f_j B_mk, and its derivative"""
     for i in o.free:
         B = o.B(i)
@@ -261,7 +261,7 @@ def components(o: PaperObjects) -> Pairs:
 
 @claim("(90)", "grad q comp", "f''")
 def gradient_of_q(o: PaperObjects) -> Pairs:
-    """The gradient of q_i in components: two sums
+    """The gradient of q_i has these two terms in components
     dq/dx_l = tr(B^T f''_l f')/8 + tr(B^T f' f''_l)/8"""
     for i in o.free:
         gradient = o.gradient(lambda o, x: o.q(i, x), o.x)
@@ -272,7 +272,7 @@ def gradient_of_q(o: PaperObjects) -> Pairs:
 
 @claim("(91)-(93)", "A grad q comp", "H B")
 def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
-    """Both contributions to B nabla q, and their sum nabla tr f'^2/8
+    """Both contributions to B nabla q have this form, and their sum is nabla tr f'^2/8
     (B nabla q)_n = sum_l (B^T)_ln dq/dx_l = sum d_n d_m f_j d_j f_m/8 + sum d_j f_k d_j d_n f_k/8"""
     trace = o.gradient(lambda o, x: o.eighth_of_trace(x), o.x)
     for i in o.free:

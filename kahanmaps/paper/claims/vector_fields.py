@@ -10,7 +10,7 @@ from kahanmaps.paper.registry import Pairs, claim
 
 @claim("(20)-(22)", "f", "f")
 def fields_of_the_chain(o: PaperObjects) -> Pairs:
-    """The vector fields of the chain
+    """The vector fields of the chain are J nabla H_i
     f_i = J nabla H_i = J A^i nabla H_0"""
     for i in range(o.m):
         yield o.value(o.f_(i), o.x), o.J * (o.A_to(i) * o.grad(o.x))
@@ -18,7 +18,7 @@ def fields_of_the_chain(o: PaperObjects) -> Pairs:
 
 @claim("(23), (24)", "f vs g", "A J", least_m=2)
 def fields_by_powers_of_A(o: PaperObjects) -> Pairs:
-    """Each field of the chain is A^T times the one before
+    """Each field of the chain is A^T times the preceding one
     f_i = A^T f_{i-1} = (A^T)^i f_0"""
     for i in range(1, o.m):
         yield o.value(o.f_(i), o.x), o.AT * o.value(o.f_(i - 1), o.x)
@@ -27,7 +27,7 @@ def fields_by_powers_of_A(o: PaperObjects) -> Pairs:
 
 @claim("(25), (26)", "f' vs g'", "A J", least_m=2)
 def jacobians_by_powers_of_A(o: PaperObjects) -> Pairs:
-    """The same for the Jacobi matrices
+    """Each Jacobi matrix of the chain is A^T times the preceding one
     f_i' = A^T f_{i-1}' = (A^T)^i f_0'"""
     for i in range(1, o.m):
         yield o.jac(o.f_(i), o.x), o.AT * o.jac(o.f_(i - 1), o.x)
@@ -36,7 +36,7 @@ def jacobians_by_powers_of_A(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 3 (27)", "Ham f'", "f H")
 def hamiltonian_jacobians(o: PaperObjects) -> Pairs:
-    """The Jacobi matrices of Hamiltonian vector fields
+    """The Jacobi matrices of the chain are Hamiltonian
     f_i'^T J = -J f_i'"""
     for i in range(o.m):
         jacobian = o.jac(o.f_(i), o.x)
@@ -54,7 +54,7 @@ def jacobians_commute_with_A(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 3, proof", "", "H J")
 def jacobians_commute_with_A_step_by_step(o: PaperObjects) -> Pairs:
-    """The chain of equalities that proves (28)
+    """The equalities of the proof of (28) hold
     A^T f' = A^T J nabla^2 H = J A nabla^2 H = J nabla^2 H A^T = f' A^T"""
     for i in range(o.m):
         hessian = o.hess(o.x, i)
@@ -80,7 +80,7 @@ def fields_commute(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 3, proof", "", "H A", least_m=2)
 def commutation_step_by_step(o: PaperObjects) -> Pairs:
-    """The chains of equalities that prove (29) and (30)
+    """The equalities of the proofs of (29) and (30) hold
     f_0' f_1 = f_0' A^T f_0 = A^T f_0' f_0 = f_1' f_0, f_0' f_1' = f_0' A^T f_0' = A^T f_0' f_0' = f_1' f_0'"""
     f1 = o.f_(1)
     steps = [o.df * o.value(f1, o.x), o.df * (o.AT * o.fx), o.AT * (o.df * o.fx), o.jac(f1, o.x) * o.fx]

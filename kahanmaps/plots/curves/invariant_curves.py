@@ -34,7 +34,7 @@ MAX_STARTS = 7  # the number of colors
 BITS = 256
 _POLE_BITS = 96
 _PROGRESS_EVERY = 2_000  # steps
-_LARGEST = 1e60  # of what is drawn: cubes of it are still floating-point numbers
+_LARGEST = 1e60  # largest coordinate that is drawn: its cube does not overflow
 
 Numbers = NDArray[Any]
 
@@ -154,7 +154,7 @@ def find_invariant_curves(
             # The orbit in the variables of the system, with a row for each step.
             original = np.zeros((length, splitting.dim))
             for frame, (u, v) in zip(frames, orbits, strict=True):
-                a, b, c, d = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
+                a, b, c, d = (complex(_to_floating_point(entry)) for entry in frame.matrix.inv().entries())
                 old = [a * u + b * v, c * u + d * v]
                 columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
                 parts = [part for z in old for part in ((z.real, z.imag) if frame.root.imag else (z.real,))]
@@ -183,13 +183,13 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
             text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
             shape, matrix = COMPLEX, acb_mat([[1, 0], [0, 1]])
         coefficients = [entry.mid() for entry in transformed(plane.block, matrix)]
-        h = tuple(map(_machine, coefficients))
+        h = tuple(map(_to_floating_point, coefficients))
         if not np.isfinite(h).all():
             raise InputError(
                 "the normal form leaves the range of floating-point numbers: its coefficients are too large to draw"
             )
         frames.append(
-            InvariantPlane(index, complex(_machine(root)), text, shape, h, PlanarBlock(*coefficients), matrix)
+            InvariantPlane(index, complex(_to_floating_point(root)), text, shape, h, PlanarBlock(*coefficients), matrix)
         )
     return sorted(frames, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
 
@@ -206,8 +206,8 @@ def _orbit(
         U, V, W = P
         if k and abs(W) <= closest * max(abs(U), abs(V)):
             break
-        us.append(_machine(U / W / step))
-        vs.append(_machine(V / W / step))
+        us.append(_to_floating_point(U / W / step))
+        vs.append(_to_floating_point(V / W / step))
         P = block.image(P)
         size = max(abs(entry) for entry in P)
         # At an indeterminacy point the next step ends the orbit, as at a pole.
@@ -235,11 +235,11 @@ def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
     if not 1 / _LARGEST < smallest <= largest < _LARGEST:
         raise InputError(
             f"found numbers from {smallest:.0e} to {largest:.0e} in the plane of lambda = {frame.root_text}, expected "
-            f"{1 / _LARGEST:.0e} to {_LARGEST:.0e}: scale the start, the system or eps"
+            f"{1 / _LARGEST:.0e} to {_LARGEST:.0e}: scale the initial point, the system or eps"
         )
     return cubic
 
 
-def _machine(value: Any) -> Any:
+def _to_floating_point(value: Any) -> Any:
     """Convert a ball to a floating-point number."""
     return complex(float(value.real.mid()), float(value.imag.mid())) if isinstance(value, acb) else float(value.mid())

@@ -130,7 +130,9 @@ def survey_drift(
     for function in functions:
         exact, value = function.at(point), float(function(to_floats(point)[None])[0])
         if exact is None or not np.isfinite(value):
-            raise InputError(f"{function.name} has no value in floating point at the start: take another start")
+            raise InputError(
+                f"{function.name} is not defined in floating point at the initial point: choose another one"
+            )
         # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
         relative[function.name] = exact != 0 and value != 0.0
         origins.append((value, abs(value) if relative[function.name] else 1.0))
@@ -177,7 +179,7 @@ def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq,
         orbit = ClassicalOrbit(system, eps, start, _PROBE_STEPS, "rk4")
         for _ in orbit.portions():
             pass
-        if orbit.end is not None and orbit.end.is_whole:
+        if orbit.end is not None and orbit.end.is_complete:
             return start
     return starts[0]
 
@@ -240,7 +242,9 @@ def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
     with drawing(style):
         from matplotlib.lines import Line2D
 
-        ended = {method: "" if end.is_whole else f" (ended at step {end.steps})" for method, end in survey.ends.items()}
+        ended = {
+            method: "" if end.is_complete else f" (ended at step {end.steps})" for method, end in survey.ends.items()
+        }
         labels = [METHODS[method] + ending for method, ending in ended.items()]
         panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
         aspect = panel * rows + legend_height(labels, style, title=True)
@@ -267,7 +271,7 @@ def plot_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
                 beyond = np.flatnonzero(heights > limit)
                 if len(beyond):
                     axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
-                elif len(heights) and not survey.ends[curve.method].is_whole:
+                elif len(heights) and not survey.ends[curve.method].is_complete:
                     axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)
             # Break the line before the name only: the name may be a formula that contains spaces.
             function, kind = survey.labels[name], "relative" if survey.relative[name] else "absolute"
@@ -297,7 +301,7 @@ def clipped_from(survey: DriftSurvey, name: str) -> float:
     flatten all other curves.
     """
     completed = [
-        curve.errors for curve in survey.curves if curve.function == name and survey.ends[curve.method].is_whole
+        curve.errors for curve in survey.curves if curve.function == name and survey.ends[curve.method].is_complete
     ]
     return max([_LOST, *(10 * float(errors.max()) for errors in completed if len(errors))])
 

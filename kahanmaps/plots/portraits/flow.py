@@ -1,4 +1,4 @@
-"""The differential equation behind a portrait: its direction, equilibria, separatrices and solutions as curves.
+"""The differential equation of a portrait: its direction, equilibria, separatrices and solutions as curves.
 
 Curves are followed by their length, not by time: x' = f/|f| by RK4 with steps of a fraction of the window, so that
 they pass through what would be a pole in time, and are as smooth as can be seen everywhere. Around an equilibrium are
@@ -49,7 +49,7 @@ class Equilibrium:
 
     @property
     def kind(self) -> str:
-        """What the eigenvalues say: a center is one of the linear part, and terms of degree 2 may undo it."""
+        """The kind by the eigenvalues: a center of the linear part need not be one, because of terms of degree 2."""
         values, real = self.values, self.values.real
         least = _ZERO * max(float(np.abs(values).max()), _ZERO)
         if (np.abs(values) <= least).any():
@@ -64,35 +64,35 @@ class Equilibrium:
 
 
 def equilibria(system: QuadraticSystem) -> list[Equilibrium]:
-    """The real equilibria to which Newton's method comes from sixty starts, each once.
+    """Find the real equilibria to which Newton's method converges from sixty initial points, each once.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
-    >>> sorted((one.point.round(6).tolist(), one.kind) for one in equilibria(pendulum))
+    >>> sorted((equilibrium.point.round(6).tolist(), equilibrium.kind) for equilibrium in equilibria(pendulum))
     [([0.0, 0.0], 'saddle'), ([1.0, 0.0], 'center')]
     """
     n = system.dim
     f = VectorField(system)
     drawn = np.random.default_rng(0).uniform(-3, 3, (_NEWTON_STARTS if n <= _MAX_DIMENSION else 0, n))
-    found: list[Equilibrium] = []
+    all_equilibria: list[Equilibrium] = []
     for x in (np.zeros(n), np.ones(n), *drawn):
         for _ in range(_NEWTON_STEPS):
             value, bound = f(x), 1e-12 * (1 + float(np.abs(x).max()))
             if np.abs(value).max() <= bound:
                 nearest = np.round(x, 9)
                 point = nearest if np.abs(f(nearest)).max() <= bound else x
-                # Where an equilibrium is degenerate, Newton's method ends somewhat beside it: once is enough.
-                if not any(np.allclose(point, other.point, atol=1e-3) for other in found):
-                    found.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
+                # Near a degenerate equilibrium Newton's method ends at slightly different points: keep one of them.
+                if not any(np.allclose(point, other.point, atol=1e-3) for other in all_equilibria):
+                    all_equilibria.append(Equilibrium(point, *np.linalg.eig(f.jacobian(point))))
                 break
-            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
+            x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria may not be isolated
             if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
                 break
-    return found
+    return all_equilibria
 
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """What is drawn of x' = f(x) below the orbits of the map.
+    """The parts of the phase portrait of x' = f(x) that are drawn below the orbits of the map.
 
     `places` and `arrows` (count, 2) are points of the plane and the direction there in units of the window;
     `equilibria` are points (2,) with the word for their kind, `separatrices` and `solutions` curves (n, 2 or 3).
@@ -106,7 +106,7 @@ class Flow:
 
 
 def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) -> Flow:
-    """Arrows, equilibria and separatrices of a planar system, in a window of the plane of its two variables.
+    """Compute arrows, equilibria and separatrices of a planar system, in a window of the plane of its two variables.
 
     `plane` says which variable is along which axis. In another dimension the directions at a point of the picture are
     many, and there is nothing.
@@ -126,24 +126,28 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
     length = np.linalg.norm(arrows, axis=1, keepdims=True)
     with np.errstate(all="ignore"):
         arrows = np.where(length > 0, arrows / length, 0)
-    every = equilibria(system)
-    if len(every) > 2**system.dim:  # more than conics have in common: they fill curves
-        every = []
-    shown = [one for one in every if np.all((one.point[order] >= low) & (one.point[order] <= high))]
+    all_equilibria = equilibria(system)
+    if len(all_equilibria) > 2**system.dim:  # more than conics have in common: they fill curves
+        all_equilibria = []
+    shown = [
+        equilibrium
+        for equilibrium in all_equilibria
+        if np.all((equilibrium.point[order] >= low) & (equilibrium.point[order] <= high))
+    ]
     box = tuple(window[k] for k in order)
     size = np.array([b - a for a, b in box])
     branches = []
-    for saddle in (one for one in shown if one.kind == SADDLE):
+    for saddle in (equilibrium for equilibrium in shown if equilibrium.kind == SADDLE):
         for value, vector in zip(saddle.values.real, saddle.vectors.real.T, strict=True):
             offset = vector / np.linalg.norm(vector / size) * 1e-3
             for start in (saddle.point + offset, saddle.point - offset):
                 branches.append(np.vstack([saddle.point, solution(f, start, box, np.copysign(np.inf, value))]))
-    kinds = tuple((one.kind, one.point[order]) for one in shown)
+    kinds = tuple((equilibrium.kind, equilibrium.point[order]) for equilibrium in shown)
     return Flow(places, arrows, kinds, tuple(curve[:, order] for curve in branches))
 
 
 def projected_solutions(
-    system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], found: Trajectories, backward: bool
+    system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], trajectories: Trajectories, backward: bool
 ) -> tuple[FloatArray, ...]:
     """The solutions through the starts of orbits, as long as these are followed and around them, along some axes.
 
@@ -151,11 +155,11 @@ def projected_solutions(
     """
     functions = [axis for axis in axes if not isinstance(axis, str)]
     if len(functions) < len(axes):
-        raise InputError("the flow is drawn as curves in phase space: it does not go with the axis step")
-    box = window_of(found.points.reshape(-1, system.dim), found.points[0])
-    steps = len(found.points) - 1
+        raise InputError("the flow is drawn as curves in phase space: it cannot be combined with the axis step")
+    box = window_of(trajectories.points.reshape(-1, system.dim), trajectories.points[0])
+    steps = len(trajectories.points) - 1
     time = float(time_step(eps) * steps) * (-1 if backward else 1) if steps else None
-    curves = (solution(VectorField(system), start, box, time) for start in found.points[0])
+    curves = (solution(VectorField(system), start, box, time) for start in trajectories.points[0])
     return tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves)
 
 
@@ -179,15 +183,15 @@ def solution(f: VectorField, start: FloatArray, box: Window, time: float | None 
 
     def direction(x: FloatArray) -> FloatArray:
         value: FloatArray = sign * f(x)
-        found = float(np.linalg.norm(value / size))
-        return value / found if found > 0 else value
+        norm = float(np.linalg.norm(value / size))
+        return value / norm if norm > 0 else value
 
     stop = _SLOW * max(map(speed, (low, high, middle, start)))
     points, x, spent = [start], start, 0.0
     for count in range(_MAX_STEPS):
         pace = speed(x)
         spent += step / pace if pace > 0 else np.inf
-        # Separatrices begin slowly, at their saddle, and have all the time.
+        # Separatrices start slowly at their saddle: their time is not limited.
         slow = pace <= stop and (count > 2 * _FINE or not np.isinf(time or 0.0))
         if slow or (time is not None and spent > abs(time)) or np.abs((x - middle) / size).max() > 1.5:
             break
@@ -210,13 +214,13 @@ _SIZES = 24
 _SHRINK = 0.8
 _STEPS = 300
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-_FAR = 4.0  # an orbit stays if it is never farther from the center than so many times the largest start
+_FAR = 4.0  # an orbit stays if its distance from the center never exceeds this multiple of the largest initial one
 
 
 def automatic_starts(
     system: QuadraticSystem, eps: Any, plane: Sequence[int] = (0, 1), *, backward: bool = False
 ) -> FloatArray:
-    """Sixteen starts (16, dim) which make a good picture, the same ones every time; eps is half the time step.
+    """Choose sixteen initial points (16, dim) for a picture, deterministically; eps is half the time step.
 
     Around an equilibrium, the most stable one that is found: on a ray in the plane of these two variables, or where
     the field is homogeneous (and points of a ray move alike) on a circle; other coordinates are moved a little. They
@@ -229,12 +233,14 @@ def automatic_starts(
     """
     plane = [index for index in plane if index < system.dim][:2]
     # Equilibria, those first at which the field expands least, then those without negative coordinates; the origin.
-    order = sorted(equilibria(system), key=lambda one: (one.expansion, bool((one.point < 0).any())))
-    centers = [one.point for one in order[:_CENTERS]]
+    order = sorted(
+        equilibria(system), key=lambda equilibrium: (equilibrium.expansion, bool((equilibrium.point < 0).any()))
+    )
+    centers = [equilibrium.point for equilibrium in order[:_CENTERS]]
     if all(center.any() for center in centers):
         centers.append(np.zeros(system.dim))
     others = [index for index in range(system.dim) if index not in plane]
-    found: list[tuple[int, FloatArray]] = []
+    candidates: list[tuple[int, FloatArray]] = []
     for center in centers:
         # Around the origin of a homogeneous field a smaller size is only a slower motion.
         is_scaled = system.is_homogeneous and not center.any()
@@ -259,5 +265,5 @@ def automatic_starts(
             stays = (distance <= _FAR * np.abs(starts - center).max()).all(axis=0)
             if (stays & moves).all():
                 return starts
-            found.append((int((stays & moves).sum()), starts))
-    return max(found, key=lambda one: one[0])[1]
+            candidates.append((int((stays & moves).sum()), starts))
+    return max(candidates, key=lambda equilibrium: equilibrium[0])[1]

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 
     from kahanmaps.plots.drifts.drift_functions import WatchedFunction
 
-_MAX_NEIGHBOURS = 2000  # points: distances are taken pair by pair, and a curve through so many looks smooth
+_MAX_NEIGHBOURS = (
+    2000  # points: all pairs of points are compared; a curve through more points looks smooth without lines
+)
 _MIN_NEIGHBOURS = 8
 _OF_DEGREE_2 = 0.9  # of the points on a curve; of those of a cloud it is half
 # A gap in an orbit that has not filled its curve: in lengths of a usual line, and in diameters of the orbit. Points
@@ -40,7 +42,7 @@ ORBIT = "orbit"
 
 @dataclass(frozen=True, eq=False)
 class Portrait:
-    """What a portrait shows.
+    """The data that a portrait shows.
 
     `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN where there is no point; `labels` and
     `window` are one for each axis. `values` (records, orbits) color the points by `value_label`; None is by orbit.
@@ -64,13 +66,13 @@ class Portrait:
 
     def pairs(self, orbit: int) -> NDArray[np.int64]:
         """The pairs (count, 2) of records of an orbit that a line joins."""
-        found = self.joined[orbit] if self.joined else None
+        joined = self.joined[orbit] if self.joined else None
         steps = np.arange(len(self.points))
-        return np.stack([steps[:-1], steps[1:]], axis=1) if found is None else found
+        return np.stack([steps[:-1], steps[1:]], axis=1) if joined is None else joined
 
 
 def portrait_of(
-    found: Trajectories,
+    trajectories: Trajectories,
     axes: Sequence[PointFunction | str],
     *,
     color: WatchedFunction | str = ORBIT,
@@ -85,22 +87,22 @@ def portrait_of(
     of axes.
 
     >>> from kahanmaps.plots.point_functions import point_function
-    >>> found = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
-    >>> portrait_of(found, ["step", point_function("x", ["x"])]).points[:, 0].tolist()
+    >>> result = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
+    >>> portrait_of(result, ["step", point_function("x", ["x"])]).points[:, 0].tolist()
     [[0.0, 1.0], [1.0, 3.0]]
     """
     if len(axes) not in (2, 3):
         raise InputError(f"found {len(axes)} axes, expected 2 or 3")
-    points = _projected(found, axes)
+    points = _projected(trajectories, axes)
     values, label = None, ""
     if not isinstance(color, str):
-        flat = color(found.points.reshape(-1, found.points.shape[2]))
-        values, label = flat.reshape(found.points.shape[:2]), color.label
+        flat = color(trajectories.points.reshape(-1, trajectories.points.shape[2]))
+        values, label = flat.reshape(trajectories.points.shape[:2]), color.label
     elif color == STEP:
-        values, label = _steps(found), STEP
+        values, label = _steps(trajectories), STEP
     elif color != ORBIT:
         raise InputError(f"found the color {quoted(color)}, expected orbit, step or a function")
-    there = ~np.isnan(found.points).any(axis=2)
+    there = ~np.isnan(trajectories.points).any(axis=2)
     shown = ~np.isnan(points).any(axis=2)
     if values is not None:
         shown &= ~np.isnan(values)
@@ -116,17 +118,19 @@ def portrait_of(
         left_out=outside(flat, chosen),
         undefined=int(there.sum() - shown.sum()),
         euler=None if euler is None else _projected(euler, axes),
-        joined=tuple(map(neighbours, found.points.swapaxes(0, 1))) if join and STEP not in axes else (),
+        joined=tuple(map(neighbours, trajectories.points.swapaxes(0, 1))) if join and STEP not in axes else (),
     )
 
 
-def _projected(found: Trajectories, axes: Sequence[PointFunction | str]) -> FloatArray:
-    return np.stack([_steps(found) if isinstance(axis, str) else axis(found.points) for axis in axes], axis=-1)
+def _projected(trajectories: Trajectories, axes: Sequence[PointFunction | str]) -> FloatArray:
+    return np.stack(
+        [_steps(trajectories) if isinstance(axis, str) else axis(trajectories.points) for axis in axes], axis=-1
+    )
 
 
-def _steps(found: Trajectories) -> FloatArray:
-    steps = np.broadcast_to(np.asarray(found.steps, dtype=np.float64)[:, None], found.points.shape[:2])
-    return np.where(np.isnan(found.points).any(axis=2), np.nan, steps)
+def _steps(trajectories: Trajectories) -> FloatArray:
+    steps = np.broadcast_to(np.asarray(trajectories.steps, dtype=np.float64)[:, None], trajectories.points.shape[:2])
+    return np.where(np.isnan(trajectories.points).any(axis=2), np.nan, steps)
 
 
 def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
@@ -143,7 +147,7 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     """
     rows = np.flatnonzero(~np.isnan(points).any(axis=1))[:_MAX_NEIGHBOURS]
     held = points[rows]
-    _, first = np.unique(held.round(12), axis=0, return_index=True)  # a cycle comes to the same points again
+    _, first = np.unique(held.round(12), axis=0, return_index=True)  # a cycle repeats its points
     rows, held = rows[np.sort(first)], held[np.sort(first)]
     if len(rows) < _MIN_NEIGHBOURS:
         return None
@@ -192,15 +196,17 @@ _EQUILIBRIA: dict[str, dict[str, Any]] = {
 }
 
 
-def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = "") -> Figure:
+def plot_portrait(
+    portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
+) -> Figure:
     """Draw a portrait: dots, or with `lines` orbits joined; `equal` gives both axes the same unit.
 
-    `note` stands above the right corner, small. Raises InputError for more than a million points to be joined.
+    `note` is printed above the right corner. Raises InputError for more than a million points to be joined.
     """
-    count = found.points[..., 0].size
+    count = portrait.points[..., 0].size
     if lines and count > _MAX_JOINED:
         raise InputError(f"found {count} points to join by lines, expected at most {_MAX_JOINED}: draw dots")
-    in_space = len(found.labels) == 3
+    in_space = len(portrait.labels) == 3
     with drawing(style):
         import matplotlib as mpl
         from matplotlib.collections import LineCollection
@@ -208,43 +214,43 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
 
         aspect = _ASPECT
         if in_space:
-            aspect = 0.9 if found.values is None else 0.8
-        elif equal:  # height over width as the window asks for it, a color bar beside it
-            (x0, x1), (y0, y1) = found.window
-            aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if found.values is not None else 1.0)))
+            aspect = 0.9 if portrait.values is None else 0.8
+        elif equal:  # height over width follows from the window and the color bar beside it
+            (x0, x1), (y0, y1) = portrait.window
+            aspect = min(1.6, max(0.4, (y1 - y0) / (x1 - x0) * (0.8 if portrait.values is not None else 1.0)))
         figure = new_figure(style, aspect)
         if in_space:
             mpl.rcParams.update({"grid.color": "#DDDDDD", "grid.linewidth": 0.4})  # before the axes are made
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if in_space else {})
         handles: dict[str, Any] = {}  # of the legend, by their texts
-        if found.flow is not None:
+        if portrait.flow is not None:
             # Arrows and curves of the differential equation are drawn below the orbits, its equilibria above them.
-            flow = found.flow
+            flow = portrait.flow
             if len(flow.places):
                 axes.quiver(*flow.places.T, *flow.arrows.T, units="width", scale=34, pivot="mid", zorder=0.5, **_ARROWS)
                 arrow: dict[str, Any] = {"marker": r"$\rightarrow$", "markersize": 9, "linestyle": "none"}
                 handles["vector field"] = Line2D([], [], color="#999999", markeredgewidth=0, **arrow)
             looks = (("separatrix", flow.separatrices, _SEPARATRIX), ("solution", flow.solutions, _SOLUTION))
             for word, curve, look in ((word, curve, look) for word, curves, look in looks for curve in curves):
-                seen = _inside(curve[:, None], found.window)[:, 0] if in_space else curve
+                seen = _inside(curve[:, None], portrait.window)[:, 0] if in_space else curve
                 (handles[word],) = axes.plot(*seen.T, zorder=1.2, **look)
             for kind, point in flow.equilibria:
                 mark = {"linestyle": "none", "zorder": 4, "clip_on": False, **_EQUILIBRIA[kind]}
                 (handles[kind],) = axes.plot(*point[:, None], **mark)
-        pieces = [piece for pieces in found.levels or () for piece in pieces]
+        pieces = [piece for pieces in portrait.levels or () for piece in pieces]
         if pieces:
             axes.add_collection(LineCollection(pieces, zorder=1, **_LEVEL), autolim=False)
             handles["level curve"] = Line2D([], [], color=_LEVEL["colors"], linewidth=_LEVEL["linewidths"])
-        if found.euler is not None:
-            # In the plane lines go on to the edge; what is far beyond it may be too large to draw.
-            around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in found.window)
-            # Dashes, for in a gray copy the colors say less.
+        if portrait.euler is not None:
+            # Lines continue to the edge of the plane; points far outside may be too large to draw.
+            around = tuple((low - 9 * (high - low), high + 9 * (high - low)) for low, high in portrait.window)
+            # Dashed, since colors are hard to distinguish in a gray copy.
             dashes: dict[str, Any] = {
                 "linewidth": 0.6,
                 "linestyle": (0, (5, 2)),
                 "rasterized": count > MAX_VECTOR_POINTS,
             }
-            for orbit in _inside(found.euler, found.window if in_space else around).swapaxes(0, 1):
+            for orbit in _inside(portrait.euler, portrait.window if in_space else around).swapaxes(0, 1):
                 if lines:
                     axes.plot(*orbit.T, color=_EULER, zorder=1.5, **dashes)
                 else:
@@ -252,10 +258,10 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
             dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markeredgewidth": 0, "markersize": 2.4}
             handles["explicit Euler"] = Line2D([], [], color=_EULER, **(dashes if lines else dot))
         # Axes in space do not cut off what lies outside of them.
-        shown = _inside(found.points, found.window) if in_space else found.points
-        if found.values is None and shown.shape[1] <= len(COLORS):
-            _draw_few(axes, shown, lines, found)
-        elif found.values is None:
+        shown = _inside(portrait.points, portrait.window) if in_space else portrait.points
+        if portrait.values is None and shown.shape[1] <= len(COLORS):
+            _draw_few(axes, shown, lines, portrait)
+        elif portrait.values is None:
             # In the colors of the color map, the widest first, so that those inside stay visible.
             with np.errstate(all="ignore"):
                 extent = np.nanmax(shown, axis=0, initial=-np.inf) - np.nanmin(shown, axis=0, initial=np.inf)
@@ -263,15 +269,15 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
                 scale = extent.max(axis=0, initial=0)
                 order = np.argsort(-(extent / np.where(scale > 0, scale, 1)).max(axis=1), kind="stable")
             numbers = np.broadcast_to(np.arange(shown.shape[1], dtype=np.float64), shown.shape[:2])
-            _draw_colored(axes, shown, numbers, order, (0.0, shown.shape[1] - 1.0), lines, found)
+            _draw_colored(axes, shown, numbers, order, (0.0, shown.shape[1] - 1.0), lines, portrait)
         else:
-            seen = found.values[~np.isnan(_inside(shown, found.window)).any(axis=2)]
+            seen = portrait.values[~np.isnan(_inside(shown, portrait.window)).any(axis=2)]
             low, high = main_range(seen)
-            drawn = _draw_colored(axes, shown, found.values, range(shown.shape[1]), (low, high), lines, found)
+            drawn = _draw_colored(axes, shown, portrait.values, range(shown.shape[1]), (low, high), lines, portrait)
             beyond = bool((seen < low).any()), bool((seen > high).any())
             how: dict[str, Any] = {"pad": 0.1 if in_space else 0.02, "aspect": 30, "extend": _EXTEND[beyond]}
-            figure.colorbar(drawn, ax=axes, **how).set_label(found.value_label)
-        if found.values is None and shown.shape[1] <= _MAX_INITIAL:
+            figure.colorbar(drawn, ax=axes, **how).set_label(portrait.value_label)
+        if portrait.values is None and shown.shape[1] <= _MAX_INITIAL:
             for k in range(shown.shape[1]):
                 fill = COLORS[k] if shown.shape[1] <= len(COLORS) else "white"
                 axes.plot(*shown[0, k][:, None], linestyle="none", markerfacecolor=fill, zorder=3, **_INITIAL)
@@ -279,24 +285,24 @@ def plot_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
                 handles["initial point"] = Line2D([], [], linestyle="none", markerfacecolor="white", **_INITIAL)
         if handles:
             legend_above(figure, list(handles.values()), list(handles), style)
-        for side, label, limits in zip("xyz", found.labels, found.window, strict=False):
+        for side, label, limits in zip("xyz", portrait.labels, portrait.window, strict=False):
             axes.set(**{f"{side}label": label, f"{side}lim": limits})
         if note:
             axes.set_title(note, loc="right", fontsize=style.smallest, color="#555555", pad=2)
         if in_space:
-            _make_room(axes, found.window if equal else None)
+            _make_room(axes, portrait.window if equal else None)
         elif equal:
             axes.set_aspect("equal", adjustable="box")
     return figure
 
 
-def _draw_few(axes: Any, shown: FloatArray, lines: bool, found: Portrait) -> None:
+def _draw_few(axes: Any, shown: FloatArray, lines: bool, portrait: Portrait) -> None:
     """Draw each orbit in its own color, and with its own mark where it has few points."""
     count = shown.shape[0] * shown.shape[1]
     for k, orbit in enumerate(shown.swapaxes(0, 1)):
         how: dict[str, Any] = {"color": COLORS[k], "zorder": 2}
         if lines:
-            pairs = found.pairs(k)
+            pairs = portrait.pairs(k)
             path = orbit
             if (pairs[:, 1] != pairs[:, 0] + 1).any():  # NaN between the lines: plot takes many of them at once
                 ends = orbit[pairs]
@@ -314,14 +320,14 @@ def _draw_colored(
     order: Iterable[int],
     limits: tuple[float, float],
     lines: bool,
-    found: Portrait,
+    portrait: Portrait,
 ) -> Any:
-    """Dots of the orbits in this order, or the lines that join them, in the colors of the values."""
+    """Draw dots of the orbits in this order, or the lines that join them, in the colors of the values."""
     import matplotlib as mpl
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, Normalize
 
-    # Without the lightest part of the map: dots are small, and paper is white.
+    # Without the lightest part of the color map: small dots would be invisible on white paper.
     colors = ListedColormap(mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, 256)))
     is_image = shown.shape[0] * shown.shape[1] > MAX_VECTOR_POINTS
     how: dict[str, Any] = {"norm": Normalize(*limits), "cmap": colors, "rasterized": is_image, "zorder": 2}
@@ -332,7 +338,7 @@ def _draw_colored(
         there = ~np.isnan(ordered).any(axis=2)
         how |= {"s": dot_size(values.size) ** 2, "linewidths": 0, **({"depthshade": False} if in_space else {})}
         return axes.scatter(*ordered[there].T, c=heights[there], **how)
-    joined = [(found.pairs(int(k)), k) for k in order]
+    joined = [(portrait.pairs(int(k)), k) for k in order]
     ends = np.concatenate([shown[pairs, k] for pairs, k in joined])
     heights = np.concatenate([values[pairs[:, 0], k] for pairs, k in joined])
     there = ~np.isnan(ends).any(axis=(1, 2))
@@ -348,12 +354,12 @@ def _draw_colored(
 
 
 def _inside(shown: FloatArray, window: Window) -> FloatArray:
-    """NaN for points outside the window."""
+    """Replace points outside the window by NaN."""
     return np.where(inside(shown, window)[..., None], shown, np.nan)
 
 
 def _make_room(axes: Any, window: Window | None) -> None:
-    """Axes in space: light planes, few ticks, and labels inside the picture, which layouts do not look after.
+    """Format axes in space: light planes, few ticks, and labels inside the picture, which layouts do not ensure.
 
     With a window the box has the proportions of its sides. Of the twelve edges matplotlib draws those of three planes.
     """
@@ -366,7 +372,7 @@ def _make_room(axes: Any, window: Window | None) -> None:
         axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10], prune="both"))
         axis.labelpad = 0
     limits = (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())
-    for one, other in combinations(product(*limits), 2):
-        if sum(a != b for a, b in zip(one, other, strict=True)) == 1:
-            axes.plot(*zip(one, other, strict=True), color="#BBBBBB", linewidth=0.4, zorder=0)
+    for corner, other in combinations(product(*limits), 2):
+        if sum(a != b for a, b in zip(corner, other, strict=True)) == 1:
+            axes.plot(*zip(corner, other, strict=True), color="#BBBBBB", linewidth=0.4, zorder=0)
     axes.tick_params(pad=0)

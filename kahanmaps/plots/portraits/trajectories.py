@@ -25,7 +25,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 4_000_000  # of all orbits together: beyond that a picture of single points shows nothing more
 _MAX_NUMBERS = 40_000_000
-# Up to so much work, and so many steps, numpy is done before compiled code is loaded.
+# Up to this work and number of steps, numpy finishes before compiled code is loaded.
 _LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
 
 
@@ -43,7 +43,7 @@ class Trajectories:
 
     @property
     def orbits(self) -> int:
-        """How many orbits there are."""
+        """The number of orbits."""
         return int(self.points.shape[1])
 
 
@@ -70,12 +70,12 @@ def field_of(file: SystemFile) -> QuadraticSystem | None:
 
 def float_normal_form(file: SystemFile) -> tuple[NormalForm | None, str]:
     """The normal form in which floats can step, or None and why there is none."""
-    found = file.normal_form
-    if isinstance(found, NoNormalForm):
-        return None, found.reason
-    if found.T is not None:
+    form = file.normal_form
+    if isinstance(form, NoNormalForm):
+        return None, form.reason
+    if form.T is not None:
         return None, "in floating point only J = [[0, I], [-I, 0]] has one"
-    return found.form, ""
+    return form.form, ""
 
 
 def ensemble_of_file(
@@ -90,16 +90,14 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
     """Take `steps` steps and keep every point. Raises InputError for more than MAX_POINTS points.
 
     >>> system = QuadraticSystem.from_text(["x"], ["x"])
-    >>> found = walked(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)
-    >>> found.points[:, :, 0].tolist(), found.ended
+    >>> result = walked(ensemble_for(system, "1/2", np.array([[1.0], [2.0]]), 2), 2)
+    >>> result.points[:, :, 0].tolist(), result.ended
     ([[1.0, 2.0], [3.0, 6.0], [9.0, 18.0]], {})
     """
     require_steps(steps)
     most = min(MAX_POINTS, _MAX_NUMBERS // ensemble.system.dim)
     if (steps + 1) * ensemble.n > most:
-        raise InputError(
-            f"found {steps} steps of {ensemble.n} orbits, expected at most {most} points: take fewer steps"
-        )
+        raise InputError(f"found {steps} steps of {ensemble.n} orbits, expected at most {most} points: use fewer steps")
     points = np.concatenate(list(ensemble.records(steps, 1, progress=progress)))
     words = {"overflow": "left the range of floating-point numbers", "singular": "met a singular matrix I - eps f'"}
     ended = {text: int((ensemble.status == status).sum()) for status, text in words.items()}
@@ -112,7 +110,7 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
 
 
 def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: int) -> Trajectories:
-    """Orbits of explicit Euler, x~ = x + 2 eps f(x), in doubles; those that leave the range of floats are NaN then.
+    """Compute orbits of the explicit Euler method, x~ = x + 2 eps f(x), in doubles; NaN after leaving their range.
 
     `starts` (n, dim) are doubles, eps is exact, half the time step; a negative one steps backward.
 

@@ -14,18 +14,18 @@ from kahanmaps.maps.floats.float_conversion import FloatArray
 
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
-_SHARE = 10.0  # percent of the points, at either end, that do not say how far the picture reaches
-_REACH = 3.0  # ... unless they are within so many lengths of what the others fill
+_SHARE = 10.0  # percent of the points at either end that do not determine the range
+_REACH = 3.0  # ... unless they are within this multiple of the length that the others fill
 _UNBOUNDED, _SHOWN = 1e12, 10  # times the reach of the starts
 _MARGIN = 0.04
-_LARGEST = 1e307  # what matplotlib can still subtract
+_LARGEST = 1e307  # largest number that matplotlib can subtract
 _LOOKED_AT = 4000  # points, when axes are chosen
 _VARIABLES = 16
 _CELLS = {1: 400, 2: 24, 3: 10}  # along each axis
 
 
 def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
-    """A window for points (n, d) that a few points far away do not spoil: it need not hold all of them.
+    """Return a window for points (n, d) that ignores a few points far away.
 
     Along each axis, the range of all points; or where some of the outer tenth at either end are farther away than three
     times the length that the others and the `starts` fill, that length and half of it at either end. Where most orbits
@@ -43,18 +43,18 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
     first = points[:0] if starts is None else starts
     reach = float(np.abs(first[np.isfinite(first)]).max(initial=0))
     window = []
-    for column, wanted in zip(points.T, first.T, strict=True):
-        low, high = main_range(column, wanted)
+    for column, required in zip(points.T, first.T, strict=True):
+        low, high = main_range(column, required)
         if 0 < _UNBOUNDED * reach < max(-low, high):
-            low, high = main_range(column[np.abs(column) <= _SHOWN * reach], wanted)
+            low, high = main_range(column[np.abs(column) <= _SHOWN * reach], required)
         unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in which nothing overflows
         margin = (high / unit - low / unit) * _MARGIN
         window.append(((low / unit - margin) * unit, (high / unit + margin) * unit))
     return tuple(window)
 
 
-def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[float, float]:
-    """The range of the values as `window_of` chooses it, without a margin; `wanted` are the starts.
+def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
+    """The range of the values as `window_of` chooses it, without a margin; `required` are the initial points.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
@@ -64,8 +64,8 @@ def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[fl
     if unit == 0:
         return -1.0, 1.0
     parts = [values]
-    if wanted is not None and len(wanted := np.clip(wanted[np.isfinite(wanted)], -_LARGEST, _LARGEST)):
-        parts.append(wanted)
+    if required is not None and len(required := np.clip(required[np.isfinite(required)], -_LARGEST, _LARGEST)):
+        parts.append(required)
     # What all but a tenth at either end fill, in a unit in which nothing overflows.
     ends = [np.percentile(part, [_SHARE, 100 - _SHARE], method="nearest") / unit for part in parts]
     first, last = float(min(end[0] for end in ends)), float(max(end[1] for end in ends))
@@ -73,13 +73,13 @@ def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[fl
     if low < first - _REACH * (last - first) or high > last + _REACH * (last - first):
         low = max(low, first - (last - first) / 2)
         high = min(high, last + (last - first) / 2)
-    if high - low < 1e-9 * max(abs(low), abs(high)):  # one value, up to rounding: it stands in the middle
+    if high - low < 1e-9 * max(abs(low), abs(high)):  # one value, up to rounding, which is put in the middle
         low, high = low - max(abs(low), abs(high)) / 10, high + max(abs(low), abs(high)) / 10
     return low * unit, high * unit
 
 
 def require_window(numbers: Sequence[float], axes: int) -> Window:
-    """Numbers low, high, low, high, ... as a window. Raises InputError unless there are two for each axis, in order."""
+    """Return low, high, low, high, ... as a window. Raises InputError unless there are two for each axis, in order."""
     if len(numbers) != 2 * axes:
         raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
     window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
@@ -90,13 +90,13 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
 
 
 def inside(points: FloatArray, window: Window) -> NDArray[np.bool_]:
-    """Which points (..., d) lie in the window; NaN does not."""
+    """Return which points (..., d) lie in the window; NaN does not."""
     low, high = (np.array(side) for side in zip(*window, strict=True))
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))
 
 
 def outside(points: FloatArray, window: Window) -> int:
-    """How many points (n, d) lie outside the window; NaN does not count."""
+    """Return the number of points (n, d) outside the window; NaN does not count."""
     return int((~np.isnan(points).any(axis=1) & ~inside(points, window)).sum())
 
 
@@ -104,7 +104,7 @@ def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
     """The `count` variables, in order, whose plane or space points (n, dim) fill most; of equals the first ones.
 
     Each variable is scaled to its own window, and the boxes of a grid that hold a point are counted. Of more than 16
-    variables the first 16 that vary are looked at.
+    variables the first 16 that vary are compared.
 
     >>> t = np.linspace(0, 6, 200)
     >>> fullest_axes(np.stack([t, t, 0 * t, np.sin(5 * t)], axis=1), 2)

@@ -365,7 +365,7 @@ class SpaceSearch:
 
     @property
     def tried(self) -> str:
-        """A phrase on the functions among which integrals were sought."""
+        """A phrase for the functions among which integrals were searched for."""
         parts = []
         if self.cofactor_degree:
             parts.append(f"P and Q of degree up to {self.cofactor_degree} with known cofactors or denominators")

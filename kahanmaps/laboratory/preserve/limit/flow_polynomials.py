@@ -51,7 +51,7 @@ _MAX_LISTED = 20_000  # monomials up to a degree, before they are grouped by wei
 _SPARE = 8  # orders of a series beyond the number of monomials
 _MAX_CHOICES = 400  # of zeros on a line, and of pairs of choices
 _PRIMES = 12  # the first one usually suffices
-_PRECISION = 24  # exponent of a prime: 1,464 bits
+_PRECISION = 24  # exponent of a prime power, which has 1,464 bits
 _MAX_CONJUGATES = 8
 _LINES = 4  # modulo each prime
 
@@ -280,6 +280,7 @@ class _Search:
             is_unique = pivots(solution) == list(range(len(columns)))
             return [row[-1] for row in solution] if is_unique else None
 
+        # P is determined up to a factor. One coefficient stays fixed, so that the linear systems have one solution.
         first = next(k for k, c in enumerate(vector) if c)
         P, P_known = total(vector, terms), list(vector)
         K_known = solve([P * k for k in cofactor], along(P))

@@ -1,4 +1,4 @@
-"""Limits of integrals of a map as eps -> 0: which integrals of its differential equation it keeps, deforms and loses.
+"""Limits of integrals of a map as eps -> 0: which integrals of its differential equation it conserves, deforms, loses.
 
 An integral of a map x + 2 eps f(x) + ... has an expansion eps^v (I_0 + eps^k I_1 + ...), and its leading term I_0 is
 an integral of the flow: f . grad I_0 = 0. If I_0 depends on the leading terms J_0, ... of other integrals,
@@ -54,12 +54,12 @@ _MAX_DEGREE = {1: 1, 2: 10, 3: 6, 4: 4}  # of relations along solutions, by dime
 
 @dataclass(frozen=True)
 class Limit:
-    """An integral of the flow that the map keeps or deforms: `combination` = `leading` + eps^order `second` + ....
+    """An integral of the flow that the map conserves or deforms: `combination` = `leading` + eps^order `second` + ....
 
     `combination` is a function of eps and of integrals of the map, by their names; `second` is None if the series has
-    no further term. f . grad leading = 0 is proved; `kept` is the verdict on the map conserving `leading` itself. If
-    the phase space consists of several successive points, `on_solutions` is True and there is only the leading term, at
-    points of one solution.
+    no further term. f . grad leading = 0 is proved; `conserved` is the verdict on the map conserving `leading` itself.
+    If the phase space consists of several successive points, `on_solutions` is True and there is only the leading term,
+    at points of one solution.
     """
 
     name: str
@@ -67,15 +67,15 @@ class Limit:
     leading: RationalFunction
     order: int
     second: RationalFunction | None
-    kept: Certainty
+    conserved: Certainty
     on_solutions: bool = False
 
     @property
     def text(self) -> str:
-        """The integral of the flow and what becomes of it under the map, as a sentence."""
+        """A sentence on the integral of the flow: whether the map conserves or deforms it."""
         relation = "one of the map tends to"
-        if self.kept.holds or self.kept is Certainty.REFUTED:
-            relation = f"the map keeps ({self.kept})" if self.kept.holds else "the map deforms"
+        if self.conserved.holds or self.conserved is Certainty.REFUTED:
+            relation = f"the map conserves ({self.conserved})" if self.conserved.holds else "the map deforms"
         series = f"{self.combination} {'tends to' if self.on_solutions else '='} {self.name}"
         series += " at successive points of one solution" * self.on_solutions
         if self.second is not None:
@@ -88,7 +88,7 @@ class Limit:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         second = None if self.second is None else format_factored(self.second)
-        known = attributes(self, "name", "combination", "order", "kept")
+        known = attributes(self, "name", "combination", "order", "conserved")
         return {**known, "leading": format_factored(self.leading), "second": second}
 
 
@@ -96,16 +96,16 @@ class Limit:
 class FlowAndMap:
     """A comparison of the flow with its map.
 
-    The known integrals of the flow are `limits`, to which integrals of the map tend, and `others`; together they are
-    independent. The map has `count` integrals; for `without_limit` of them no limit is known. `search` is the search
-    for integrals of the flow, None if the limits are already the largest possible number. `density` is a phi of the
-    flow; `density_search` is the search for it, None if the limit of a density of the map is one. `polynomials` are the
-    known Darboux polynomials of the flow of degree above 1 that are not integrals. Up to `polynomials_degree` there are
-    no others (measured); 0 means that there was no search. `polynomials_reason` says why the next degree is open.
+    The known integrals of the flow are `limits`, to which integrals of the map tend, and `other_integrals`; together
+    they are independent. The map has `count` integrals; for `without_limit` of them no limit is known. `search` is the
+    search for integrals of the flow, None if the limits are already the largest possible number. `density` is a phi of
+    the flow; `density_search` is the search for it, None if the limit of a density of the map is one. `polynomials` are
+    the known Darboux polynomials of the flow of degree above 1 that are not integrals. Up to `polynomials_degree` there
+    are no others (measured); 0 means that there was no search. `polynomials_reason` says why the next degree is open.
     """
 
     limits: tuple[Limit, ...]
-    others: tuple[FoundIntegral, ...]
+    other_integrals: tuple[FoundIntegral, ...]
     without_limit: int
     count: int
     map_search: IntegralSearch
@@ -123,9 +123,9 @@ class FlowAndMap:
 
     @property
     def lost(self) -> int:
-        """A lower bound (measured) of the number of `others` that are not limits of integrals of the map."""
+        """A lower bound (measured) of the number of `other_integrals` that are not limits of integrals of the map."""
         profile = self.map_search.profile
-        return max(0, len(self.others) - self.without_limit) if profile.nullities and profile.agree else 0
+        return max(0, len(self.other_integrals) - self.without_limit) if profile.nullities and profile.agree else 0
 
     def __str__(self) -> str:
         return "\n".join("\t".join(line) for line in self.lines())
@@ -133,28 +133,30 @@ class FlowAndMap:
     def lines(self, *, others: bool = True) -> list[tuple[str, str]]:
         """Return the statements, each as (certainty, sentence); with `others` also the formulas of the others."""
         statements = [("proved", limit.text) for limit in self.limits]
-        for F in self.others if others else ():
+        for F in self.other_integrals if others else ():
             statements.append((str(F.verdict), f"{F.name} = {F.short_text} is an integral of the flow  [{F.origin}]"))
-        names = ", ".join(F.name for F in self.others)
+        names = ", ".join(F.name for F in self.other_integrals)
         shown = counted(self.count, "integral") if self.count else "no integral"
         shown += " free of n" if self.map_search.time_dependent else ""  # time-dependent ones contain the step n
         if self.lost:
-            which = names if self.lost == len(self.others) else f"at least {self.lost} of {names}"
+            which = names if self.lost == len(self.other_integrals) else f"at least {self.lost} of {names}"
             limits = f", with limits independent of {names}" if self.count else ""
-            lost = f"{which} {'is' if self.lost == 1 else 'are'} lost up to degree {self.map_search.profile.degree}"
-            statements.append(("measured", f"{lost}: the map shows {shown}{limits}"))
-        if self.lost < len(self.others):
+            verb, degree = "is" if self.lost == 1 else "are", self.map_search.profile.degree
+            statements.append(("measured", f"{which} {verb} lost up to degree {degree}: the map shows {shown}{limits}"))
+        if self.lost < len(self.other_integrals):
             missing = f"the limits of {counted(self.without_limit, 'integral')} are not known"
             why = missing if self.without_limit else "its integrals were not counted"
             statements.append(("undecided", f"what the map makes of {names}: {why}"))
-        missing_formulas = 0 if self.search is None else self.search.codimension - len(self.limits) - len(self.others)
+        missing_formulas = (
+            0 if self.search is None else self.search.codimension - len(self.limits) - len(self.other_integrals)
+        )
         if self.search is not None and missing_formulas > 0:
             number = counted(self.search.codimension, "independent integral")
             statements.append(
                 ("measured", f"solutions show {number} of the flow, {missing_formulas} without a formula")
             )
         elif self.search is not None and self.search.profile.nullities and not self.search.is_exact:
-            more = "other " * bool(self.limits or self.others)
+            more = "other " * bool(self.limits or self.other_integrals)
             tried = f"relations along solutions up to degree {self.search.profile.degree}"
             statements.append(("measured", f"no {more}rational integral of the flow shows in {tried}"))
         if self.search is not None and self.search.profile.cut == SPENT:
@@ -173,9 +175,9 @@ class FlowAndMap:
             statements.append((str(timed.integral.verdict), text))
         if self.polynomials_degree > 1:
             which, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
-            found = f"of the flow of degree <= {self.polynomials_degree} were found"
+            degrees = f"of the flow of degree <= {self.polynomials_degree} were found"
             statements.append(
-                ("measured", f"no {which}Darboux polynomials {found} {exceptions} factors of known integrals")
+                ("measured", f"no {which}Darboux polynomials {degrees} {exceptions} factors of known integrals")
             )
         if self.polynomials_reason:
             which = f"Darboux polynomials of the flow of degree {self.polynomials_degree + 1}"
@@ -185,7 +187,7 @@ class FlowAndMap:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            **attributes(self, "limits", "others", "lost", "without_limit", "density", "reason"),
+            **attributes(self, "limits", "other_integrals", "lost", "without_limit", "density", "reason"),
             **attributes(self, "polynomials", "polynomials_degree", "polynomials_reason"),
             "degree": None if self.search is None else self.search.profile.degree,
         }
@@ -316,9 +318,9 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
         if not verdict.holds:
             continue
         independent.add(independent.gradient(leading))
-        kept = integral.verdict if second is None and R is None else map_laboratory.verdict_on(leading)[0]
+        verdict = integral.verdict if second is None and R is None else map_laboratory.verdict_on(leading)[0]
         used.append((I, name))
-        limits.append(Limit(f"L{len(limits) + 1}", formal.format(name), leading, order, second, kept))
+        limits.append(Limit(f"L{len(limits) + 1}", formal.format(name), leading, order, second, verdict))
     return tuple(limits)
 
 
@@ -349,6 +351,7 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
             for part in (integral.function.numerator, integral.function.denominator)
         )
         try:
+            # A constant leading term says nothing: subtract it and take the next term, once.
             for _ in range(2):
                 order, content, leading = _leading(Function(functions, P, Q))
                 if not (leading.is_polynomial and leading.numerator.is_constant()):
@@ -363,8 +366,8 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
         independent.add(row)
         combination = formal.format(name * formal.variables[-1] ** -order / formal.convert(content))
         parts = (part.compose(*map_gens, ctx=map_ring) for part in (leading.numerator, leading.denominator))
-        kept, _ = Laboratory(search.file, search.symbols, None, search.seed).verdict_on(RationalFunction(*parts))
-        limits.append(Limit(f"L{len(limits) + 1}", combination, leading, 0, None, kept, on_solutions=True))
+        verdict, _ = Laboratory(search.file, search.symbols, None, search.seed).verdict_on(RationalFunction(*parts))
+        limits.append(Limit(f"L{len(limits) + 1}", combination, leading, 0, None, verdict, on_solutions=True))
     return tuple(limits)
 
 

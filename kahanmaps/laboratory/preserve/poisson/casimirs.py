@@ -78,6 +78,7 @@ def _products(
     p, rows = map_.prime, list[list[int]]()
     for _ in range(_SPARE + len(integrals)):
         values, fields = _hamiltonian_fields(map_, tensor, integrals)
+        # I_1^a I_2^b ... is a Casimir if and only if the logarithmic fields satisfy a P grad I_1/I_1 + ... = 0.
         columns = [[c * pow(I, -1, p) % p for c in v] for I, v in zip(values, fields, strict=True)]
         rows += [list(row) for row in zip(*columns, strict=True)]
     for vector in null_space(rows, len(integrals), p):

@@ -85,7 +85,7 @@ def constant_structures(system: SystemLike, *, seed: int = 0) -> ConstantStructu
 
     Returns:
         A `ConstantStructures`. J = [[0, I], [-I, 0]] is preferred, then another invertible J of few terms, then a J
-        whose kernel is the space of all affine integrals. A kernel that is a proper subspace of it is not tried.
+        whose kernel is the space of all affine integrals. Proper subspaces of this space are not tried as kernels.
 
     Raises:
         InputError: for a dimension above 30.
@@ -266,6 +266,7 @@ class InheritedIntegrals:
         f_y = field.column([f[i] for i in free])
         u = field.column([image_point[i] - point[i] for i in free])
         du_dy = (identity - A * eps).inv() * (identity + A_image * eps) - identity
+        # The integral of the map is H + grad H . (x~ - x)/3, where grad H = K f and the Hesse matrix of H is K A.
         third = field.convert(fmpq(1, 3))
         for form in self.forms:
             K = field.convert_matrix(form)

@@ -55,7 +55,7 @@ class BasePoints:
 
     @property
     def text(self) -> str:
-        """As a phrase."""
+        """The base points as a phrase."""
         near = f" ({self.infinitely_near} infinitely near)" if self.infinitely_near else ""
         return f"{self.count} of multiplicity {self.multiplicity}{near}"
 
@@ -80,7 +80,7 @@ class Pencil:
 
     @property
     def text(self) -> str:
-        """One sentence with all numbers."""
+        """A sentence on degree, genus and base points of the generic curve."""
         kind = "is" if self.components == 1 else f"has {self.components} components"
         points = ", ".join(points.text for points in self.base_points)
         return (
@@ -91,7 +91,7 @@ class Pencil:
     def motion(self, growth: Growth) -> str:
         """Return a sentence on the restriction of the map to these curves, given the growth of its degrees.
 
-        It is empty where nothing follows. An automorphism of a curve of genus 1 is a translation or has finite order.
+        Empty if nothing can be concluded. An automorphism of a curve of genus 1 is a translation or has finite order.
         """
         if self.genus > 1:
             return "the map has finite order, since such a curve has only finitely many automorphisms"
@@ -214,7 +214,7 @@ class _Reduced:
             eliminant[i] = int(c)
         _require(eliminant[-1] != 0)
         for factor, number in nmod_poly(eliminant, self.prime).factor()[1]:
-            if number < 4:  # less than 2^2: a chain of simple points, each infinitely near to the one before
+            if number < 4:  # less than 2^2: a chain of simple points, each infinitely near to the preceding one
                 self._add_simple(int(factor.degree()), int(number), near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
@@ -290,7 +290,7 @@ class _Reduced:
 
 
 def _polynomial(K: Any, coefficients: list[Any]) -> Any:
-    return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub forgets lists
+    return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub does not allow lists
 
 
 def _root(K: Any, coefficients: list[Any]) -> Any:

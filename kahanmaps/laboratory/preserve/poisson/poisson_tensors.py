@@ -60,7 +60,7 @@ _MAX_UNKNOWNS = 2000
 _MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
 _SPARE = 8
 _SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
-_MAX_INTEGRALS = 12  # all subsets of so many integrals are tried for involution
+_MAX_INTEGRALS = 12  # the number of integrals of which all subsets are tested for involution
 _MAX_PENCIL = 8  # tensors whose combinations are tested for the Jacobi identity
 
 Exponents = tuple[int, ...]
@@ -242,8 +242,8 @@ def find_poisson(
         if any(part.is_zero() for part in at_eps(denominator, laboratory.eps)):
             at = "" if laboratory.eps is None else f" at eps = {laboratory.eps}"
             raise InputError(
-                f"found the denominator {quoted(format_rational_function(denominator))}, which is identically 0 or has "
-                f"no values{at}, expected a function that is not zero"
+                f"found the denominator {quoted(format_rational_function(denominator))}, which is identically 0 or "
+                f"undefined{at}, expected a function that is not zero"
             )
     while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree -= 1
@@ -262,7 +262,7 @@ def find_poisson(
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             forms, _ = _tensors(laboratory, 2, None, logarithmic, log_canonical(dim))
         if not forms and denominator is None:
-            # Try the product of the factors of a known density as denominator, and raise the degree by that of it.
+            # Try the product of the factors of a known density as denominator, and raise the degree by its degree.
             density = None
             with suppress(NoPoint):
                 density = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), over_density)).density
@@ -314,7 +314,7 @@ def with_brackets(result: PoissonSearch, integrals: Sequence[FoundIntegral], bud
         laboratory = Laboratory(result.file, result.symbols, result.eps, result.seed)
         tensors = tuple(_with_brackets(laboratory, tensor, integrals, budget) for tensor in tensors)
     if tensors and budget.is_spent:
-        cut = f"some identities were not expanded, or some Casimirs not sought: {SPENT}"
+        cut = f"some identities were not expanded, or some Casimirs not searched for: {SPENT}"
         result = replace(result, reason="; ".join(filter(None, [result.reason, cut])))
     return replace(result, tensors=tensors, integrals=tuple(integrals))
 

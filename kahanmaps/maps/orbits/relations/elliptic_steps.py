@@ -50,7 +50,7 @@ class EllipticSteps:
         return self.point(number) if self.skip(number) else None
 
     def skip(self, number: int) -> bool:
-        """Return whether the previous point surely has an image, by means of the orbit modulo a prime."""
+        """Return whether the orbit modulo a prime shows that the previous point has an image."""
         if self._residue is None:
             previous = self.point(number - 1)
             self._residue = None if previous is None else previous.residues(_PRIME)

@@ -43,7 +43,7 @@ def common_primes(degree: int, table: fmpz_mat, W: Sequence[fmpq], U: Sequence[f
     n T. If these products span the forms of their degree, such primes divide the index of their lattice: the only
     common primes of the forms are those of the first terms. Raises ArithmeticError if the products do not span.
     """
-    for extra_degree in (0, *range(2, degree + 1)):
+    for extra_degree in (0, *range(2, degree + 1)):  # no section of degree 1 depends on n T alone
         length = degree + extra_degree
         if table.nrows() * max(extra_degree, 1) < length:
             continue

@@ -1,4 +1,4 @@
-"""The exceptional hypersurfaces of a map without their polynomials: by points, and by what happens along curves there.
+"""The exceptional hypersurfaces of a map without their polynomials: by points, and by curves through these points.
 
 Let M and M' be the matrices of a map F and of its inverse, both linear in the point. The image of a hypersurface that F
 contracts lies in the indeterminacy locus of the inverse. So the hypersurface is a pole, a factor of det M(X), or
@@ -69,7 +69,7 @@ def components(
 ) -> list[HypersurfaceComponent]:
     """The components of the zero sets of forms on the surface curve(t) + u direction, in projective space over GF(p).
 
-    With each of the forms over Q stands whether it is one at the image of the point under the map of the equation.
+    Each form over Q comes with a flag: whether it is evaluated at the image of the point under the map of the equation.
     `direction` is a random vector: then degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
     """
     field = GF(equation.over.characteristic)
@@ -82,11 +82,11 @@ def components(
     count(2 * sum(map(len, image)))
     common = reduce(nmod_mpoly.gcd, image)
     image = [entry / common for entry in image]
-    found: dict[str, tuple[nmod_mpoly, list[int]]] = {}
+    multiplicities: dict[str, tuple[nmod_mpoly, list[int]]] = {}
     for k, (form, is_there) in enumerate(forms):
         value = modulo(form, field).compose(*(image if is_there else X), ctx=ring)
         for factor, exponent in factored(value):
-            _, exponents = found.setdefault(str(factor), (factor, [0] * len(forms)))
+            _, exponents = multiplicities.setdefault(str(factor), (factor, [0] * len(forms)))
             exponents[k] = exponent
     return [
         HypersurfaceComponent(
@@ -95,13 +95,13 @@ def components(
             min((int(power[0]) for power in factor.monoms() if power[1] == 0), default=None),
             factor,
         )
-        for factor, exponents in found.values()
+        for factor, exponents in multiplicities.values()
         if factor.degrees()[1]
     ]
 
 
 _MIN_LINES, _MAX_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
-_REPEATED = 4  # so many times orders of forms are told apart, and then the same way again
+_REPEATED = 4  # after this number of equal multiplicities for the same orders of forms, they are not computed again
 _FIRST = 12  # steps by which hypersurfaces are distinguished
 _MAX_DIGITS = 1000  # in forms that are factored
 _TRIES = 16  # lines on a surface, for a point of a component
@@ -133,7 +133,7 @@ class _Forms:
 
 @dataclass(frozen=True)
 class _Curve:
-    """A curve through a point of a line where a form vanishes, and what is tracked along it.
+    """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
 
     `across` is another random vector, for surfaces. `excess` are the exponents of the forms in the common factor of the
     minors of the equation, which is no part of the map. Curves are followed within the limits.
@@ -155,7 +155,7 @@ class _Curve:
 
     @property
     def prime(self) -> int:
-        """The prime modulo which all is computed."""
+        """The prime modulo which the curve is computed."""
         return self.equation.over.characteristic
 
     @cached_property
@@ -190,30 +190,30 @@ class _Curve:
 
     def levels(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
         """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
-        poles, found = len(self.forms.poles), []
+        poles, levels = len(self.forms.poles), []
         orders = [self.own, *(step.orders for step in run)]
         for mu, here, there in zip(divided(run, self.own, self.excess), orders, orders[1:], strict=False):
             images = zip(self.forms.images, there[poles:-1], strict=True)
-            found.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
-        return found
+            levels.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
+        return levels
 
     def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
-        """Those of the forms on a surface through any curve."""
+        """Return the components of the forms on a surface through any curve."""
         return components(self.equation, self.forms.all, curve, self.across)
 
-    def through(self, one: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """The same with a point of a component on the surface through a curve. Raises OrbitDataUnknown without any."""
+    def through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
+        """Return the curve with a point of a component on the surface through `curve`; raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
-            for u in one.roots(t):
+            for u in component.roots(t):
                 point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
                 return replace(self, point=point)
         raise OrbitDataUnknown("a hypersurface has no point modulo a prime")
 
     @cached_property
     def census(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
-        """All components on a plane, each with a curve through a point of it; empty where one has no point."""
+        """Return all components on a plane, each with a curve through one of its points; empty if one has no point."""
         try:
-            return [(one, self.through(one, self.line)) for one in self.components(self.line)]
+            return [(component, self.through(component, self.line)) for component in self.components(self.line)]
         except OrbitDataUnknown:
             return []
 
@@ -240,8 +240,8 @@ class _Resolved:
         return self.curve.functions
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Those of the steps but the last. Raises OrbitDataUnknown."""
-        found, mus = [], divided(run, self.curve.own, self.curve.excess)
+        """Return the rows of all steps except the last. Raises OrbitDataUnknown."""
+        rows, mus = [], divided(run, self.curve.own, self.curve.excess)
         for t, (mu, level) in enumerate(zip(mus, self.curve.levels(run)[1:], strict=False)):
             column = fmpq_mat(len(level), 1, list(level))
             if t not in self.multiplicities:
@@ -251,48 +251,50 @@ class _Resolved:
             nu = self.multiplicities[t]
             if self.exponents * nu != column or any(entry.q != 1 or entry < 0 for entry in nu.entries()):
                 raise OrbitDataUnknown("the multiplicities of hypersurfaces do not follow from the orders of forms")
-            found.append((mu, *(int(entry) for entry in nu.entries())))
-        return tuple(found)
+            rows.append((mu, *(int(entry) for entry in nu.entries())))
+        return tuple(rows)
 
     def _on_surface(self, level: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
         """The orders along a curve by the factors of forms on a surface through it. Raises OrbitDataUnknown."""
         nu, largest = fmpq_mat(len(self.keys), 1), max(level.entries())
         if largest == 0:
             return nu
-        # With the same orders of forms they are often the same; else as few terms are taken as show them.
-        same = [one for one in self.multiplicities.values() if self.exponents * one == level]
-        if len(same) >= _REPEATED and all(one == same[0] for one in same):
+        # Equal orders of forms often have the same multiplicities; otherwise the fewest terms that show them are taken.
+        same = [component for component in self.multiplicities.values() if self.exponents * component == level]
+        if len(same) >= _REPEATED and all(component == same[0] for component in same):
             return same[0]
-        terms = 1 + max((int(max(one.entries())) for one in same), default=1)
+        terms = 1 + max((int(max(component.entries())) for component in same), default=1)
         while True:
             cut = [entry.truncate(terms) for entry in curve]
-            found = self.curve.components(cut)
-            if all(one.order is not None and one.order < terms for one in found):
+            components = self.curve.components(cut)
+            if all(component.order is not None and component.order < terms for component in components):
                 break
             if terms > largest:
                 raise OrbitDataUnknown("the image of a curve lies on a critical hypersurface")
             terms *= 2
-        for one in found:
-            if one.order:
-                places = self.places.get(one.kind, set())
-                key = next(iter(places)) if len(places) == 1 else self.curve.through(one, cut).key
+        for component in components:
+            if component.order:
+                places = self.places.get(component.kind, set())
+                key = next(iter(places)) if len(places) == 1 else self.curve.through(component, cut).key
                 if key not in self.keys:
                     raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
-                nu[self.keys.index(key), 0] += one.order
+                nu[self.keys.index(key), 0] += component.order
         return nu
 
 
-def contracted(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> tuple[int, list[Hypersurface]]:
+def exceptional_hypersurfaces(
+    map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range
+) -> tuple[int, list[Hypersurface]]:
     """The degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
     Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
-    point. Nothing but points modulo random primes is followed. Where the forms do not suffice to tell the hypersurfaces
+    point. Only points modulo random primes are followed. If the forms do not suffice to tell the hypersurfaces
     apart, their degrees are 0 and their orders those of the forms. Raises OrbitDataUnknown.
     """
     here = map_.at(eps)
 
-    def factors(one: Equation) -> tuple[Any, ...]:
-        form = kernel_minors([[*row[:-1], None] for row in one.polynomials()], counted_product)[-1]
+    def factors(equation: Equation) -> tuple[Any, ...]:
+        form = kernel_minors([[*row[:-1], None] for row in equation.polynomials()], counted_product)[-1]
         return (form,) if map_.digits > _MAX_DIGITS else tuple(factor for factor, _ in factored(form))
 
     infinity = here.equations[0].polynomials()[0][0].context().gens()[-1]
@@ -343,15 +345,15 @@ def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros:
         for census in [line.census for line in lines.values() if line.census][:2]:
             places: dict[Kind, set[Key]] = {}
             sizes = fmpq_mat(len(keys), 1)
-            for one, curve in census:
+            for component, curve in census:
                 if curve.key not in kinds:
                     raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
-                places.setdefault(one.kind, set()).add(curve.key)
-                sizes[keys.index(curve.key), 0] += one.degree
+                places.setdefault(component.kind, set()).add(curve.key)
+                sizes[keys.index(curve.key), 0] += component.degree
                 followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, places)))
     if exponents * sizes != column or sum(sizes.entries(), fmpq(0)) != zeros:
         raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
-    # Orders on hypersurfaces that are not contracted have no part in what follows.
+    # Orders on hypersurfaces that are not contracted are not needed.
     chosen = [k for k, key in enumerate(keys) if key[0]]
     return _followed(followed, [int(size) for size in sizes.entries()], chosen)
 
@@ -360,21 +362,23 @@ def _followed(
     curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
     """The exceptional hypersurfaces with these columns of their patterns, by two primes. Raises OrbitDataUnknown."""
-    found = []
+    hypersurfaces = []
     for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
             by_prime = {curve.prime: (curve, tracked) for curve, tracked in pairs}
-            orders = [curve.test_curve(tracked).orders(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
+            orders = [curve.test_curve(tracked).orbit_data(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
             if len(orders) < 2:
                 raise OrbitDataUnknown("a hypersurface has points modulo one prime only")
             if orders[0].known != orders[1].known:
                 raise OrbitDataUnknown(POINTS_DIFFER)
             along = orders[0].of(columns)
             status = CONFINED if any(row[0] for row in along.rows) else NOT_CONFINED
-            known = Hypersurface("Z" if key[2] else "?", size, any(key[1]), 1, status, 1, orders=along)
+            known = Hypersurface("Z" if key[2] else "?", size, any(key[1]), 1, status, 1, orbit_data=along)
             settled = along.settled_at if along.is_settled else None
-            found.append(replace(known, primes=tuple(by_prime)[:2], followed=along.followed, settled_at=settled))
-    return found
+            hypersurfaces.append(
+                replace(known, primes=tuple(by_prime)[:2], followed=along.followed, settled_at=settled)
+            )
+    return hypersurfaces
 
 
 def _on_line(

@@ -1,0 +1,55 @@
+"""kahanmaps geometry."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from kahanmaps import internals as lib
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.params import PointText
+from kahanmaps_cli.screen.render import print_json, record_of
+from kahanmaps_cli.screen.terminal import print_stdout
+
+
+@click.command("geometry")
+@system_options
+@click.option("--start", type=PointText(), metavar="X", required=True, help="Initial point, e.g. 1/2,-1/3,0.25.")
+@eps_options
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, start: Any, **options: Any) -> int:
+    """Describe the level set of the integrals through a point, for a member of the commuting family.
+
+    \b
+      kahanmaps geometry paper_m3 --start 1,2,3,4,5,6 --eps 1/10
+      kahanmaps geometry nahm_tetrahedral --start 1,2 --eps 1/10
+      kahanmaps geometry paper_m2 --start 1,2,3,4 --eps 1/7 --json | jq '.planes[0].j'
+
+    The level set is a product of elliptic curves, one in each plane of the normal form, and the map is a translation
+    of it. For each irreducible factor of chi the command prints k^3 of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, the
+    j-invariant, the order of the translation (finite or infinite, proved), and at rational roots its canonical height;
+    for each real root the rotation number, in (0, 1/2] and up to sign, with an error bound, and that of the flow at the
+    time step 2 eps. At a pair of complex roots the two numbers are coordinates in a reduced basis of the periods.
+
+    The command also recognizes systems of the family that are not declared as such.
+
+    Exit status: 0, or 2 for a usage error or a system without a normal form.
+    """
+    file = load_system(system, {**options, "quiet": quiet})
+    normal_form = file.normal_form
+    if isinstance(normal_form, lib.NoNormalForm):
+        reason = normal_form.reason if file.is_quadratic else "it is not the Kahan map of a quadratic system"
+        raise lib.InputError(f"the geometry of {file.name} cannot be computed: {reason}")
+    eps = the_eps(options["eps"], options["time_step"])
+    file.map.at(eps, lib.QQ).point(start)
+    result = lib.geometry_of(normal_form, eps, start)
+    if as_json:
+        record = record_of(
+            "geometry", file, "exact", seed=None, **lib.eps_record(eps, file.map), start=lib.plain(start)
+        )
+        print_json({**record, **result.to_json()})
+    else:
+        print_stdout(f"# {file.name}{lib.eps_suffix(eps, file.map)}")
+        print_stdout(str(result))
+    return 0

@@ -1,0 +1,329 @@
+"""Geometry of the level sets of a member of the family: j-invariants, translation points, rotation numbers, heights.
+
+In each plane of the normal form the orbit stays on a plane cubic, whose Jacobian is Y^2 = x^3 + (9 + 3 gamma) x^2 +
+48 gamma x + 64 gamma^2, and the Kahan map is the translation by T = (0, 8 gamma) (level_curves.py). So the level set
+of all integrals is a product of elliptic curves, and the map is a translation of it. docs/mathematics.md, "Geometry of
+the level sets", has the proofs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from flint import acb, acb_poly, arb, ctx, fmpq, fmpz
+
+from kahanmaps.algebra.fields import QQ, RR
+from kahanmaps.algebra.printing import format_number
+from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.errors import InputError, PrecisionLost
+from kahanmaps.family.planar import NormalForm
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.maps.normal_form.level_curves import Jacobian
+from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
+from kahanmaps.maps.normal_form.splitting import Splitting
+
+_ACCURACY = 1e-15  # of rotation numbers
+_HEIGHT_TERMS = 40  # of the series for a height, whose terms decrease like 4^-n
+_LONGEST_HEIGHT = 4000  # bits of gamma for which a height is computed
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """The rotation of an orbit on its level curve over one real root, or one pair of complex roots, of chi.
+
+    `number` is the rotation number in (0, 1/2], up to sign: a step is a rotation of the circle by this part of a turn.
+    If the level curve has two real components, the map exchanges them (`steps` = 2), and the number is that of its
+    second iterate. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of
+    the translation in a reduced basis of the periods. `flow` is the rotation number of the time-2 eps map of the flow.
+    """
+
+    root: str
+    numbers: tuple[arb, ...]
+    steps: int = 1
+    flow: arb | None = None
+
+    @property
+    def number(self) -> arb:
+        return self.numbers[0]
+
+
+@dataclass(frozen=True)
+class PlaneGeometry:
+    """The geometry of an orbit in the planes at the roots of one irreducible factor of chi.
+
+    `delta` = disc(h) level^2 and `gamma` = 1 - delta lie in the field of the root, as the j-invariant does; they are
+    None where the level is not smooth. `order` is that of the translation, None if it is infinite (proved). `height` is
+    the canonical height of the translation point, for rational roots (numerically, with an error of about 1e-12).
+    """
+
+    name: str
+    kind: PeriodKind
+    delta: Any = None
+    gamma: Any = None
+    j: Any = None
+    order: int | None = None
+    reason: str = ""
+    height: float | None = None
+    rotations: tuple[Rotation, ...] = ()
+
+    def lines(self) -> list[str]:
+        """Return the lines of the text output."""
+        lines = [f"plane {self.name}\t{self.kind}"]
+        if self.j is None:
+            return lines
+        lines += [f"  k^3\t{_text(self.delta)}", f"  j-invariant\t{_text(self.j)}"]
+        order = "infinite order" if self.order is None else f"order {self.order}"
+        lines.append(f"  translation\t{order} (proved: {self.reason})")
+        if self.height is not None:
+            lines.append(f"  canonical height\t{self.height:.10g}")
+        for rotation in self.rotations:
+            of_second = ", of the second iterate: the map exchanges two real components" if rotation.steps == 2 else ""
+            numbers = ", ".join(x.str(12) for x in rotation.numbers)
+            lines.append(f"  rotation number\t{numbers} at t = {rotation.root}{of_second}")
+            if rotation.flow is not None:
+                lines.append(f"    of the flow\t{rotation.flow.str(12)}")
+        return lines
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data; exact numbers are text."""
+        exact = {name: None if (x := getattr(self, name)) is None else _text(x) for name in ("delta", "gamma", "j")}
+        rotations = [
+            {
+                "root": rotation.root,
+                "steps": rotation.steps,
+                "numbers": [x.str(15) for x in rotation.numbers],
+                "flow": None if rotation.flow is None else rotation.flow.str(15),
+            }
+            for rotation in self.rotations
+        ]
+        plain = {"name": self.name, "kind": self.kind.name.lower(), "order": self.order, "reason": self.reason}
+        return {**plain, **exact, "height": self.height, "rotations": rotations}
+
+
+@dataclass(frozen=True)
+class LevelGeometry(PrintableResult):
+    """The geometry of the level set of the integrals through a point, and of the map on it.
+
+    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all planes are rational and smooth.
+    """
+
+    planes: tuple[PlaneGeometry, ...]
+    height_constant: float | None
+
+    @property
+    def text(self) -> str:
+        lines = [line for plane in self.planes for line in plane.lines()]
+        if self.height_constant is not None:
+            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically")
+        return "\n".join(lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data; exact numbers are text."""
+        return {"planes": [plane.to_json() for plane in self.planes], "height_constant": self.height_constant}
+
+
+def geometry(system: SystemLike, start: Sequence[Any], eps: Any = None, *, time_step: Any = None) -> LevelGeometry:
+    """Return the geometry of the level set through `start`, of a system that has a normal form.
+
+    Args:
+        system: a member of the commuting family, or a system that is linearly equivalent to one.
+        start: a point with exact coordinates.
+        eps, time_step: half the time step, or the time step; exact and not 0.
+
+    Returns:
+        A `LevelGeometry`: j-invariants and orders of translations are exact, rotation numbers are balls, heights are
+        floats.
+
+    Raises:
+        InputError: if the system has no normal form.
+
+    Source: docs/mathematics.md, "Geometry of the level sets".
+
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> plane = geometry(QuadraticSystem.from_text(["x", "y"], ["3*y^2", "-3*x^2"]), [1, 2], "1/10").planes[0]
+    >>> plane.delta, plane.order, plane.rotations[0].number.str(8, radius=False)
+    (-19683/14048504, None, '0.10396157')
+    """
+    form, eps = system_normal_form(system), resolve_eps(eps, time_step)
+    if isinstance(form, NoNormalForm):
+        raise InputError(f"found no normal form ({form.reason}), expected a system that has one")
+    return geometry_of(form, eps, start)
+
+
+def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:
+    """Return the geometry for a system whose normal form is known; otherwise like `geometry`."""
+    form: Any = getattr(normal_form, "form", normal_form)
+    T = getattr(normal_form, "T", None)
+    point = [QQ.convert(x) for x in start]
+    exact = Splitting(form, QQ, eps, T)
+    planes = []
+    for plane, triple in zip(exact.planes, exact.triples(point), strict=True):
+        kind, gamma = classify(plane.block, triple)
+        if kind is not PeriodKind.SMOOTH:
+            planes.append(PlaneGeometry(plane.name, kind))
+            continue
+        delta = 1 - gamma
+        order, reason = torsion_order(gamma)
+        height = None
+        if isinstance(gamma, fmpq) and max(gamma.height_bits(), 1) <= _LONGEST_HEIGHT:
+            height = 0.0 if order is not None else canonical_height(gamma)
+        rotations = rotations_of(gamma, plane.block.discriminant, plane.block.h(*triple[:2]), plane.name)
+        j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
+        planes.append(PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, height, rotations))
+    heights = [plane.height for plane in planes if plane.kind is not PeriodKind.FIXED]
+    # A plane cubic is embedded by a divisor of degree 3, and heights of the planes add up: docs/mathematics.md.
+    constant = None
+    if heights and all(height is not None for height in heights):
+        constant = sum(3 * height for height in heights if height is not None) / math.log(2)
+    return LevelGeometry(tuple(planes), constant)
+
+
+def _text(x: Any) -> str:
+    """Return an element of Q or of Q[t]/g as text."""
+    return format_number(x) if isinstance(x, fmpq) else str(x)
+
+
+# Rotation numbers.
+
+
+def rotations_of(gamma: Any, disc: Any, h: Any, name: str) -> tuple[Rotation, ...]:
+    """Return the rotations at the real roots and pairs of complex roots of the field of gamma.
+
+    Args:
+        gamma: an element of Q or of Q[t]/g, not 0 and not 1.
+        disc, h: the discriminant of the cubic of the plane, and its value at the point in the coordinates 2 eps (u, v).
+        name: the name of the plane, for a plane over Q.
+
+    Raises PrecisionLost if 8192 bits do not suffice.
+    """
+    for bits in (128, 512, 2048, 8192):
+        with RR(bits).working(), suppress(PrecisionLost):
+            rotations = []
+            if isinstance(gamma, fmpq):
+                rotations.append(_real_rotation(arb(gamma), arb(disc), arb(h), name.removeprefix("t = ")))
+            else:
+                roots: Any = gamma.field.chi.complex_roots()
+                for root in (acb(root) for root, _ in roots if not root.imag < 0):
+                    is_real, label = root.imag == 0, root.str(8, radius=False)
+                    at = [_at(x, root.real if is_real else root) for x in (gamma, disc, h)]
+                    if is_real:
+                        rotations.append(_real_rotation(at[0], at[1], at[2], label))
+                    else:
+                        rotations.append(Rotation(label, _complex_rotation(at[0])))
+            balls = [x for rotation in rotations for x in (*rotation.numbers, rotation.flow) if x is not None]
+            if all(x.is_finite() and float(x.rad()) < _ACCURACY for x in balls):
+                return tuple(rotations)
+    raise PrecisionLost("rotation numbers need more than 8192 bits: the level is almost singular")
+
+
+def _at(element: Any, root: Any) -> Any:
+    """Return the value of an element of Q[t]/g at a root of g."""
+    total = 0 * root
+    for coefficient in reversed(element.polynomial.coeffs()):
+        total = total * root + arb(coefficient)
+    return total
+
+
+def _shifts(gamma: Any) -> list[acb]:
+    """Return -e for the three roots e of the cubic of the Jacobian, the real ones first and by increasing -e."""
+    one = gamma * 0 + 1
+    try:
+        roots = acb_poly([64 * gamma * gamma, 48 * gamma, 9 + 3 * gamma, one]).roots(arb(2) ** -(ctx.prec // 2))
+    except ValueError as error:
+        raise PrecisionLost("the roots of the cubic cannot be separated") from error
+    return sorted(
+        (-acb(e) for e in roots), key=lambda e: (not e.imag.contains(0), float(e.real.mid()), float(e.imag.mid()))
+    )
+
+
+def _real_rotation(gamma: arb, disc: arb, h: arb, root: str) -> Rotation:
+    """Return the rotation at a real root of chi."""
+    a, b, c = _shifts(gamma)
+    steps, x = 1, arb(0)
+    if not gamma > 0:  # the cubic of the Jacobian has three real roots, and T lies on the oval
+        steps, double = 2, Jacobian(gamma).multiple(2, (arb(0), 8 * gamma))
+        assert double is not None  # psi_2 = 2: no translation has order 2
+        x = double[0]
+    # Carlson's R_F(x - e_1, x - e_2, x - e_3) is the integral of dx/(2Y) from x to infinity.
+    elapsed = acb.elliptic_rf(x + a, x + b, x + c)
+    period = 2 * acb.elliptic_rf(acb(0), b - a, c - a)
+    return Rotation(root, ((elapsed / period).real,), steps, _flow_rotation(disc, h))
+
+
+def _flow_rotation(disc: arb, h: arb) -> arb:
+    """Return 1/period of the flow u' = h_v, v' = -h_u on a level of h.
+
+    p = -D satisfies p'^2 = 4 p^3 - 27 disc(h) h^2 on it. If h has three real roots, p has three poles in a period, one
+    at each point at infinity.
+    """
+    g3 = 27 * disc * h * h
+    unit = arb(1) / 3
+    period = unit.gamma() ** 3 / (2 * arb.pi()) / abs(g3).root(6)  # that of p'^2 = 4 p^3 - 1, for g3 > 0
+    return 1 / (3 * period) if g3 > 0 else 1 / (period * arb(3).sqrt())
+
+
+def _complex_rotation(gamma: acb) -> tuple[arb, arb]:
+    """Return the coordinates of T in a reduced basis of the periods."""
+    a, b, c = _shifts(gamma)
+    zero = acb(0)
+    first, second = (2 * acb.elliptic_rf(zero, *pair) for pair in ((b - a, c - a), (a - b, c - b)))
+    while True:  # Gauss
+        if abs(first) > abs(second):
+            first, second = second, first
+        quotient = (second / first).real
+        number = round(float(quotient.mid()))
+        if not number:
+            break
+        second = second - number * first
+    elapsed = acb.elliptic_rf(a, b, c)
+    area = (first.conjugate() * second).imag
+    x, y = (elapsed.conjugate() * second).imag / area, (first.conjugate() * elapsed).imag / area
+    return tuple(z - round(float(z.mid())) for z in (x, y))  # type: ignore[return-value]
+
+
+# Heights.
+
+
+def canonical_height(gamma: fmpq) -> float:
+    """Return the canonical height of T over Q, half of that of its x-coordinate; the error is about 1e-12.
+
+    Tate's series: the height of x changes by a bounded amount from P to 2P, of which a real number computed in
+    floating point is the archimedean part and the common factor of both forms of degree 4 the others. These factors
+    divide a resultant R, so that coordinates modulo a power of R determine them.
+    """
+    d = gamma.q
+    a2, a4, a6 = (int(x) for x in ((9 + 3 * gamma) * d**2, 48 * gamma * d**4, 64 * gamma * gamma * d**6))
+    b2, b4, b6, b8 = 4 * a2, 2 * a4, 4 * a6, 4 * a2 * a6 - a4 * a4
+    resultant = abs(fmpz(int(6912 * gamma**3 * (1 - gamma) ** 2 * d**12))) ** 2
+    modulus = resultant ** (_HEIGHT_TERMS + 2)
+
+    def doubled(X: Any, Z: Any) -> tuple[Any, Any]:
+        return (
+            X**4 - b4 * (X * Z) ** 2 - 2 * b6 * X * Z**3 - b8 * Z**4,
+            4 * X**3 * Z + b2 * (X * Z) ** 2 + 2 * b4 * X * Z**3 + b6 * Z**4,
+        )
+
+    for bits in (1 << 9, 1 << 12, 1 << 15):
+        X, Z = fmpz(0), fmpz(1)
+        left = modulus
+        with RR(bits).working():
+            real, total, scale = (arb(0), arb(1)), arb(0), arb(1)
+            for _ in range(_HEIGHT_TERMS):
+                scale /= 4
+                X, Z = doubled(X, Z)
+                common = X.gcd(Z).gcd(resultant)
+                real = doubled(*real)
+                size = abs(real[0]).max(abs(real[1]))
+                real = (real[0] / size, real[1] / size)
+                total += scale * (size.log() - arb(common).log())
+                left //= common
+                X, Z = X // common % left, Z // common % left
+            if total.is_finite() and float(total.rad()) < _ACCURACY:
+                return float((total / 2).mid())
+    raise PrecisionLost("the height needs more than 32768 bits: the level is almost singular")

@@ -1,0 +1,26 @@
+"""kahanmaps geometry: the same numbers as text and as JSON, and errors that say what to type."""
+
+
+def test_text_and_json_have_the_same_curve(kahanmaps):
+    text = kahanmaps("geometry nahm_tetrahedral --start 1,2 --eps 1/10").out
+    (plane,) = kahanmaps("geometry nahm_tetrahedral --start 1,2 --eps 1/10 --json").json["planes"]
+    assert plane["delta"] == "1/16875"
+    assert plane["gamma"] == "16874/16875"
+    assert plane["order"] is None
+    assert f"j-invariant\t{plane['j']}\n" in text
+    assert "rotation number\t[0.0367013173715" in text
+    assert plane["rotations"][0]["numbers"][0].startswith("[0.0367013173715")
+
+
+def test_a_system_that_is_not_declared_as_a_member_is_recognized(kahanmaps):
+    outcome = kahanmaps("geometry --vars x,y --rhs 3*y^2 --rhs=-3*x^2 --start 1,2 --eps 1/10")
+    assert "k^3\t-2187/46225" in outcome.out
+
+
+def test_other_systems_and_wrong_points_are_refused(kahanmaps):
+    outcome = kahanmaps("geometry lorenz --start 1,2,3 --eps 1/10")
+    assert outcome.status == 2
+    assert outcome.err.startswith("Error: the geometry of lorenz cannot be computed: ")
+    outcome = kahanmaps("geometry paper_m2 --start 1,2 --eps 1/10")
+    assert outcome.status == 2
+    assert "found a point with 2 coordinates, expected 4" in outcome.err

@@ -1,0 +1,152 @@
+"""Geometry of the level sets: j-invariants, rotation numbers and heights, each against an independent computation."""
+
+import math
+import shutil
+import subprocess
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from flint import arb, fmpq, fmpq_poly
+
+from kahanmaps import FloatEnsemble, InputError, QuadraticSystem, geometry, load, orbit
+from kahanmaps.family.random_members import random_member_with_chi
+from kahanmaps.maps.normal_form.geometry import canonical_height, rotations_of
+from kahanmaps.maps.normal_form.periods import PeriodKind
+
+
+def hamiltonian_flow(a, b, c, d):
+    """x' = h_y, y' = -h_x for h = a x^3 + b x^2 y + c x y^2 + d y^3."""
+    return QuadraticSystem.from_text(
+        ["x", "y"], [f"{b}*x^2 + {2 * c}*x*y + {3 * d}*y^2", f"-{3 * a}*x^2 - {2 * b}*x*y - ({c})*y^2"]
+    )
+
+
+def planar_orbit(cubic, start, eps, steps):
+    """Points of Kahan's map in floats, by Cramer's rule."""
+    a, b, c, d = cubic
+    eps, (x, y) = float(Fraction(eps)), (float(Fraction(entry)) for entry in start)
+    points = [(x, y)]
+    for _ in range(steps):
+        p, q, r = eps * (2 * b * x + 2 * c * y), eps * (2 * c * x + 6 * d * y), eps * (6 * a * x + 2 * b * y)
+        det = 1 - p * p + q * r
+        x, y = ((1 + p) * x + q * y) / det, ((1 - p) * y - r * x) / det
+        points.append((x, y))
+    return np.array(points)
+
+
+def mean_turn(angles, turn):
+    """The rotation number of a sequence of angles modulo `turn`, as Laskar's weighted average of their differences."""
+    differences = np.diff(angles)
+    usual = np.median(differences % turn)
+    differences = (differences - usual + turn / 2) % turn - turn / 2 + usual
+    t = (np.arange(len(differences)) + 0.5) / len(differences)
+    weights = np.exp(-1 / (t * (1 - t)))
+    mean = float((differences * weights).sum() / weights.sum() / turn)
+    return min(mean, 1 - mean)
+
+
+@pytest.mark.parametrize(
+    ("cubic", "start", "eps"),
+    [
+        ((1, 0, 0, 1), ["1", "2"], "1/100"),
+        ((1, 0, -1, 0), ["1", "3/10"], "1/50"),
+        ((1, 2, 0, -3), ["1/2", "1"], "1/100"),
+    ],
+)
+def test_the_rotation_number_is_that_of_a_float_orbit(cubic, start, eps):
+    """Every line through the origin meets the level curve in one point near the cubic of the flow."""
+    system = hamiltonian_flow(*cubic)
+    (rotation,) = geometry(system, start, eps).planes[0].rotations
+    points = planar_orbit(cubic, start, eps, 40_000)
+    measured = mean_turn(np.arctan2(points[:, 1], points[:, 0]), math.pi)
+    assert rotation.steps == 1
+    assert abs(measured - float(rotation.number)) < 1e-10
+    assert abs(measured - float(rotation.flow)) > 1e-8  # which the flow does not have
+    assert abs(float(rotation.flow / rotation.number) - 1) < 0.01
+
+
+def test_two_real_components_are_exchanged_and_the_second_iterate_turns():
+    cubic, start, eps = (1, 0, -1, 0), ["2", "1/10"], "7/10"
+    plane = geometry(hamiltonian_flow(*cubic), start, eps).planes[0]
+    assert plane.delta > 1
+    (rotation,) = plane.rotations
+    assert rotation.steps == 2
+    oval = planar_orbit(cubic, start, eps, 40_000)[1::2]  # the component that is bounded here
+    center = np.median(oval, axis=0)
+    measured = mean_turn(np.arctan2(*(oval - center).T[::-1]), 2 * math.pi)
+    assert abs(measured - float(rotation.number)) < 1e-8
+
+
+def test_on_a_level_of_period_5_the_rotation_number_is_a_multiple_of_a_fifth():
+    (rotation,) = rotations_of(fmpq(32, 27), fmpq(-27), fmpq(1), "t = 0")
+    assert (5 * rotation.number - 2).contains(0) or (5 * rotation.number - 1).contains(0)
+    (nearby,) = rotations_of(fmpq(33, 27), fmpq(-27), fmpq(1), "t = 0")
+    assert not any((5 * nearby.number - k).contains(0) for k in (1, 2))
+
+
+def test_at_complex_roots_the_orbit_returns_when_multiples_of_the_translation_are_small():
+    system = random_member_with_chi(fmpq_poly([1, 0, 1]), seed=1).chosen.system
+    start, eps = ["1/3", "1/2", "-1/5", "1/7"], "1/20"
+    (rotation,) = geometry(system, start, eps).planes[0].rotations
+    ensemble = FloatEnsemble(system, eps, np.array([[float(Fraction(x)) for x in start]]))
+    points = np.concatenate([portion[:, 0] for portion in ensemble.records(20_000, 1)])
+    moved = np.abs(points[1:] - points[0]).max(axis=1)
+    close = np.quantile(moved, 0.002)
+
+    def returns(shift):
+        """Whether the orbit is close to its start after those numbers of steps for which this shift returns best."""
+        multiples = np.arange(1, 20_001)[:, None] * shift
+        distances = np.abs(multiples - np.round(multiples)).max(axis=1)
+        return bool((moved[distances.argsort()[:4]] < close).all())
+
+    shift = np.array([float(x) for x in rotation.numbers])
+    assert len(shift) == 2
+    assert returns(shift)
+    assert not returns(shift * [1.001, 1])
+    assert not returns(shift * [1, 1.001])
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "steps"), [("nahm_tetrahedral", [1, 2], 150), ("paper_m2", [1, 2, 3, 5], 60)]
+)
+def test_heights_grow_as_the_canonical_heights_say(name, start, steps):
+    constant = geometry(load(name), start, "1/10").height_constant
+    point = list(orbit(load(name), start, "1/10", steps))[-1].x
+    denominator = math.lcm(*(int(x.q) for x in point))
+    bits = max(abs(int(x.p) * denominator // int(x.q)).bit_length() for x in point)
+    assert abs(bits / steps**2 / constant - 1) < 3 / steps * 2
+
+
+@pytest.mark.skipif(shutil.which("gp") is None, reason="PARI/GP (gp) is not installed")
+@pytest.mark.parametrize("gamma", [fmpq(3), fmpq(48412, 46225), fmpq(-70, 11)])
+def test_j_invariant_and_height_agree_with_pari(gamma):
+    delta = 1 - gamma
+    j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
+    script = f"g={gamma}; E=ellinit([0,9+3*g,0,48*g,64*g^2]); print(E.j); print(ellheight(E,[0,8*g])/2)"
+    lines = subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
+    assert fmpq(*map(int, (lines[0] + "/1").split("/")[:2])) == j
+    assert abs(float(lines[1]) - canonical_height(gamma)) < 1e-11
+
+
+def test_a_level_of_three_lines_and_a_fixed_point_have_no_curve():
+    planes = geometry(load("paper_m2"), [1, 2, 3, 4], "1/10").planes
+    assert planes[0].kind is PeriodKind.TRIANGLE
+    assert planes[0].j is None
+    assert planes[1].kind is PeriodKind.SMOOTH
+    assert {plane.kind for plane in geometry(load("paper_m2"), [0, 0, 0, 0], "1/10").planes} == {PeriodKind.FIXED}
+
+
+def test_a_system_without_normal_form_is_refused():
+    with pytest.raises(InputError, match="found no normal form"):
+        geometry(load("lorenz"), [1, 2, 3], "1/10")
+
+
+def test_the_curves_over_a_number_field_are_conjugate_and_tend_to_j_0():
+    large, small = (
+        geometry(load("paper_m3_irreducible"), [1, 2, 3, 4, 5, 6], eps).planes[0] for eps in ("1/10", "1/10000")
+    )
+    assert len(large.rotations) == 2  # one real root, one pair of complex roots
+    assert small.j.field.degree == 3
+    assert all(abs(float(arb(c))) < 1e-6 for c in small.j.coefficients)
+    assert not all(abs(float(arb(c))) < 1e-6 for c in large.j.coefficients)
