@@ -91,7 +91,7 @@ def plot_rotation(
                 break
             if low < 1 / n < high:
                 axes.axhline(1 / n, color="0.75", linewidth=0.4, zorder=1)
-                at = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
+                at: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
                 axes.annotate(f"1/{n}", (1, 1 / n), (2, 0), **at)
         axes.set_xlabel("position on the segment of initial points")
         axes.set_ylabel(rf"rotation number $\rho$, $\varepsilon = {label_number(QQ.convert(eps))}$")
