@@ -202,6 +202,7 @@ from .plots.portraits.trajectories import walked as walked
 from .plots.portraits.windows import Window as Window
 from .plots.portraits.windows import fullest_axes as fullest_axes
 from .plots.portraits.windows import require_window as require_window
+from .plots.rotation import plot_rotation as plot_rotation
 from .plots.scan import plot_scan as plot_scan
 from .plots.squares import pair_of_systems as pair_of_systems
 from .plots.squares import pairs_of_member as pairs_of_member

@@ -1,4 +1,4 @@
-"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | commute."""
+"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | rotation | commute."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, portrait, scan
+from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, portrait, rotation, scan
 
 
 class PlotCommands(SuggestingGroup):
@@ -39,6 +39,7 @@ for _command in (
     growth.heights,
     growth.degrees,
     scan.command,
+    rotation.command,
     commute.command,
 ):
     command.add_command(_command)

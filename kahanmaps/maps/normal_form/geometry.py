@@ -184,6 +184,22 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
     return LevelGeometry(tuple(planes), constant)
 
 
+def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> dict[str, Rotation]:
+    """Return the rotations on the level set through `start` by the roots of chi, without those of singular levels.
+
+    Raises PrecisionLost if a level is almost singular.
+    """
+    form: Any = getattr(normal_form, "form", normal_form)
+    exact = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
+    rotations: dict[str, Rotation] = {}
+    for plane, triple in zip(exact.planes, exact.triples([QQ.convert(x) for x in start]), strict=True):
+        kind, gamma = classify(plane.block, triple)
+        if kind is PeriodKind.SMOOTH:
+            of_plane = rotations_of(gamma, plane.block.discriminant, plane.block.h(*triple[:2]), plane.name)
+            rotations |= {rotation.root: rotation for rotation in of_plane}
+    return rotations
+
+
 def _text(x: Any) -> str:
     """Return an element of Q or of Q[t]/g as text."""
     return format_number(x) if isinstance(x, fmpq) else str(x)
