@@ -153,7 +153,7 @@ def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
     monkeypatch.setattr("kahanmaps.laboratory.preserve.search.repeat_search", lambda *_: None)
     search = find_integrals(load("euler_top"))
     assert (search.integrals, search.codimension) == ((), 2)
-    assert search.reason == "the polynomials search at one eps do not exist at another"
+    assert search.reason == "the polynomials found at one eps do not exist at another"
 
 
 UP_TO_2 = "relations of degree up to 2 along orbits"
