@@ -66,7 +66,15 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
         of_run = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
-        of_each = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
+        of_each = (
+            "polynomial",
+            "degree",
+            "divides_denominator",
+            "multiplicity",
+            "status",
+            "contracted_at",
+            "confined_at",
+        )
         steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
         records = [
             {
