@@ -4,6 +4,7 @@ import gc
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -51,3 +52,9 @@ def pytest_collection() -> Iterator[None]:
         gc.freeze()
         gc.set_threshold(50_000)
         gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def stopped_clock_of_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands run in this process print no progress: it appears after some seconds, so on a busy machine only."""
+    monkeypatch.setattr("kahanmaps_cli.screen.progress.time", SimpleNamespace(monotonic=lambda: 0.0))

@@ -94,7 +94,7 @@ class AlgebraBlock(LevelBlock):
             cofactor = power - algebra.trace(power) / k
             if k < algebra.degree - 1:
                 power = W * cofactor
-        # Of the last product only one coefficient is wanted.
+        # N is rational, so that one coefficient of the last product suffices; the full product would cost more.
         norm, shifted = fmpq(0), cofactor
         for entry in W.coefficients:
             norm += entry * shifted.polynomial[0]
