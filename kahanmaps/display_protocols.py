@@ -36,6 +36,8 @@ class WithoutTruthValue:
     def __bool__(self) -> bool:
         if hasattr(self, "holds"):
             hint = "use .holds, which is True, False or None (undecided)"
+        elif getattr(self, "_parts", ""):
+            hint = "use len(result), or `is not None`"
         else:
             hint = "use one of its attributes, or `is not None`"
         name = type(self).__name__
