@@ -257,6 +257,7 @@ km.check_integrals("weierstrass", km.find_integrals("weierstrass")).rows()
 km.check_measure("weierstrass", km.find_density("weierstrass")[0]).rows()
 km.check_poisson("weierstrass", km.find_poisson("weierstrass")[0]).rows()
 km.explicit_map(["x", "y"], ["y", "(2 + y)/x"]).at(1)([1, 3])
+km.geometry("paper_m2", x0=[1, 2, 0, 1], h="1/5"), km.period("paper_m2", x0=[1, 2, 0, 1], h="1/5", prime=101)
 km.fixed_points("lotka_volterra")[0], km.orbit("euler_top", [1, 2, 3], "1/10", 5).shape
 km.find_integrals("euler_top").to_dict() == km.find_integrals("euler_top").to_json()
 km.find_density("lotka_volterra")[0](1, 2, "1/10"), km.invariant_measure("lotka_volterra")
@@ -347,6 +348,7 @@ REFUSED = [
     ("km.batch(['euler_top'])", r"type \[km.analyze"),
     ("km.systems()['euler-topp']", "did you mean euler_top"),
     ("phi([0.5, 1])", r"numpy.array\(\[...\]\) gives floats"),
+    ("km.geometry('paper_m2', eps='1/10')", "found no initial point or no eps"),
     ("phi.jacobian(np.ones(2))", r"\[Fraction\(x\) for x in point\] is exact"),
     ("km.analyze(['weierstrass', 'lorenz'])", r"type \[f\(system\) for system in systems\]"),
     ("km.degrees(FISH, N=5)", "max_terms= is the number of iterates"),
