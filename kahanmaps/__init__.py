@@ -45,9 +45,9 @@ def __getattr__(name: str) -> Any:
         raise missing_name("module 'kahanmaps'", name, __all__)
     value = _load(_COMMANDS.get(name, name))
     if isinstance(value, FunctionType):
-        from kahanmaps.function_calls import public
+        from kahanmaps.function_calls import public_function
 
-        value = globals()[name] = public(value, name)
+        value = globals()[name] = public_function(value, name)
     return value
 
 

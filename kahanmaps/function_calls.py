@@ -1,7 +1,7 @@
 """Calls of the public functions: wrong arguments are reported in words, and notebooks show progress.
 
-`public` wraps a function of `import kahanmaps`; the signature, annotations and docstring stay those of the function,
-and no argument is changed.
+`public_function` wraps a function of `import kahanmaps`; the signature, annotations and docstring stay those of the
+function, and no argument is changed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from kahanmaps.errors import InputError, suggestion
 from kahanmaps.hard_stop import TimeLimit
 
 _BEFORE_PROGRESS, _BETWEEN_UPDATES = 2.0, 0.5  # seconds
-_WORDS = {
+_ARGUMENT_HINTS = {
     **dict.fromkeys(("seconds", "timeout"), "with km.time_limit(10): ... is a limit in seconds, effort= one of work"),
     **dict.fromkeys(("dt", "step_size", "stepsize", "tau"), "h= is the time step, eps= half of it"),
     **dict.fromkeys(("t_span", "t_max", "t_end", "tmax", "t1", "t_eval"), "n= is the number of steps of length h="),
@@ -47,7 +47,7 @@ class CallError(InputError, TypeError):
     """A call with a missing, unknown or superfluous argument; the message gives the arguments of the function."""
 
 
-def public(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+def public_function(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     """Return a function as it is called by users, under its public name."""
     signature = inspect.signature(function)
     kinds = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
@@ -63,14 +63,14 @@ def public(function: Callable[..., Any], name: str) -> Callable[..., Any]:
             if kinds[argument].startswith("bool"):  # any other value would count as one
                 _require_kind(argument, value, kinds[argument])
         try:
-            return function(*args, **kwargs) if not _is_interactive() else attended(given, args, kwargs)
+            return function(*args, **kwargs) if not _is_interactive() else call_interactively(given, args, kwargs)
         except TypeError as error:
             if not isinstance(error, InputError):  # the function did not check it
                 for argument, value in given.items():
                     _require_kind(argument, value, kinds[argument])
             raise
 
-    def attended(given: dict[str, Any], args: Sequence[Any], kwargs: dict[str, Any]) -> Any:
+    def call_interactively(given: dict[str, Any], args: Sequence[Any], kwargs: dict[str, Any]) -> Any:
         results: list[Any] = []
         if "on_result" in kinds and "on_result" not in given:
             kwargs["on_result"] = results.append
@@ -97,7 +97,7 @@ class CallableModule(ModuleType):
     """A subpackage with the name of a command, which can be called like the command: its function `command`."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        return public(self.command, self.__name__.rpartition(".")[2])(*arguments, **options)
+        return public_function(self.command, self.__name__.rpartition(".")[2])(*arguments, **options)
 
     def __setattr__(self, name: str, value: Any) -> None:
         # Importing a submodule sets it as an attribute; a function of the same name keeps the name.
@@ -114,7 +114,7 @@ def _wrong_call(
     known = [argument for argument in signature.parameters if argument != "options"]
     for argument in () if takes_options else kwargs:
         if argument not in known:
-            word = _WORDS.get(argument, "")
+            word = _ARGUMENT_HINTS.get(argument, "")
             applies = word.startswith(("km.", "with ")) or word.partition("=")[0] in known
             hint = f": {word}" if applies else suggestion(argument, known)
             return f"km.{name} has no argument {argument}={hint}; it has {', '.join(known)}"

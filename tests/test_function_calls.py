@@ -10,7 +10,7 @@ import pytest
 import kahanmaps as km
 from kahanmaps import function_calls
 from kahanmaps.errors import InputError
-from kahanmaps.function_calls import CallError, public
+from kahanmaps.function_calls import CallError, public_function
 from kahanmaps.hard_stop import TimeLimit
 
 
@@ -92,13 +92,13 @@ def test_progress_is_shown_in_a_notebook_after_a_while_and_removed(monkeypatch):
 
     search.__annotations__["progress"] = "Callable[[str], None]"
     monkeypatch.setattr(function_calls, "_BEFORE_PROGRESS", 0.01)
-    assert public(search, "search")()
+    assert public_function(search, "search")()
     assert "step 2 &lt;b&gt;" in shown[-2]
     assert shown[-1] == ""
     count = len(shown)
     monkeypatch.setattr(function_calls, "_BEFORE_PROGRESS", 60)
     seen.set()
-    assert public(search, "search")()
+    assert public_function(search, "search")()
     assert len(shown) == count  # nothing for a short search
 
 
@@ -106,7 +106,7 @@ def test_a_type_error_of_a_checked_function_is_explained_and_another_one_is_left
     def add(count: "int", scale: "float" = 1.0, name: "str" = ""):
         return sum(range(count)) * scale + len(name) + None
 
-    call = public(add, "add")
+    call = public_function(add, "add")
     for arguments, words in [
         (("3",), "found count = '3', expected an integer"),
         ((3, "x"), "found scale = 'x', expected a number"),

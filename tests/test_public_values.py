@@ -16,7 +16,7 @@ from helpers import together
 
 import kahanmaps as km
 from kahanmaps.errors import InputError
-from kahanmaps.function_calls import _WORDS
+from kahanmaps.function_calls import _ARGUMENT_HINTS
 from kahanmaps.hints import HINTS
 
 FISH = "q' = p; p' = q^2 - q"
@@ -201,7 +201,7 @@ def test_dynamical_degree_and_entropy_are_those_of_the_degrees():
 
 
 def test_what_hints_name_exists():
-    named = {name for text in (*HINTS.values(), *_WORDS.values()) for name in re.findall(r"\bkm\.(\w+)", text)}
+    named = {name for text in (*HINTS.values(), *_ARGUMENT_HINTS.values()) for name in re.findall(r"\bkm\.(\w+)", text)}
     assert len(named) > 20
     for name in named:
         getattr(km, name)

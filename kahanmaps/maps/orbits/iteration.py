@@ -180,6 +180,10 @@ class Orbit(HtmlDisplay):
         self._busy_in: int | None = None  # the thread that computes an iterate directly
         self._walk: RationalOrbit | None = None
 
+    def __repr__(self) -> str:
+        state = "no point computed yet" if self.last is None else f"computed to step {self.last.step}"
+        return f"<Orbit: {state if self.end is None else self.end.text}>"
+
     @property
     def relations(self) -> str | None:
         """The relations between points of the orbit that are in use, and since which step; None if there are none."""
