@@ -10,6 +10,7 @@ import numpy as np
 from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
+from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.hints import AttributeHints
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
@@ -128,6 +129,16 @@ class Plot(AttributeHints):
 
         starts = x0 if hasattr(x0[0], "__len__") and not isinstance(x0[0], str) else [x0]
         axes: Axes = plot_invariant_curves(find_invariant_curves(as_file(system), starts, eps, n), Style()).axes[0]
+        return axes
+
+    def rotation(self, system: SystemLike, first: Any, last: Any, *, eps: Any, points: int = 200) -> Axes:
+        """Plot the rotation numbers of a system with a normal form along the segment between two initial points."""
+        from kahanmaps.plots.rotation import plot_rotation
+
+        normal_form = as_file(system).normal_form
+        if isinstance(normal_form, NoNormalForm):
+            raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
+        axes: Axes = plot_rotation(normal_form, rational(eps), first, last, Style(), points=points).axes[0]
         return axes
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
