@@ -15,11 +15,12 @@ Names are imported when they are first used, so that `import kahanmaps` costs ne
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any
 
 from lazy_loader import attach_stub
 
-from kahanmaps.errors import suggestion
+from kahanmaps.hints import missing_name
 from kahanmaps.version import __version__ as __version__
 
 # The list of public names is what type checkers read: __init__.pyi.
@@ -30,6 +31,7 @@ _COMMANDS = {  # functions that are also called like their commands
     "find_density": "find_densities",
     "find_symmetry": "linear_symmetries",
     "heights": "height_survey",
+    "invariant_measure": "find_densities",
     "lyapunov": "lyapunov_exponents",
     "map": "map_at",
     "portrait": "plot_orbits",
@@ -40,8 +42,13 @@ __all__ = sorted({*_NAMES, *_COMMANDS} - {"map", "map_at", "plot_orbits"})
 
 def __getattr__(name: str) -> Any:
     if name not in _NAMES and name not in _COMMANDS:
-        raise AttributeError(f"module 'kahanmaps' has no attribute {name!r}{suggestion(name, __all__)}")
-    return _load(_COMMANDS.get(name, name))
+        raise missing_name("module 'kahanmaps'", name, __all__)
+    value = _load(_COMMANDS.get(name, name))
+    if isinstance(value, FunctionType):
+        from kahanmaps.function_calls import public_function
+
+        value = globals()[name] = public_function(value, name)
+    return value
 
 
 def __dir__() -> list[str]:

@@ -3,6 +3,8 @@
 For type checkers, and for lazy_loader, which imports a name when it is first used.
 """
 
+from . import family as family
+from . import systems as systems
 from .algebra.fields import CC as CC
 from .algebra.fields import GF as GF
 from .algebra.fields import QQ as QQ
@@ -23,6 +25,8 @@ from .checks.preserve import check_poisson as check_poisson
 from .checks.settings import Settings as Settings
 from .display.latex import latex_polynomial as latex_polynomial
 from .display.latex import latex_rational_function as latex_rational_function
+from .documents.catalog import Catalogue as Catalogue
+from .documents.catalog import catalogue as catalogue
 from .documents.catalog import load as load
 from .documents.catalog import names as names
 from .documents.files import SystemFile as SystemFile
@@ -35,6 +39,7 @@ from .errors import InputError as InputError
 from .errors import KahanmapsError as KahanmapsError
 from .errors import SingularStep as SingularStep
 from .errors import SystemFileError as SystemFileError
+from .experiments.batch import batch as batch
 from .experiments.results.records import Record as Record
 from .experiments.results.records import Task as Task
 from .experiments.results.store import Store as Store
@@ -68,7 +73,9 @@ from .laboratory.analysis import analyze as analyze
 from .laboratory.cycles import Census as Census
 from .laboratory.cycles import cycle_census as cycle_census
 from .laboratory.growth.degrees import DegreeGrowth as DegreeGrowth
+from .laboratory.growth.degrees import algebraic_entropy as algebraic_entropy
 from .laboratory.growth.degrees import degree_growth as degree_growth
+from .laboratory.growth.degrees import dynamical_degree as dynamical_degree
 from .laboratory.growth.height_survey import HeightSurvey as HeightSurvey
 from .laboratory.growth.height_survey import height_survey as height_survey
 from .laboratory.growth.recurrences import Recurrence as Recurrence
@@ -130,6 +137,7 @@ from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
 from .plots.plot import plot as plot
 from .plots.plot import plot_orbits as plot_orbits
+from .reports.report import report as report
 from .reports.report import report_html as report_html
 from .reports.report import write_report as write_report
 from .systems.hamiltonian import CubicHamiltonian as CubicHamiltonian
@@ -142,6 +150,7 @@ cycles = cycle_census
 degrees = degree_growth
 find_density = find_densities
 find_symmetry = linear_symmetries
+invariant_measure = find_densities
 heights = height_survey
 lyapunov = lyapunov_exponents
 map = map_at

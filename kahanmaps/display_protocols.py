@@ -6,15 +6,16 @@ none of these modules. They are imported by name on first use: this is the only 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import singledispatch
 from importlib import import_module
 from typing import Any
 
 from kahanmaps.errors import InputError
+from kahanmaps.hints import AttributeHints
 
 
-class HtmlDisplay:
+class HtmlDisplay(AttributeHints):
     """Base class of values that notebooks display as HTML."""
 
     __slots__ = ()
@@ -35,6 +36,8 @@ class WithoutTruthValue:
     def __bool__(self) -> bool:
         if hasattr(self, "holds"):
             hint = "use .holds, which is True, False or None (undecided)"
+        elif getattr(self, "_parts", ""):
+            hint = "use len(result), or `is not None`"
         else:
             hint = "use one of its attributes, or `is not None`"
         name = type(self).__name__
@@ -43,9 +46,14 @@ class WithoutTruthValue:
 
 
 class PrintableResult(HtmlDisplay, WithoutTruthValue):
-    """Base class of results that `print` shows as the output of their command."""
+    """Base class of results that `print` shows as the output of their command.
+
+    A result with parts is a sequence of them: `_parts` is the name of the attribute, `_noun` the word for one part and
+    for several.
+    """
 
     __slots__ = ()
+    _parts, _noun = "", ("", "")
 
     def __str__(self) -> str:
         _load(self)
@@ -53,12 +61,39 @@ class PrintableResult(HtmlDisplay, WithoutTruthValue):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        cls.__repr__ = PrintableResult.__repr__  # type: ignore[method-assign]  # that of a dataclass prints all fields
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = PrintableResult.__repr__  # type: ignore[method-assign]  # that of a dataclass prints all fields
 
     def __repr__(self) -> str:
-        """Return the class name and the first line of the text."""
+        """Return the class name with the number of parts and their verdicts, or with the first line of the text."""
+        if self._noun[0]:
+            verdicts = sorted({str(part.verdict) for part in self if hasattr(part, "verdict")})
+            if hasattr(self, "verdict"):  # of all parts together
+                verdicts = [str(self.verdict)]
+            number = f"{len(self) or 'no'} {self._noun[len(self) > 1]}"
+            return f"<{type(self).__name__}: {', '.join([number, *verdicts])}>"
         first = str(self).partition("\n")[0].replace("\t", " ")
         return f"<{type(self).__name__}: {shorten(first, 100)}>"
+
+    def _sequence(self) -> Sequence[Any]:
+        if not self._parts:
+            what = "rows(), or its attributes" if hasattr(self, "rows") else "its attributes"
+            raise TypeError(f"a {type(self).__name__} is not a sequence: use {what}")
+        parts: Sequence[Any] = getattr(self, self._parts)
+        return parts
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self._sequence())
+
+    def __len__(self) -> int:
+        return len(self._sequence())
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._sequence()[index]
+
+    def to_dict(self) -> Any:
+        """Return plain data, as `to_json` does: `json.dump(result.to_dict(), file)` writes them."""
+        return self.to_json()  # type: ignore[attr-defined]
 
     def to_pandas(self) -> Any:
         """Return `rows()` as a DataFrame. Raises InputError where pandas is not installed or the result is no table."""
@@ -76,13 +111,43 @@ def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
     return pandas.DataFrame(rows)
 
 
-class LatexDisplay:
+_TEXTS = ("text", "sentence", "summary", "claim", "reason", "rhs")
+
+
+class ResultPart(AttributeHints):
+    """Base class of the parts of results, which are shown by the first of the attributes `_TEXTS` that they have."""
+
+    __slots__ = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "__repr__" not in vars(cls):
+            cls.__repr__ = ResultPart.__repr__  # type: ignore[method-assign]  # that of a dataclass prints all fields
+
+    def __repr__(self) -> str:
+        value = next(getattr(self, name) for name in _TEXTS if hasattr(self, name))
+        text = value if isinstance(value, str) else ", ".join(value)
+        return f"<{type(self).__name__}: {shorten(text.partition(chr(10))[0], 100)}>"
+
+
+class LatexDisplay(AttributeHints):
     """Base class of values that notebooks display as a formula."""
 
     __slots__ = ()
 
     def _repr_latex_(self) -> str:
-        return latex(self)
+        formula = latex(self)
+        return formula if formula.startswith("$") else rf"$\displaystyle {formula}$"
+
+    def latex(self) -> str:
+        """Return the formula as LaTeX, without dollar signs."""
+        return latex(self).removeprefix(r"$\displaystyle ").removesuffix("$")
+
+    def to_sympy(self) -> Any:
+        """Return the formula of SymPy, exactly: for a system or a map, the right-hand sides or images by variable."""
+        return import_module("kahanmaps.languages.to_sympy").sympy_form(self)
+
+    _sympy_ = to_sympy  # `sympy.sympify(value)` calls it
 
 
 def latex(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Runs the notebook of the examples in a kernel of its own. As a script it writes the outputs into the notebook:
+"""Runs the notebooks of the examples in kernels of their own. As a script it writes the outputs into the notebooks:
 
 python tests/notebook_runner.py
 """
@@ -11,10 +11,10 @@ from pathlib import Path
 
 import nbformat
 
-NOTEBOOK = Path(__file__).parent.parent / "examples" / "first_steps.ipynb"
+NOTEBOOKS = sorted((Path(__file__).parent.parent / "examples").glob("*.ipynb"))
 
 
-def executed(path: Path = NOTEBOOK) -> nbformat.NotebookNode:
+def executed(path: Path) -> nbformat.NotebookNode:
     """The notebook with the outputs of all cells, run in order by the interpreter that runs this."""
     from nbclient import NotebookClient
 
@@ -31,6 +31,8 @@ def executed(path: Path = NOTEBOOK) -> nbformat.NotebookNode:
         asyncio.run(client.async_execute())
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)  # times
+        if cell.cell_type == "code":  # what a progress bar leaves, if the cell took more than two seconds
+            cell.outputs = [one for one in cell.outputs if one.get("data", {}).get("text/html") != ""]
     notebook.metadata = {
         "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
         "language_info": {"name": "python"},
@@ -40,4 +42,5 @@ def executed(path: Path = NOTEBOOK) -> nbformat.NotebookNode:
 
 if __name__ == "__main__":
     os.environ.setdefault("PYDEVD_DISABLE_FILE_VALIDATION", "1")
-    nbformat.write(executed(), NOTEBOOK)
+    for path in NOTEBOOKS:
+        nbformat.write(executed(path), path)

@@ -1,5 +1,5 @@
-"""The examples do what stands beside them: every script prints its .out file, the notebook shows what it has stored
-(its pictures are only asked to be there), the study learns what it has committed, and the demo runs through.
+"""The examples do what stands beside them: every script prints its .out file, the notebooks show what they have stored
+(their pictures are only asked to be there), the study learns what it has committed, and the demo runs through.
 """
 
 import os
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from notebook_runner import NOTEBOOK, executed
+from notebook_runner import NOTEBOOKS, executed
 
 import kahanmaps as km
 
@@ -30,6 +30,11 @@ def test_an_example_prints_what_stands_beside_it(script, tmp_path):
     done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == script.with_suffix(".out").read_text(encoding="utf-8")
+
+
+def test_the_script_of_the_guide_is_the_example():
+    guide = (EXAMPLES.parent / "docs" / "howto" / "python.md").read_text(encoding="utf-8")
+    assert (EXAMPLES / "11_exact_and_float.py").read_text(encoding="utf-8") in guide
 
 
 def test_the_demo_proves_what_it_promises_and_leaves_files_to_play_with(tmp_path):
@@ -81,5 +86,17 @@ def shown(notebook):
     return pages
 
 
-def test_a_fresh_run_shows_what_is_stored():
-    assert shown(executed()) == shown(nbformat.read(NOTEBOOK, as_version=4))
+DUMP = re.compile(r"\b[A-Z]\w+\(\w+=")  # a dataclass with all its fields: ClassName(field=...)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_fresh_run_of_a_notebook_shows_what_is_stored(path):
+    pages = shown(executed(path))
+    assert pages == shown(nbformat.read(path, as_version=4))
+    assert not [page for page in pages if DUMP.search(page[2]) or page[1] == "error"]
+
+
+def test_a_dump_of_a_dataclass_is_seen():
+    assert DUMP.search("(FoundDensity(function=x, verdict='proved'),)")
+    assert not DUMP.search("<FoundIntegral: (x + 1)/(y)> KahanMap(x, y; eps=1/10, over QQ)")

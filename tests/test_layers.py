@@ -29,8 +29,8 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # From the ground up, one folder or file of kahanmaps/ a floor.
 FLOORS = [
-    *("errors", "version", "sources", "display_protocols", "atomic_files", "processes", "hard_stop"),
-    *("algebra", "systems", "family", "maps", "documents", "invariants"),
+    *("errors", "hints", "version", "sources", "display_protocols", "atomic_files", "processes", "hard_stop"),
+    *("algebra", "function_calls", "systems", "family", "maps", "documents", "invariants"),
     *("checks", "paper", "laboratory", "experiments"),
     *("display", "languages", "certificates", "plots", "reports"),
     "internals",

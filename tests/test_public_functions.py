@@ -1,12 +1,14 @@
 """What may be passed to the functions of `import kahanmaps`, and what they refuse, in which words."""
 
+from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy
-from flint import fmpq
+from command_tree import all_commands
+from flint import fmpq, fmpq_mat
 
 import kahanmaps as km
 from kahanmaps.algebra.duals import DualField  # noqa: F401  # named in a row of REFUSED
@@ -121,7 +123,7 @@ COUNTS = {
     "every": lambda value: km.orbit("weierstrass", [1, 2], "1/10", 3, every=value)[1].step,
     "a step of at": lambda value: km.orbit("weierstrass", [1, 2], "1/10", at=[value])[0].step,
     "max_terms": lambda value: len(km.degrees("weierstrass", max_terms=value).degrees) - 1,
-    "degree": lambda value: km.darboux_polynomials("weierstrass", value).degree,
+    "max_degree": lambda value: km.darboux_polynomials("weierstrass", value).degree,
     "the power": lambda value: (km.map("weierstrass", "1/10") ** value == km.map("weierstrass", "1/10") ** 3) * 3,
     "the modulus": lambda value: km.GF(value).characteristic,
     "prime": lambda value: km.cycles("x' = y; y' = x - x^2", "1/5", value).prime,
@@ -230,13 +232,53 @@ km.plot.orbit(km.orbit("euler_top", [1, 2, 3], "1/10", 20))
 km.plot.portrait("lotka_volterra", [1, 2], "1/10", 20)
 km.portrait("lotka_volterra", [[1, 2], [1, 3]], time_step="1/10", steps=20)
 km.latex_polynomial(km.load("euler_top").system.rhs[0])
+km.orbit("euler-top", x0=[1, 2, 3], h="1/5", n=5, exact=True)[1:3]
+km.orbit("euler_top", x0={"x1": 0.1, "x2": 0.2, "x3": 1}, eps=0.1, n=5, exact=False).x[-1]
+km.orbit("euler_top", fmpq_mat(3, 1, [1, 2, 3]), Decimal("0.1"), 3)["x1"]
+km.orbit("euler_top", sympy.Matrix([1, 2, sympy.Rational(1, 3)]), sympy.Rational(1, 10), 3).t
+km.orbit("euler_top", [1, 2, 3], "1/10", 5).plot()
+km.orbit("euler_top", [1, 2, 3], "1/10", 5).save("o.npz")
+km.ensemble("euler_top", [[0.1, 0.2, 0.3], [1, 2, "1/3"]], 0.1, 5, kernel="numpy")
+km.lyapunov("lorenz", x0=[1, 1, 1], h=0.01, n=10)
+km.plot("euler_top", x0=[1, 0.5, 0.2], h=0.1, n=20)
+km.plot(km.degrees("euler_top", max_terms=3))
+km.plot.drift("euler_top", x0=[1, 0.5, 0.25], h=0.1, n=100)
+km.plot.rotation("nahm_tetrahedral", ["1/10", "1/5"], [2, 3], eps="1/10", points=5)
+km.plot.commute("paper_m2", x0=["1/2", "-1/3", 0, 1], eps="1/50")
+km.plot.invariant_curves("paper_m2", x0=["1/2", "-1/3", 0, 1], eps="1/10", n=50)
+km.load("lotka_volterra").plot(eps=0.05, n=20)
+km.System({"x": "a*y", "y": "x"}, {"a": 2}) == km.System({"x": "a*y", "y": "x"}, params={"a": 2})
+km.System({"x": "a*y", "y": "x"}, a=2).subs({sympy.Symbol("a"): sympy.Rational(1, 3)}).parameters
+km.load("euler_top").f([1, 2, 3]), km.load("euler_top").jacobian({"x1": 1, "x2": 2, "x3": 3})
+km.load("euler_top").latex(), km.load("euler_top").to_sympy(), km.load("euler_top").dimension
+km.load("euler_top").kahan(h="1/5").orbit([1, 2, 3], 5), km.load("euler_top").kahan("1/10").latex()
+[integral.latex() for integral in km.find_integrals("euler_top")]
+km.check_integrals("weierstrass", km.find_integrals("weierstrass")[0]).holds and None
+km.check_integrals("weierstrass", km.find_integrals("weierstrass")).rows()
+km.check_measure("weierstrass", km.find_density("weierstrass")[0]).rows()
+km.check_poisson("weierstrass", km.find_poisson("weierstrass")[0]).rows()
+km.explicit_map(["x", "y"], ["y", "(2 + y)/x"]).at(1)([1, 3])
+km.geometry("paper_m2", x0=[1, 2, 0, 1], h="1/5"), km.period("paper_m2", x0=[1, 2, 0, 1], h="1/5", prime=101)
+km.fixed_points("lotka_volterra")[0], km.orbit("euler_top", [1, 2, 3], "1/10", 5).shape
+km.find_integrals("euler_top").to_dict() == km.find_integrals("euler_top").to_json()
+km.find_density("lotka_volterra")[0](1, 2, "1/10"), km.invariant_measure("lotka_volterra")
+km.dynamical_degree("euler_top"), km.algebraic_entropy("lotka_volterra")
+km.singularities("riccati"), km.singularities("lyness")
+km.systems()["lorenz"], km.systems("euler_top", a1=2), km.catalogue().rows()[0], print(km.catalogue())
+km.family(m=2, seed=1).system, km.family.new(chi="t^2 - 2", seed=1), km.family.associated("paper_m3")
+km.family.space("paper_m2"), km.family.show("paper_m2"), km.family.tensor("lorenz", "t^2 - 2")
+km.batch.tasks()
+km.scan("euler_top", over="a1", terms=3, primes=[31, 37, 41]), km.find_integrals("euler_top", symbols="a1, a2").symbols
+km.report(km.check_integrals("euler_top"), "r.html", pictures=False)[:9]
+km.KahanMap(km.load("euler_top"), h="1/5")([1, 2, 3])
+np.asarray(km.load("euler_top").at("1/10").jacobian([1, 2, 3]).tolist(), dtype=float)
 """.strip().splitlines()
 
 
 @pytest.mark.parametrize("expression", EXPRESSIONS)
 def test_what_one_writes_works(expression, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    eval(expression, {"km": km, "np": np})
+    eval(expression, {"km": km, "np": np, "sympy": sympy, "fmpq_mat": fmpq_mat, "Decimal": Decimal})
 
 
 REFUSED = [
@@ -287,6 +329,38 @@ REFUSED = [
     ('km.check_poisson("weierstrass", 5)', "expected a matrix of formulas"),
     ("km.check_measure(FISH)", 'extra="EXPRESSION"'),
     ("np.array(km.orbit(FISH, [1, 2], '1/10', 2, arithmetic='ball:64'))", 'use arithmetic="float"'),
+    ("km.orbit(FISH, [1, 2], eps=0.1, n=5)", 'e.g. "0.1"; or exact=False'),
+    ("km.orbit(FISH, x0=[0.5, 2], eps='1/10', n=5)", "exact=False, for an orbit in floating point"),
+    ("km.orbit(FISH, [1, 2], n=5)", 'eps="1/10" or h="1/5"'),
+    ("km.orbit(FISH, [1, 2], '1/10', 5, x0=[1, 2])", "found start and x0"),
+    ("km.orbit(FISH, [1, 2], h='1/5', eps='1/10', n=5)", "found eps and h"),
+    ("km.orbit(FISH, [1, 2], '1/10', 5, exact=True, arithmetic='float')", "expected one of them"),
+    ("km.orbit(FISH, [1, 2], '1/10', 5, exact='no')", "found exact = 'no', expected True or False"),
+    ("km.orbit(FISH, {'q': 1}, '1/10', 5)", "found the coordinates q, expected q, p"),
+    ("km.orbit(FISH, [1, 2], h='1/5', t_max=5)", r"no argument t_max=: n= is the number of steps"),
+    ("km.orbit(FISH, [1, 2], '1/10', 5)['z']", "found the variable 'z', expected one of q, p"),
+    ("km.degrees(FISH, seconds=3)", r"no argument seconds=: with km.time_limit\(10\)"),
+    ("km.find_integrals(FISH, degree=2)", "max_degree= is the largest degree"),
+    ("km.find_integrals(FISH, max_degree='2')", "found max_degree = '2', expected an integer"),
+    ("km.analyze(FISH, 2)", "km.analyze: too many positional arguments; its arguments are system, symbols"),
+    ("km.ensemble(FISH, [[1, 2]], '1/10', 3, dtype=float)", "km.ensemble has no argument dtype="),
+    ("km.family(over=3)", "km.family has no argument over="),
+    ("km.family()", "expected m=3, eigenvalues"),
+    ("km.batch(['euler_top'])", r"type \[km.analyze"),
+    ("km.systems()['euler-topp']", "did you mean euler_top"),
+    ("phi([0.5, 1])", r"numpy.array\(\[...\]\) gives floats"),
+    ("km.geometry('paper_m2', eps='1/10')", "found no initial point or no eps"),
+    ("phi.jacobian(np.ones(2))", r"\[Fraction\(x\) for x in point\] is exact"),
+    ("km.analyze(['weierstrass', 'lorenz'])", r"type \[f\(system\) for system in systems\]"),
+    ("km.degrees(FISH, N=5)", "max_terms= is the number of iterates"),
+    ("km.check_integrals('weierstrass', seed=3)", r"settings=km.Settings\(seed=3\)"),
+    ("km.bilinear_map(['x'], ['X - x = x*X'])", "expected polynomials"),
+    ("phi(np.ones((2, 3)))", "expected rows of 2 numbers"),
+    ("km.System(FISH).f(0, np.ones(2))", "found two arguments, expected the point alone"),
+    ("km.System(FISH)(np.ones(2))", r"system.at\(eps\)\(x\)"),
+    ("km.cycles(FISH, prime=101)", 'found None, expected an exact number, e.g. eps="1/10"'),
+    ("km.plot.drift(FISH, x0=[1, 2])", "expected eps= or h="),
+    ("km.load('lyness').kahan('1/10')", "expected a quadratic vector field"),
 ]
 
 
@@ -294,6 +368,50 @@ REFUSED = [
 def test_what_does_not_work_says_what_does(expression, words):
     with pytest.raises(InputError, match=words):
         eval(expression, {**globals(), "phi": km.map(FISH, "1/5")})
+
+
+# Words of SciPy, SymPy and earlier releases, and what is to be typed instead.
+MISSING = [
+    ("km.parse", r"type km\.System\("),
+    ("km.solve_ivp", r"type km\.orbit\(system, x0, eps, steps\)"),
+    ("km.integrals", r"km\.find_integrals\(system\)"),
+    ("km.analize", "did you mean analyze"),
+    ("km.nothing_like_this", "see docs/howto/python.md"),
+    ("km.System(FISH).equilibria", r"type km\.fixed_points\(system\)"),
+    ("km.System(FISH).variabels", "did you mean variables"),
+    ("phi.lyapunov", r"type km\.lyapunov\(\.\.\.\)"),
+    ("phi.degree", r"km\.degrees\(system\)"),
+    ("phi.invers", "did you mean inverse"),
+    ("km.orbit(FISH, [1, 2], '1/10', 2).y", "orbit.x, an array"),
+    ("km.degrees(FISH, max_terms=2).degreees", "did you mean degrees"),
+    ("km.find_integrals('weierstrass')[0].subs", r"I\(x, eps\) for a value"),
+    ("km.plot.scatter", "'Plot' object has no attribute 'scatter'"),
+    ("km.batch.runn", "did you mean run"),
+]
+
+
+@pytest.mark.parametrize(("expression", "words"), MISSING)
+def test_a_missing_name_is_answered_with_what_to_type(expression, words):
+    with pytest.raises(AttributeError, match=words):
+        eval(expression, {**globals(), "phi": km.map(FISH, "1/5")})
+
+
+def test_protocols_are_asked_for_in_vain_without_a_hint():
+    for value in (km.System(FISH), km.map(FISH, "1/5"), km.degrees(FISH, max_terms=2)):
+        assert not hasattr(value, "_ipython_display_")
+        assert not hasattr(value, "__array_interface__")
+
+
+def test_each_command_has_its_function_or_its_group_of_functions():
+    for words, _ in all_commands():
+        names = words.replace("-", "_").split()
+        if words in ("", "completion", "version"):  # of the command line alone; km.__version__
+            continue
+        value = km
+        for name in names:
+            value = getattr(value, name)
+        assert callable(value), words
+        assert names[0] in dir(km) or names[0] == "plot"
 
 
 @pytest.mark.parametrize("given", [0.5, np.float64(0.5)])

@@ -1,17 +1,23 @@
 """Values of the library in Python: equal, copied, pickled, shown in short, plain data, arrays."""
 
 import copy
+import json
 import multiprocessing
 import pickle
+import re
 from concurrent.futures import ProcessPoolExecutor
 from fractions import Fraction
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from flint import fmpq
 from helpers import together
 
 import kahanmaps as km
 from kahanmaps.errors import InputError
+from kahanmaps.function_calls import _ARGUMENT_HINTS
+from kahanmaps.hints import HINTS
 
 FISH = "q' = p; p' = q^2 - q"
 
@@ -81,6 +87,124 @@ def test_functions_and_their_results_go_to_other_processes_and_back():
     assert analysis.sections
     assert phi == km.map(FISH, "1/5")
     assert polynomial == km.parse_polynomial("x + y/2", ("x", "y"))
+
+
+POINTS = np.array([[0.5, 0.25], [-0.75, 1.0], [0.0, 2.0]])
+
+
+def test_a_field_and_its_jacobian_are_exact_or_arrays():
+    fish = km.System("q' = p; p' = a*q^2 - q", a="1/2")
+    assert fish.f([2, 3]) == fish.f(2, 3) == fish.f({"q": 2, "p": 3}) == (3, 0)
+    assert np.array_equal(fish.f(POINTS), [[p, q * q / 2 - q] for q, p in POINTS])
+    assert fish.jacobian([2, 3]).tolist() == [[0, 1], [1, 0]]
+    assert [[str(entry) for entry in row] for row in fish.jacobian()] == [["0", "1"], ["q - 1", "0"]]
+    assert np.array_equal(fish.jacobian(POINTS), [[[0, 1], [q - 1, 0]] for q, _ in POINTS])
+    assert fish.jacobian(POINTS[0]).shape == (2, 2)
+
+
+def test_parameters_are_substituted_and_systems_are_keys():
+    fish = km.System("q' = p; p' = a*q^2 - q", a="1/2")
+    assert fish.subs(a=3) == fish.with_parameters({"a": 3}) == km.System("q' = p; p' = a*q^2 - q", a=3) != fish
+    assert fish.parameters == {"a": fmpq(1, 2)}
+    assert {fish: 1, fish.subs(a=3): 2}[km.System("q' = p; p' = a*q^2 - q", a="1/2")] == 1
+
+
+def test_a_map_takes_arrays_of_floats_and_rounds_what_is_exact():
+    phi = km.map(FISH, "1/5")
+    before = POINTS.copy()
+    exact = [[float(x) for x in phi(list(map(Fraction, point)))] for point in POINTS.tolist()]
+    assert np.allclose(phi(POINTS), exact, rtol=1e-15, atol=1e-15)
+    assert np.allclose((phi @ phi)(POINTS[1]), phi(phi(POINTS[1])), rtol=1e-15)
+    pole = km.map("x' = x^2", "1/2")  # 1 - x is the denominator
+    assert np.array_equal(POINTS, before)
+    assert np.array_equal(pole(np.array([[0.5], [1.0]])), [[1.0], [np.nan]], equal_nan=True)
+    assert phi.h == phi.time_step == fmpq(2, 5)
+
+
+def test_orbits_have_arrays_times_columns_and_slices():
+    exact = km.orbit(FISH, x0=[1, 2], h="1/5", n=4)
+    floats = km.orbit(FISH, x0=[1.0, 2], h=0.2, n=4, exact=False)
+    assert exact.x.dtype == object
+    assert exact.x.tolist() == [list(point.x) for point in exact]
+    assert np.allclose(floats.x, np.asarray(exact), rtol=1e-13)
+    assert exact["p"].tolist() == [point.x[1] for point in exact]
+    assert exact.t.tolist() == [fmpq(k, 5) for k in range(5)]
+    assert np.array_equal(floats.t, np.arange(5) * 0.2)
+    assert km.orbit(FISH, [1, 2], h="1/5", n=2, backward=True).t.tolist() == [0, fmpq(-1, 5), fmpq(-2, 5)]
+    assert km.orbit("lyness", [1, 2], n=2).t.tolist() == [0, 1, 2]
+    assert [point.step for point in exact[1:4:2]] == [1, 3]
+    assert km.orbit(FISH, {"p": 2, "q": 1}, h="1/5", n=4).x.tolist() == exact.x.tolist()
+
+
+def test_a_float_stands_for_the_decimal_that_is_printed_in_float_orbits_only():
+    for option in ({"eps": 0.1}, {"h": 0.2}, {"eps": np.float64(0.1)}):
+        assert km.orbit(FISH, [1, 2], n=3, exact=False, **option).header()["eps"] == "1/10"
+        with pytest.raises(InputError, match="or exact=False"):
+            km.orbit(FISH, [1, 2], n=3, **option)
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:101", "ball:64"])
+def test_orbits_are_written_to_parquet(arithmetic, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    walk = km.orbit(FISH, [1, 2], "1/10", 5, arithmetic=arithmetic)
+    walk.write(tmp_path / "o.parquet")
+    table = parquet.read_table(tmp_path / "o.parquet")
+    assert table.to_pylist() == walk.rows()
+    record = json.loads(table.schema.metadata[b"kahanmaps"])
+    assert (record["header"]["eps"], record["end"]["status"]) == ("1/10", walk.end.status)
+
+
+def test_an_orbit_is_a_dataset_of_xarray(monkeypatch):
+    walk = km.orbit(FISH, [1, 2], "1/10", 3)
+    if find_spec("xarray") is None:
+        with pytest.raises(InputError, match="pip install xarray"):
+            walk.to_xarray()
+        return
+    data = walk.to_xarray()
+    assert data["q"].values.tolist() == [float(point.x[0]) for point in walk]
+    assert data["t"].values.tolist() == [0.0, 0.2, 0.4, 0.6]
+
+
+def test_integrals_are_called_iterated_and_converted():
+    sympy = pytest.importorskip("sympy")
+    top, found = km.load("euler_top"), km.find_integrals("euler_top")
+    walk = km.orbit(top, [1, 2, 3], "1/10", 4)
+    assert repr(found) == "<IntegralSearch: 2 integrals, proved>"
+    assert list(found) == [found[0], found[1]] == list(found.integrals)
+    for integral in found:
+        assert len({integral(point.x, "1/10") for point in walk}) == 1
+        assert len({integral(point.x, "1/9") for point in walk}) > 1
+        by_hand = sympy.sympify(integral)
+        values = dict(zip(["x1", "x2", "x3", "eps"], [1, 2, 3, sympy.Rational(1, 10)], strict=True))
+        assert str(integral([1, 2, 3], "1/10")) == str(by_hand.subs(values))
+        assert np.allclose(integral(np.asarray(walk), 0.1), float(by_hand.subs(values)), rtol=1e-12)
+        assert integral._repr_latex_() == rf"$\displaystyle {integral.latex()}$"
+    assert repr(km.find_integrals("lotka_volterra")).startswith("<IntegralSearch: ")
+    assert km.System(top.to_sympy()).rhs == top.rhs
+    image = km.map("weierstrass", "1/10").to_sympy()
+    at = dict(zip(image, [1, 2], strict=True))
+    assert [str(value.subs(at)) for value in image.values()] == km.orbit("weierstrass", [1, 2], "1/10", 1)[1].text
+    double = (km.map("weierstrass", "1/10") ** 2).to_sympy()
+    assert [str(value.subs(at)) for value in double.values()] == km.orbit("weierstrass", [1, 2], "1/10", 2)[2].text
+
+
+def test_the_verdict_of_an_analysis_in_a_word():
+    assert km.analyze("weierstrass").integrable is True
+    assert km.analyze("x' = x*(1 - y); y' = y*(x - 2)").integrable is False
+    assert km.analyze("weierstrass", analyses=()).integrable is None
+    assert repr(km.analyze("riccati", analyses=())) == "<Analysis: riccati, undecided>"
+
+
+def test_dynamical_degree_and_entropy_are_those_of_the_degrees():
+    assert str(km.dynamical_degree("henon_heiles").digits) == km.degrees("henon_heiles").dynamical_degree.digits
+    assert km.algebraic_entropy("x' = x*(1 - y); y' = y*(x - 1)") == np.log(2)
+
+
+def test_what_hints_name_exists():
+    named = {name for text in (*HINTS.values(), *_ARGUMENT_HINTS.values()) for name in re.findall(r"\bkm\.(\w+)", text)}
+    assert len(named) > 20
+    for name in named:
+        getattr(km, name)
 
 
 @pytest.mark.parametrize("prime", [101, 2**53 + 5, 2**61 - 1, 2**127 - 1])

@@ -34,6 +34,13 @@ def script() -> None:
         km.heights(top.map, "1/10", effort=0).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence
     )
 
+    for integral in km.find_integrals({"x": "y", "y": "6*x^2 - 2"}):
+        print(integral.latex(), integral.to_sympy(), integral([1, 2], "1/10"))
+    floats = km.orbit(top, x0=[1.0, 0.5, 0.25], h=0.1, n=5, exact=False)
+    print(floats.x.mean(), floats.t, floats["x1"], floats.write(Path("o.parquet")).status, top.f([1, 2, 3]), hash(top))
+    print(km.analyze(fish).integrable is True, km.dynamical_degree(fish), fish.kahan(h="1/5").h, len(km.catalogue()))
+    print(km.ensemble(fish, x0=np.zeros((5, 2)), h=0.1, n=5).x, km.singularities(fish).to_dict(), top.subs(a1=3).dim)
+
     km.degrees(3)  # type: ignore[arg-type]
     km.degrees("euler_top", max_tems=4)  # type: ignore[call-arg]
     print(km.degrees("euler_top").growth_txt)  # type: ignore[attr-defined]

@@ -13,6 +13,7 @@ import random
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from decimal import Decimal
 from functools import lru_cache
 from numbers import Rational
 from operator import index
@@ -33,8 +34,8 @@ MAX_BALL_BITS = 1_000_000
 def rational(value: Any) -> fmpq:
     """Convert a value to an exact rational number.
 
-    Accepts int, Fraction, text (`"1/3"`, `"0.1"`), fmpz and fmpq, and every `numbers.Rational`: also numbers of SymPy
-    and integers of numpy. Raises `InexactNumber` for floats, whose value differs from the decimal that is printed.
+    Accepts int, Fraction, Decimal, text (`"1/3"`, `"0.1"`), fmpz and fmpq, and every `numbers.Rational`: also numbers
+    of SymPy and integers of numpy. Raises `InexactNumber` for floats, whose value differs from the printed decimal.
 
     >>> rational("0.1")
     1/10
@@ -56,6 +57,8 @@ def rational(value: Any) -> fmpq:
         return rational(value.item())
     if kind and kind not in "fc":
         raise InputError(f"found {value!r} of numpy, expected one exact number")
+    if isinstance(value, Decimal) and value.is_finite():
+        return fmpq(*value.as_integer_ratio())
     if isinstance(value, Rational):
         return fmpq(int(value.numerator), int(value.denominator))
     if isinstance(value, float | complex) or kind:
@@ -68,6 +71,8 @@ def rational(value: Any) -> fmpq:
             f"found the floating-point number {value!s}, expected an exact one: "
             f'write an integer, p/q or a decimal as text, e.g. "{example}"'
         )
+    if value is None:
+        raise InputError('found None, expected an exact number, e.g. eps="1/10"')
     raise InputError(f"found {value!r} of type {type(value).__name__}, expected an exact number")
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import copyreg
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 from flint import (
@@ -36,6 +37,7 @@ from flint import (
 
 from kahanmaps.algebra.integers import content, over_one
 from kahanmaps.algebra.work import count
+from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError, quoted
 
 _MAX_FACTORED_TERMS = 100_000
@@ -271,8 +273,8 @@ def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
     return [polynomial.context().from_dict(terms) for terms in coefficients.values()]
 
 
-@dataclass(frozen=True, eq=False)
-class RationalFunction:
+@dataclass(frozen=True, eq=False, repr=False)
+class RationalFunction(LatexDisplay):
     """A quotient of two polynomials over Q; the denominator has coprime integer coefficients, the first positive.
 
     Common factors are not removed, since a gcd of large polynomials is expensive; two rational functions are equal if
@@ -322,6 +324,21 @@ class RationalFunction:
     @property
     def names(self) -> tuple[str, ...]:
         return names_of(self.numerator)
+
+    def __str__(self) -> str:
+        text: str = import_module("kahanmaps.algebra.printing").format_rational_function(self)
+        return text
+
+    def __repr__(self) -> str:
+        return f"RationalFunction({shorten(str(self), 100)})"
+
+    def __call__(self, *point: Any) -> Any:
+        """Return the value at a point: exact numbers, or rounded where a coordinate is a float; None at a pole.
+
+        The arguments are the values of `names` in this order, those of the variables also as one sequence: I(x, eps).
+        An array of floats of shape (points, dimension) gives the array of the values, with NaN at poles.
+        """
+        return import_module("kahanmaps.maps.values").function_value(self, point)
 
     def value(self, field: Any, point: Sequence[Any]) -> Any:
         """Return the value at `point` over `field`, or None where the denominator vanishes."""

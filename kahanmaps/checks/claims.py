@@ -13,7 +13,7 @@ from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
 
-from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, WithoutTruthValue
+from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, ResultPart, WithoutTruthValue
 
 
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
@@ -39,7 +39,7 @@ class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Evidence(ResultPart):
     """The reason for a verdict: the method, a sentence, and plain data for scripts."""
 
     method: str
@@ -75,7 +75,7 @@ class Witness:
 
 
 @dataclass(frozen=True)
-class Finding(HtmlDisplay, WithoutTruthValue):
+class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
     """A claim with its verdict. A `control` is expected to be refuted, and shows that the check is able to fail."""
 
     claim: str
@@ -124,6 +124,8 @@ class Finding(HtmlDisplay, WithoutTruthValue):
 @dataclass(frozen=True)
 class Report(PrintableResult):
     """The findings of a check, with the data needed to reproduce it (`context`)."""
+
+    _parts, _noun = "findings", ("claim", "claims")
 
     check: str
     findings: tuple[Finding, ...]

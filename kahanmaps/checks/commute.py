@@ -84,6 +84,7 @@ def check_commute(
     *,
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
 ) -> Report:
     """Check whether the maps of two systems commute, or all rational associated maps of one member of the family.
 
@@ -93,7 +94,7 @@ def check_commute(
             grad H_1 = A grad H_0, serve as a control: in general they do not commute.
         settings: eps, seed, error bound and orbit.
         eps2: the eps of the second map, if it differs (then eps must be given as well).
-        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+        eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report.
@@ -101,7 +102,7 @@ def check_commute(
     Raises:
         InputError: if there is nothing to compare, or one of the maps is the identity.
     """
-    file, settings = as_file(system), Settings.of(settings, eps, time_step)
+    file, settings = as_file(system), Settings.of(settings, eps, time_step, h)
     if other is None:
         if eps2 is not None:
             raise InputError("a second step needs a second system: kahanmaps check-commute SYSTEM OTHER --eps2 E")

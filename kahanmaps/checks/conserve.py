@@ -156,6 +156,7 @@ def check_integrals(
     known: bool = False,
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
 ) -> Report:
     """Check whether integrals are conserved, identically and along an exact orbit.
 
@@ -166,7 +167,7 @@ def check_integrals(
             functions, text or SymPy expressions; or names of integrals of the file. By default the integrals that
             follow from theorems and those of the file.
         known: check those integrals in addition to `extra`.
-        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+        eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report; the claimed integrals come first.
@@ -179,7 +180,7 @@ def check_integrals(
     'proved'
     """
     file = as_file(system)
-    settings, extra = settings_and_claim(settings, extra, eps, time_step)
+    settings, extra = settings_and_claim(settings, extra, eps, time_step, h)
     claims, of_file = claimed_functions(file, extra), {**file.integrals, **file.integrals_in_iterates}
     for name, function in claims.items():
         file.require_claim(f"the integral {name}", function)

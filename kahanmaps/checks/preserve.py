@@ -90,6 +90,7 @@ def check_measure(
     known: bool = False,
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
 ) -> Report:
     """Check whether the measure dx/phi is invariant.
 
@@ -99,7 +100,7 @@ def check_measure(
         extra: phi, as a function, text or SymPy expression. By default det(I - eps f') for Hamiltonian systems, and the
             [density] of the file.
         known: check those densities in addition to `extra`.
-        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+        eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report.
@@ -112,7 +113,7 @@ def check_measure(
     'proved'
     """
     file = as_file(system)
-    settings, extra = settings_and_claim(settings, extra, eps, time_step)
+    settings, extra = settings_and_claim(settings, extra, eps, time_step, h)
     candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str]] = []
 
     def add(function: RationalFunction) -> None:
@@ -197,6 +198,7 @@ def check_poisson(
     *,
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
 ) -> Report:
     """Check whether a tensor is a Poisson tensor that the map preserves.
 
@@ -204,7 +206,7 @@ def check_poisson(
         system: a map, or a system, which stands for its Kahan map.
         settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
         extra: the tensor, or a matrix of formulas. By default Pi(x) = J - eps^2 f'(x)^2 J, for Hamiltonian systems.
-        eps, time_step: eps (half the time step) or the time step, instead of `settings.eps`.
+        eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report: the transformation law and the Jacobi identity.
@@ -214,7 +216,7 @@ def check_poisson(
             dimension or is identically zero.
     """
     file = as_file(system)
-    settings, extra = settings_and_claim(settings, extra, eps, time_step)
+    settings, extra = settings_and_claim(settings, extra, eps, time_step, h)
     extra = claimed_tensor(file, extra)
     proof, source, condition = None, "", ""
     tensor: PoissonTensor

@@ -17,6 +17,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
+from kahanmaps.display_protocols import PrintableResult, ResultPart
 from kahanmaps.documents.expressions import formula_text
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.iterates import parse_with_iterates
@@ -67,9 +68,9 @@ class Settings:
             raise InputError(f"found an error bound of {self.error_bits} bits, expected 1 to 10000")
 
     @classmethod
-    def of(cls, settings: Settings | None, eps: Any, time_step: Any) -> Settings:
+    def of(cls, settings: Settings | None, eps: Any, time_step: Any, h: Any = None) -> Settings:
         """Return the settings (default: the default settings), with eps or the time step replaced if given."""
-        settings, eps = settings or cls(), resolve_eps(eps, time_step)
+        settings, eps = settings or cls(), resolve_eps(eps, time_step, h)
         return settings if eps is None else replace(settings, eps=eps)
 
     def cut_short(self, run: OrbitRun) -> bool:
@@ -196,21 +197,23 @@ def _orbit_data(run: OrbitRun, tried: int, poles: int) -> Mapping[str, Any]:
 
 
 def settings_and_claim(
-    settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None
+    settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None, h: Any = None
 ) -> tuple[Settings, Any]:
     """Return (settings, claim), also if the claim was given in place of the settings; replace eps if given."""
     if settings is None or isinstance(settings, Settings):
-        return Settings.of(settings, eps, time_step), extra
+        return Settings.of(settings, eps, time_step, h), extra
     if extra is not None:
         raise InputError(f"expected Settings as second argument, since the third is a claim; got {settings!r}")
-    return Settings.of(None, eps, time_step), settings
+    return Settings.of(None, eps, time_step, h), settings
 
 
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
     """Convert a claim to a function of the variables of a file and eps (and iterates, if it contains x~).
 
-    The claim is a function, a formula in the variables, parameters and eps, or the name of an integral of the file.
+    The claim is a function, a result of a search, a formula in the variables, parameters and eps, or the name of an
+    integral of the file.
     """
+    claim = getattr(claim, "function", claim) if isinstance(claim, ResultPart) else claim
     if isinstance(claim, RationalFunction):
         return claim
     of_file, names = {**file.integrals, **file.integrals_in_iterates}, file.claim_names
@@ -224,7 +227,7 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
     if claims is None:
         return {}
     if not isinstance(claims, Mapping):
-        unnamed = claims if isinstance(claims, list | tuple) else [claims]
+        unnamed = list(claims) if isinstance(claims, list | tuple | PrintableResult) else [claims]
         of_file = {**file.integrals, **file.integrals_in_iterates}
         free = (f"I{k}" for k in count(1) if f"I{k}" not in of_file)
         claims = {c if isinstance(c, str) and c in of_file else next(free): c for c in unnamed}
@@ -237,6 +240,7 @@ def claimed_functions(file: SystemFile, claims: Any) -> dict[str, RationalFuncti
 
 def claimed_tensor(file: SystemFile, claim: Any) -> MatrixPoissonTensor | None:
     """Convert a matrix of formulas to a tensor. Raises InputError if it is not a skew-symmetric matrix."""
+    claim = getattr(claim, "tensor", claim) if isinstance(claim, ResultPart) else claim
     if claim is None or isinstance(claim, MatrixPoissonTensor):
         return claim
     rows = claim.tolist() if hasattr(claim, "tolist") else claim

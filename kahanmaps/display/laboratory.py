@@ -17,9 +17,9 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.display import markup
-from kahanmaps.display.latex import formula
+from kahanmaps.display.latex import formula, latex_rational_function
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
-from kahanmaps.display_protocols import html_form, text_form
+from kahanmaps.display_protocols import html_form, latex_form, text_form
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.cycles import Census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
@@ -27,8 +27,10 @@ from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch
 from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+from kahanmaps.laboratory.preserve.iterates import IntegralInIterates
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import ConstantStructures
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import FoundTensor, PoissonSearch
+from kahanmaps.laboratory.preserve.results import FoundFunction
 from kahanmaps.laboratory.scan.result import Scan
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
@@ -68,6 +70,16 @@ def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> HtmlCell:
     return _formula(format_polynomial(polynomial), polynomial, name)
 
 
+@latex_form.register
+def _found_function(found: FoundFunction) -> str:
+    return latex_rational_function(found.function)
+
+
+@latex_form.register
+def _found_tensor(found: FoundTensor | IntegralInIterates) -> str:
+    return found.latex()
+
+
 def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
     """The eps of a result, with the time step, as a phrase; empty for a map that does not depend on eps."""
     return markup.eps_phrase(eps_record(eps, *maps))
@@ -98,7 +110,7 @@ def result_html(result: Any, map_: MapFamily | None = None) -> str:
     title, subtitle = _TITLES[type(result)](result)
     if map_ is not None:
         subtitle = eps_sentence(result.eps, map_)
-    return markup.titled(title, (markup.table((), rows[:_ROWS]) if rows else "<p>none</p>") + more, subtitle)
+    return markup.titled(title, (markup.folded(rows[:_ROWS]) if rows else "<p>none</p>") + more, subtitle)
 
 
 def _text(text: str, width: int = _TEXT) -> str:
@@ -142,7 +154,7 @@ def analysis_html(analysis: Analysis) -> str:
     inside = [
         f"<p>{map_html(analysis.file.map)}</p>",
         f"<p><strong>{_text(final.kind)}</strong>: {_text(final.sentence, 800)}</p>",
-        markup.table(["", "known how", ""], rows) + more,
+        markup.folded(rows, ["", "known how", ""]) + more,
     ]
     beside = ", ".join(filter(None, (f"dimension {analysis.dim}", eps_sentence(analysis.eps, analysis.file.map))))
     return markup.titled(markup.shortened(analysis.file.name), "\n".join(inside), beside)

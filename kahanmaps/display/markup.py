@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from kahanmaps.errors import printable
+from kahanmaps.errors import counted, printable
 from kahanmaps.maps.convention import eps_record_suffix
 
 # A symbol, and a color to be mixed with that of the text; the contrast is above 4.5 : 1 on white and on near black.
@@ -26,6 +26,7 @@ WORDS = {
     "undecided": ("?", "#b8860b"),
 }
 _LEFT = 'style="text-align: left"'  # Jupyter aligns all cells on the right
+_OPEN_ROWS = 12
 _SHORTENED = 60  # characters of a number or a name
 
 
@@ -104,6 +105,19 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
         line = "".join(f"<td {_LEFT}>{cell}</td>" for cell in cells)
         lines.append(f"<tr>{line}<td{wide} {_LEFT}>{last}</td></tr>")
     return "\n".join([f"<table>{title}{names}<tbody>", *lines, "</tbody></table>"])
+
+
+def folded(rows: Sequence[Sequence[str]], head: Sequence[str] = ()) -> str:
+    """Return a table of which only the first 12 rows are shown before a click on the number of the others.
+
+    >>> print(folded([["a"]]) == table((), [["a"]]), folded([["a"]] * 15).count("<summary>3 more lines</summary>"))
+    True 1
+    """
+    first, others = rows[:_OPEN_ROWS], rows[_OPEN_ROWS:]
+    if not others:
+        return table(head, rows)
+    more = f"<details><summary>{counted(len(others), 'more line')}</summary>\n{table(head, others)}\n</details>"
+    return f"{table(head, first)}\n{more}"
 
 
 def definitions(rows: Iterable[tuple[str, str]]) -> str:

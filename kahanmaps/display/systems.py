@@ -28,11 +28,12 @@ from kahanmaps.errors import counted
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.composed import ComposedMap
-from kahanmaps.maps.implicit import ImplicitMap, MapFamily
+from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily, KahanMap
 from kahanmaps.maps.normal_form.geometry import LevelGeometry
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint
+from kahanmaps.maps.orbits.orbit import Trajectory
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -55,6 +56,12 @@ def hamiltonian_latex(hamiltonian: CubicHamiltonian) -> str:
     """Return H and the equations x' = J grad H."""
     J = r"\begin{pmatrix} 0 & I \\ -I & 0 \end{pmatrix}" if hamiltonian.is_standard else latex_matrix(hamiltonian.J)
     return latex_aligned([("H", latex_cut(hamiltonian.H, CHARACTERS)), (r"\dot{x}", rf"J \nabla H, \quad J = {J}")])
+
+
+@latex_form.register
+def file_latex(file: SystemFile) -> str:
+    """Return the equations of a system file."""
+    return birational_latex(file.map)
 
 
 def map_html(map_: MapFamily) -> str:
@@ -139,6 +146,7 @@ def normal_form_html(form: NormalForm) -> str:
 
 _EQUATIONS = 8
 _COORDINATES = 8
+_POINTS = 6
 _MAX_DIGITS = 2_000  # longer numbers are not converted to text
 
 
@@ -162,6 +170,12 @@ def map_latex(kahan: KahanMap) -> str:
         )
     )
     return latex_aligned(rows, _EQUATIONS + 2)
+
+
+@latex_form.register
+def composition_latex(map_: Map) -> str:
+    """Return a map other than Kahan's as text."""
+    return rf"$\text{{{_plain(map_)}}}$"
 
 
 @latex_form.register
@@ -220,6 +234,24 @@ def orbit_html(orbit: Orbit) -> str:
     at += "" if flow is None else f" time step {markup.shortened(field.format(flow[1]))},"
     title = f"orbit{direction},{at} over {field}"
     return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
+
+
+@html_form.register
+def trajectory_html(orbit: Trajectory) -> str:
+    """Return the first points, and the last one if all points are known."""
+    known = vars(orbit).get("points")
+    shown = orbit.preview(_POINTS) if known is None else [*known[:_POINTS], *known[_POINTS:][-1:]]
+    variables = orbit.variables
+    head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
+    rows = [_cells(point, len(variables)) for point in shown]
+    if known is not None and len(known) > _POINTS + 1:
+        rows.insert(_POINTS, ["…"] * len(head))
+    if known is None:
+        status = "the first points; len(orbit), orbit.x and orbit[-1] compute all"
+    else:
+        status = f"{markup.verdict(orbit.end.status)}: {markup.escape(orbit.end.message)}"
+    title = f"orbit, {orbit.arithmetic} arithmetic, {orbit.method} method"
+    return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>")
 
 
 def _cells(point: OrbitPoint, count: int) -> list[str]:

@@ -11,7 +11,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from importlib import resources
+from importlib import import_module, resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.atomic_files import write_atomically
-from kahanmaps.display_protocols import HtmlDisplay, shorten
+from kahanmaps.display_protocols import HtmlDisplay, LatexDisplay, shorten
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.families import family_member
 from kahanmaps.documents.iterates import iterates_in, with_iterates
@@ -31,8 +31,10 @@ from kahanmaps.documents.xpp import ENDING, is_ode, read_ode
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
 from kahanmaps.maps.algebraic import AlgebraicMap
+from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily
+from kahanmaps.maps.values import values_at
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -46,7 +48,7 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 
 @dataclass(frozen=True, eq=False)
-class SystemFile(HtmlDisplay):
+class SystemFile(HtmlDisplay, LatexDisplay):
     """A system or map with the parameters and claims of its file.
 
     `map` is the map, for a differential equation its Kahan map; `hamiltonian` and `member` are there when
@@ -89,6 +91,42 @@ class SystemFile(HtmlDisplay):
         """The dimension of the phase space."""
         return self.map.dim
 
+    dimension = dim
+
+    def f(self, *point: Any) -> Any:
+        """Return the right-hand sides at a point: f(x), f({"x": 1, "y": 2}) or f(1, 2).
+
+        They are exact for exact numbers, and an array for an array of floats of shape (dim,) or (points, dim). Raises
+        InputError for a map without a vector field.
+        """
+        return values_at(self.rhs, self.variables, point)
+
+    def jacobian(self, *point: Any) -> Any:
+        """Return the Jacobi matrix f'(x) at a point, as `f` takes it; without a point, its entries as polynomials."""
+        rows = self.system.jacobian(self.variables)
+        if not point:
+            return rows
+        entries = values_at([entry for row in rows for entry in row], self.variables, point)
+        if isinstance(entries, tuple):
+            return fmpq_mat(self.dim, self.dim, entries)
+        return entries.reshape(*entries.shape[:-1], self.dim, self.dim)
+
+    def with_parameters(self, values: Mapping[Any, Any] | None = None, **named: Any) -> SystemFile:
+        """Return the system with other values of its parameters, exact numbers by name. Raises InputError."""
+        given = {str(name): value for name, value in {**(values or {}), **named}.items()}
+        return parse_system(self.to_toml(), self.name, given)
+
+    subs = with_parameters
+
+    def kahan(self, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:
+        """Return the Kahan map at an exact eps, or at the time step h = 2 eps; raise InputError for other systems."""
+        _ = self.system
+        return self.at(resolve_eps(eps, time_step, h))
+
+    def plot(self, *arguments: Any, **options: Any) -> Any:
+        """Draw a portrait and return its axes; the arguments are those of `km.portrait` after the system."""
+        return import_module("kahanmaps.plots.plot").plot_orbits(self, *arguments, **options)
+
     @property
     def claim_names(self) -> tuple[str, ...]:
         """The arguments of claims: the variables, the algebraic parameter if there is one, and eps."""
@@ -118,6 +156,8 @@ class SystemFile(HtmlDisplay):
 
     def at(self, eps: Any = None) -> Map:
         """Return the map at an exact eps, half the time step; it is callable. Raises InputError if eps is missing."""
+        if hasattr(eps, "__len__") and not isinstance(eps, str):
+            raise InputError("found a point, expected eps: system.at(eps)(x) is the image of x, system.f(x) the field")
         if eps is None and self.map.has_eps:
             raise InputError(f'found no eps, expected an exact number such as "1/10": {self.name} depends on it')
         return self.map.at(fmpq(1) if eps is None else rational(eps))
@@ -230,7 +270,8 @@ class SystemFile(HtmlDisplay):
             and self.density == other.density
         )
 
-    __hash__ = None  # type: ignore[assignment]  # the claims have no hash that agrees with ==
+    def __hash__(self) -> int:
+        return hash((self.name, self.kind, self.variables))
 
 
 def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:

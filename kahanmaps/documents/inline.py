@@ -49,8 +49,9 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
             of SymPy, or a list of its equations Eq(x(t).diff(t), ...).
-        variables: for a list of right-hand sides, their names in this order.
-        parameters: the values of other names, exact numbers, among them algebraic numbers of SymPy.
+        variables: for a list of right-hand sides, their names in this order; otherwise also a dict of parameters.
+        parameters: the values of other names, a=2 or parameters={"a": 2}, exact numbers, among them algebraic numbers
+            of SymPy.
 
     Returns:
         A `SystemFile`, as if read from a file.
@@ -61,6 +62,11 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
     >>> System("x' = 2*x*y - a; y' = -x^2 - y^2 - x", a="1/2").system.rhs
     (2*x*y - 1/2, -x^2 - y^2 - x)
     """
+    if isinstance(variables, Mapping):
+        variables, parameters = None, {**{str(key): value for key, value in variables.items()}, **parameters}
+    for name in ("parameters", "params"):
+        if isinstance(parameters.get(name), Mapping):
+            parameters |= {str(key): value for key, value in parameters.pop(name).items()}
     if not isinstance(equations, str | Mapping):
         try:
             equations = list(equations)
@@ -85,17 +91,17 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None) -> Map:
+def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:
     """Return the map of a system at an exact eps: callable, composed by @ and **. Raises InputError without eps.
 
     >>> map_at("euler_top", "1/10")([1, 2, 3])
     (65/37, 10/37, 125/37)
     """
-    return as_file(system).at(resolve_eps(eps, time_step))
+    return as_file(system).at(resolve_eps(eps, time_step, h))
 
 
 def as_file(value: Any) -> SystemFile:
-    """Convert a value to a file: a file, a system, a name of the catalogue, a path, or equations as text.
+    """Convert a value to a file: a file, a system, a catalogue name, a path, or equations as `System` takes them.
 
     Raises InputError for anything else.
     """
@@ -109,7 +115,11 @@ def as_file(value: Any) -> SystemFile:
         value = value.hamiltonian
     if isinstance(value, CubicHamiltonian):
         return SystemFile.from_hamiltonian(value)
-    if isinstance(value, str) and "=" in value:
+    if (isinstance(value, str) and "=" in value) or isinstance(value, Mapping):
+        return System(value)
+    if isinstance(value, list | tuple):
+        if not any("=" in str(equation) or hasattr(equation, "lhs") for equation in value):
+            raise InputError("found a list, expected one system: for several type [f(system) for system in systems]")
         return System(value)
     if isinstance(value, str | Path):
         return load(value)

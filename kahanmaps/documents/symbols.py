@@ -15,6 +15,11 @@ from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
+def split_names(names: Sequence[str]) -> Sequence[str]:
+    """Return names given as a sequence, or as one text "a, b"."""
+    return names.replace(",", " ").split() if isinstance(names, str) else names
+
+
 def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> MapFamily:
     """Return the map of a file with the given parameters as symbols, and the other parameters at their values.
 

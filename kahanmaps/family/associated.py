@@ -18,7 +18,7 @@ from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.algebra.printing import format_polynomial, format_univariate
 from kahanmaps.algebra.roots import MAX_DEGREE, Root
-from kahanmaps.display_protocols import HtmlDisplay
+from kahanmaps.display_protocols import HtmlDisplay, ResultPart
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.cubics import chain
 from kahanmaps.family.skew_hamiltonian import Factor, chi, evaluate_at_matrix, factors_of_chi, require_skew_hamiltonian
@@ -27,7 +27,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 @dataclass(frozen=True, eq=False)
-class AssociatedSystem(HtmlDisplay):
+class AssociatedSystem(HtmlDisplay, ResultPart):
     """An associated system f_s = B^T f_0: the signs, B with its coefficients as a polynomial in A, and the cubic K."""
 
     signs: tuple[int, ...]
@@ -44,6 +44,11 @@ class AssociatedSystem(HtmlDisplay):
     def system(self) -> QuadraticSystem:
         """The quadratic system x' = J grad K(x)."""
         return self.hamiltonian.system
+
+    @property
+    def text(self) -> str:
+        """The signs and the dimension, in a phrase."""
+        return f"signs {self.label}, dimension {self.B.nrows()}"
 
     @property
     def label(self) -> str:
@@ -88,7 +93,7 @@ class ConjugateAssociate:
 
 
 @dataclass(frozen=True, eq=False)
-class FamilyMember(HtmlDisplay):
+class FamilyMember(HtmlDisplay, ResultPart):
     """A member of the family: a skew-Hamiltonian A, a cubic H with A Hess(H) = Hess(H) A^T, and signs.
 
     The signs choose an associated system (all positive: f_0 itself). Raises HypothesisError if A is not
@@ -202,6 +207,17 @@ class FamilyMember(HtmlDisplay):
                 associate = self.associate((*signs[:k], 1, *signs[k:]))
                 coefficients = tuple(a - b for a, b in zip(associate.coefficients, flipped, strict=True))
                 yield ConjugateAssociate(root, associate.signs, coefficients, self.chain)
+
+    @property
+    def text(self) -> str:
+        """The factors of chi and the signs, in a phrase."""
+        factors = "".join(f"({factor})" for factor in self.factors)
+        return f"m = {self.m}, roots of {factors}, signs {self.chosen.label}"
+
+    @property
+    def system(self) -> QuadraticSystem:
+        """The system of `chosen`."""
+        return self.chosen.system
 
     @cached_property
     def chosen(self) -> AssociatedSystem:

@@ -28,7 +28,7 @@ from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.printing import format_number, format_polynomial
-from kahanmaps.display_protocols import HtmlDisplay
+from kahanmaps.display_protocols import HtmlDisplay, ResultPart
 from kahanmaps.errors import HypothesisError, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import third_derivatives
@@ -77,7 +77,7 @@ class PlanarPart:
 
 
 @dataclass(frozen=True, eq=False)
-class NormalForm(HtmlDisplay):
+class NormalForm(HtmlDisplay, ResultPart):
     """The normal form of x' = J grad H(x): a planar system over K = Q[t]/chi with x = S z and H(x) = l(h(X, Y)).
 
     It is constructed by `normal_form`, and verified exactly at construction.
@@ -100,6 +100,11 @@ class NormalForm(HtmlDisplay):
 
     def __post_init__(self) -> None:
         self.verify()
+
+    @property
+    def text(self) -> str:
+        """chi and h."""
+        return f"chi = {self.chi_text}, h = {self.h_text}"
 
     @property
     def dim(self) -> int:

@@ -46,6 +46,10 @@ class Analysis(AnalysisResult, PrintableResult):
     analyses: tuple[AnalysisStep, ...] = ANALYSES
     interrupted: bool = False
 
+    def __repr__(self) -> str:
+        final = self.conclusion
+        return f"<Analysis: {self.file.name}, {final.kind}{f' ({final.ground})' if final.ground else ''}>"
+
     def __getstate__(self) -> dict[str, Any]:
         """The state for `pickle`, which cannot store the functions of the table; the default of the class is used."""
         return {name: value for name, value in vars(self).items() if value is not ANALYSES}
@@ -65,6 +69,11 @@ class Analysis(AnalysisResult, PrintableResult):
     def conclusion(self) -> Conclusion:
         """The verdict on integrability, the number of integrals and the growth."""
         return conclude(self)
+
+    @property
+    def integrable(self) -> bool | None:
+        """True, False or None (undecided), as the verdict says; `conclusion.ground` is how that is known."""
+        return {"not integrable": False, "singular": None, "undecided": None}.get(self.conclusion.kind, True)
 
     @property
     def sections(self) -> list[tuple[str, list[Statement]]]:
@@ -133,6 +142,7 @@ def analyze(
     symbols: Sequence[str] = (),
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
     effort: int = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
@@ -147,7 +157,7 @@ def analyze(
             an algebraic parameter, steps that do not apply over a number field are named in `skipped`.
         symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
         eps: an exact number, to analyse the map at that eps only; None for every eps. eps is half the time step.
-        time_step: 2 eps, in its place.
+        time_step, h: the time step 2 eps, in its place.
         effort: an integer; each increase by 1 doubles the work that searches may take.
         seed: the random seed.
         progress: called with a message whenever the analysis turns to something else.
@@ -169,7 +179,7 @@ def analyze(
     >>> analysis.conclusion.kind, analysis.conclusion.integrals, analysis.conclusion.growth
     ('integrable', 1, 'quadratic')
     """
-    file, eps = as_file(system), resolve_eps(eps, time_step)
+    file, eps = as_file(system), resolve_eps(eps, time_step, h)
     laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses wrong arguments before any work
     units = units_at(effort, _UNITS.get(file.dim, _MAX_UNITS))
     analysis = Analysis(file, laboratory.eps, effort, seed, laboratory.free_symbols, analyses=tuple(analyses))

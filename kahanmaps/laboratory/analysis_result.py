@@ -9,6 +9,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.family.tensor import TensorStructure
@@ -29,7 +30,7 @@ from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch
 
 
 @dataclass(frozen=True)
-class Statement:
+class Statement(ResultPart):
     """One line of a report, and how it is known."""
 
     status: Certainty

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.claims import Certainty
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.invariants.growth import Growth
@@ -25,7 +26,7 @@ _CURVES = {None: "curves", 0: "rational curves", 1: "elliptic curves, of genus 1
 
 
 @dataclass(frozen=True)
-class Conclusion:
+class Conclusion(ResultPart):
     """The verdict on a map; `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere
     defined) or "undecided".
 

@@ -92,6 +92,7 @@ def cycle_census(
     prime: int = 0,
     *,
     time_step: Any = None,
+    h: Any = None,
     samples: int | None = None,
     steps: int = DEFAULT_STEPS,
     seed: int = 0,
@@ -111,7 +112,7 @@ def cycle_census(
     >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
     (993, 3, 613, 377, 21)
     """
-    exact_eps, map_, prime = rational(resolve_eps(eps, time_step)), as_map(system), integer(prime, "prime")
+    exact_eps, map_, prime = rational(resolve_eps(eps, time_step, h)), as_map(system), integer(prime, "prime")
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES}, and at least 1")
     space = _ProjectiveMap(map_, exact_eps, prime)

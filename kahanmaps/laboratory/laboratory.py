@@ -43,7 +43,7 @@ from kahanmaps.checks.certify import MAX_DIMENSION, try_expand
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.symbols import map_with_symbols
+from kahanmaps.documents.symbols import map_with_symbols, split_names
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.invariants.phase_functions import density_condition, integral_condition, jacobian_determinant_sides
@@ -109,6 +109,7 @@ class Laboratory:
         algebraic: bool = False,
     ) -> None:
         self.file = file
+        symbols = split_names(symbols)
         self.symbols = self.free_symbols = tuple(name for name in dict.fromkeys(symbols) if name != "eps")
         self.root: Root | None = None
         self.eps = None if eps is None else rational(eps)

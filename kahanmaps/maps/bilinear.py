@@ -41,6 +41,10 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
     names, n = tuple(variables), len(variables)
     if len(equations) != n:
         raise InputError(f"found {len(equations)} equations for {n} variables, expected as many")
+    if not all(isinstance(equation, fmpq_mpoly) for equation in equations):
+        raise InputError(
+            f"found {equations!r}, expected polynomials: parse_polynomial('X - x - 2*eps*x*X', ['x', 'X', 'eps'])"
+        )
     context = ring((*names, *names_of(equations[0])[2 * n :]))
     rows = []
     for equation in equations:

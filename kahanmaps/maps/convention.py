@@ -21,13 +21,23 @@ NO_TIME_STEP = "eps enters the map as its file defines it; there is no time step
 NO_EPS = "the map does not depend on eps"
 
 
-def resolve_eps(eps: Any, time_step: Any) -> Any:
-    """Return eps, given as itself or by the time step 2 eps; None where neither is given."""
-    if time_step is None:
-        return eps
-    if eps is not None:
-        raise InputError("found eps and time_step, expected one of them: the time step is 2 eps")
-    return rational(time_step) / 2
+def either(hint: str = "", **given: Any) -> Any:
+    """Return the argument that is given under one of several names, None where none is. Raises InputError for two."""
+    named = {name: value for name, value in given.items() if value is not None}
+    if len(named) > 1:
+        raise InputError(f"found {' and '.join(named)}, expected one of them{hint}")
+    return next(iter(named.values()), None)
+
+
+def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False) -> Any:
+    """Return eps, given as itself or by the time step 2 eps, of which h is short; None where none is given.
+
+    With `floats`, for floating-point orbits, a float stands for the decimal number that Python prints: 0.1 for 1/10.
+    """
+    number = either(": the time step is h = 2 eps", eps=eps, time_step=time_step, h=h)
+    if floats and isinstance(number, float):
+        number = rational(repr(float(number)))
+    return number if eps is not None or number is None else rational(number) / 2
 
 
 def _time_steps(maps: tuple[MapFamily, ...]) -> list[int]:

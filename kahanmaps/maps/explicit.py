@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from flint import fmpq_mpoly
 
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import ImplicitMap
@@ -17,13 +18,15 @@ TITLE = "explicit map"
 
 
 def explicit_map(
-    variables: Sequence[str], image: Sequence[RationalFunction], inverse: Sequence[RationalFunction] | None = None
+    variables: Sequence[str],
+    image: Sequence[RationalFunction | str],
+    inverse: Sequence[RationalFunction | str] | None = None,
 ) -> ImplicitMap:
     """The map x -> (P_1/Q_1, ..., P_n/Q_n).
 
     Args:
         variables: the names of the n coordinates.
-        image: n rational functions of the variables, then symbols, if there are any, and eps.
+        image: n rational functions of the variables, then symbols, if there are any, and eps; or texts.
         inverse: the same for the inverse map, where it is known. That it is the inverse is not tested here.
 
     Returns:
@@ -41,11 +44,12 @@ def explicit_map(
     for functions in (image, inverse or image):
         if len(functions) != len(names):
             raise InputError(f"found {len(functions)} functions for {len(names)} variables, expected as many")
-    return ImplicitMap(names, _rows(image), TITLE, backward=None if inverse is None else _rows(inverse))
+    return ImplicitMap(names, _rows(names, image), TITLE, backward=None if inverse is None else _rows(names, inverse))
 
 
-def _rows(functions: Sequence[RationalFunction]) -> tuple[tuple[fmpq_mpoly, ...], ...]:
-    n = len(functions)
+def _rows(names: tuple[str, ...], given: Sequence[RationalFunction | str]) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+    n = len(given)
+    functions = [parse_rational_function(f, (*names, "eps")) if isinstance(f, str) else f for f in given]
     return tuple(
         (*(f.denominator if i == j else f.denominator * 0 for j in range(n)), -f.numerator)
         for i, f in enumerate(functions)

@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, reduce
+from importlib import import_module
 from operator import mul
 from typing import Any
 
@@ -40,10 +41,11 @@ from kahanmaps.maps.equation import Equation, equation_of
 from kahanmaps.maps.inverse import Rows, inverse_rows, why_not_birational
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.integer_steps import IntegerSteps
+from kahanmaps.maps.values import coordinates, is_float_array, point_of
 from kahanmaps.systems.polynomial import PolynomialField
 
 
-class Map:
+class Map(LatexDisplay):
     """A composition of birational maps over a field at a fixed eps; `eps` is None if the maps have different ones."""
 
     field: Field
@@ -101,23 +103,34 @@ class Map:
 
     def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
         """Convert values to a point over the field. Raises InputError for a wrong length or inexact numbers."""
-        if isinstance(values, str):
-            raise InputError(f"found the text {values[:60]!r}, expected a sequence: parse_point reads points from text")
-        if not hasattr(values, "__len__"):
-            raise InputError(f"found {values!r}, expected a sequence of {self.dim} exact numbers")
-        if len(values) != self.dim:
-            named = f": {', '.join(self.variables)}" if self.variables else ""
-            raise InputError(f"found a point with {len(values)} coordinates, expected {self.dim}{named}")
-        return tuple(self.field.convert(value) for value in values)
+        return coordinates(values, self.field, self.variables, self.dim)
 
     def __call__(self, *point: Any) -> Any:
-        """Return the image of a point, given as phi((1, 2)) or phi(1, 2).
+        """Return the image of a point, given as phi((1, 2)), phi(1, 2) or phi({"x": 1, "y": 2}).
 
-        Calling without arguments returns the map itself, so `phi.inverse()` works.
+        An array of floats, of shape (dim,) or (points, dim), has an array of floats as image, with NaN where the map is
+        not defined. Calling without arguments returns the map itself, so `phi.inverse()` works.
         """
         if not point:
             return self
-        return self.step(point[0] if len(point) == 1 and hasattr(point[0], "__len__") else point)
+        x = point_of(point, self.variables)
+        if is_float_array(x):
+            return import_module("kahanmaps.maps.floats.steps").images_of(self, x)
+        return self.step(x)
+
+    def orbit(self, x0: Any, steps: int, **options: Any) -> Any:
+        """Return the orbit of a point under this map, as `km.orbit(phi, x0, steps=steps)` does."""
+        return import_module("kahanmaps.maps.orbits.orbit").orbit(self, x0, steps=steps, **options)
+
+    @property
+    def time_step(self) -> Any:
+        """The time step of the flow that the map approximates, None if there is none."""
+        return None if self.flow is None else self.flow[1]
+
+    @property
+    def h(self) -> Any:
+        """Short for `time_step`."""
+        return self.time_step
 
     def __matmul__(self, other: Map) -> Map:
         """Return the composition: first `other`, then this map. Raises InputError for another dimension or field."""

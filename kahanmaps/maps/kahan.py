@@ -13,7 +13,7 @@ As all maps (implicit.py) it is an equation M(x) x~ = r(x), with M = I - eps f' 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -24,13 +24,12 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.display_protocols import LatexDisplay
-from kahanmaps.errors import InputError
-from kahanmaps.maps.convention import time_step
+from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.convention import time_step as time_step_at
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import ElementaryMap, MapFamily, nonzero_eps
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
-from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
+from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver, as_system
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import AssociatedSystem, FamilyMember
@@ -45,11 +44,12 @@ class HasMap(Protocol):
 
 # The arguments of `as_map`.
 SystemLike: TypeAlias = (
-    "str | Path | HasMap | QuadraticSystem | MapFamily | CubicHamiltonian | FamilyMember | AssociatedSystem"
+    "str | Path | Mapping[Any, Any] | Sequence[Any] | HasMap | QuadraticSystem | MapFamily | CubicHamiltonian "
+    "| FamilyMember | AssociatedSystem"
 )
 
 
-class KahanMap(LatexDisplay, ElementaryMap):
+class KahanMap(ElementaryMap):
     """The Kahan map Phi(., eps) of a quadratic system over a field (by default the rationals).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
@@ -69,27 +69,30 @@ class KahanMap(LatexDisplay, ElementaryMap):
 
     def __init__(
         self,
-        system: QuadraticSystem | SystemOver,
-        eps: Any,
+        system: SystemLike | SystemOver,
+        eps: Any = None,
         field: Field = QQ,
         values: Sequence[Any] = (),
         inside: Any = None,
+        *,
+        time_step: Any = None,
+        h: Any = None,
     ) -> None:
         """For an inverse map, `inside` is the value of eps in the coefficients, since the step is -eps."""
+        if eps is None:
+            eps = resolve_eps(eps, time_step, h)
+        if not isinstance(system, QuadraticSystem | SystemOver):
+            system = as_system(system)
         if isinstance(system, SystemOver):
             self.local, self.eps = system, eps
             self._given: tuple[Any, ...] = (system,)
-        elif isinstance(system, QuadraticSystem):
+        else:
             self.system, self.values, self.variables = system, tuple(values), system.variables
             self.eps = nonzero_eps(eps, field)
             self._inside = self.eps if inside is None else inside
             remaining = iter(self.values)
             self.local = system.over(field, [self._inside if x == "eps" else next(remaining) for x in system.symbols])
             self._given = (system, field, self.values, self._inside)
-        else:
-            raise InputError(
-                f"found a {type(system).__name__}, expected a quadratic system: km.load(...).system is one"
-            )
         self.field, self.dim = self.local.field, self.local.dim
 
     def denominator_name(self, backward: bool) -> str:
@@ -152,7 +155,7 @@ class KahanMap(LatexDisplay, ElementaryMap):
             return None
         symbols = self._inside if "eps" in self.system.symbols else None, *self.values
         with self.field.working():
-            return (str(self.system), symbols), time_step(self.eps)
+            return (str(self.system), symbols), time_step_at(self.eps)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return KahanMap, (self._given[0], self.eps, *self._given[1:])
@@ -222,7 +225,8 @@ class KahanFamily(MapFamily):
 def as_map(value: SystemLike) -> MapFamily:
     """Convert a value to a map; a system stands for its Kahan map.
 
-    The value is a map, a system, a system file, a member of the family, a catalogue name, a path, or equations as text.
+    The value is a map, a system, a system file, a member of the family, a catalogue name, a path, or equations: text, a
+    dictionary {variable: expression}, or a list of equations of SymPy.
     Raises InputError for anything else.
     """
     if isinstance(value, QuadraticSystem):

@@ -113,6 +113,7 @@ def verify(
     m: int | None = None,
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
 ) -> Report:
     """Verify all claims of the paper, for a member of the family or for the generic member.
 
@@ -124,7 +125,7 @@ def verify(
             random over GF(p), and the error bound of a claim is on the probability that it is false for the generic
             member. A claim that could also be proved in normal form is `proved`, for every member with distinct roots.
         eps: an exact number, in the place of that of the settings; none for the member in general.
-        time_step: 2 eps, in its place.
+        time_step, h: the time step 2 eps, in its place.
 
     Returns:
         A Report with one Finding a claim, in the order of the paper. Exact but for the claims whose verdict is
@@ -141,7 +142,7 @@ def verify(
     >>> report.findings[1].also[0].data["error_bound"]
     '2^-145'
     """
-    settings, options = Settings.of(settings, eps, time_step), options or VerifyOptions()
+    settings, options = Settings.of(settings, eps, time_step, h), options or VerifyOptions()
     if (system is None) == (m is None):
         raise InputError("expected a member of the family, or m: half the dimension of the one in general")
     if system is None:

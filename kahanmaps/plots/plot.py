@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
+from kahanmaps.family.system_normal_form import NoNormalForm
+from kahanmaps.hints import AttributeHints
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
-from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.laboratory.scan.result import Scan
+from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.floats.float_conversion import start_rows
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.orbit import Trajectory
@@ -25,11 +29,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-class Plot:
-    """The pictures; `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other results."""
+class Plot(AttributeHints):
+    """The pictures, as axes; `ax.figure.savefig("degrees.pdf")` writes one. Raises InputError for other results.
+
+    `km.plot(value)` draws a result, an orbit, or the portrait of a system.
+    """
 
     def __reduce__(self) -> str:
         return "plot"  # there is one, `km.plot`
+
+    def __call__(self, value: Any, *arguments: Any, **options: Any) -> Axes:
+        """Draw a result of `km.degrees`, `km.heights` or `km.scan`, an orbit, or else the portrait of a system."""
+        kinds: dict[type, Any] = {
+            DegreeGrowth: self.degrees,
+            HeightSurvey: self.heights,
+            Scan: self.scan,
+            Trajectory: self.orbit,
+        }
+        axes: Axes = kinds.get(type(value), self.portrait)(value, *arguments, **options)
+        return axes
 
     def degrees(self, growth: DegreeGrowth, *, label: str = "degrees", scale: str | None = None) -> Axes:
         """Plot the result of `km.degrees`; `scale` is "linear", "log" or "loglog"."""
@@ -45,6 +63,82 @@ class Plot:
 
         _require(survey, HeightSurvey, "a result: km.plot.heights(km.heights(...))")
         axes: Axes = plot_heights(survey, scale=scale).axes[0]
+        return axes
+
+    def scan(self, result: Scan) -> Axes:
+        """Plot the result of `km.scan` in the plane of two parameters."""
+        from kahanmaps.plots.scan import plot_scan
+
+        _require(result, Scan, "a result: km.plot.scan(km.scan(...))")
+        axes: Axes = plot_scan(result, Style()).axes[0]
+        return axes
+
+    def drift(
+        self,
+        system: SystemLike,
+        start: Any = None,
+        eps: Any = None,
+        steps: int | None = None,
+        *,
+        x0: Any = None,
+        time_step: Any = None,
+        h: Any = None,
+        n: int | None = None,
+        methods: Sequence[str] = ("generic", "rk4", "midpoint"),
+    ) -> Axes:
+        """Plot the errors of the known integrals along float orbits of several methods, as `plot drift` draws them.
+
+        Args:
+            system: a quadratic system.
+            start, x0: the initial point, by default a small one; floats are taken exactly.
+            eps: half the time step; `time_step` or `h` is the time step.
+            steps, n: the number of steps, by default 10,000.
+            methods: "generic" (Kahan's), "rk4", "midpoint".
+        """
+        from kahanmaps.maps.floats.float_conversion import exact
+        from kahanmaps.plots.drifts.drift import plot_drift, small_start, survey_drift
+        from kahanmaps.plots.drifts.drift_functions import known_functions
+
+        file, value = as_file(system).real_approximation, resolve_eps(eps, time_step, h, floats=True)
+        if value is None:
+            raise InputError("found no eps, expected eps= or h=, e.g. h=0.1")
+        value, point, count = rational(value), either(start=start, x0=x0), either(steps=steps, n=n)
+        if point is None:
+            point = small_start(file.system, value)
+        point = [exact(float(x)) if isinstance(x, float) else x for x in point]
+        functions = known_functions(file, value)
+        if not functions:
+            raise InputError(f"found no known integral of {file.name}: km.find_integrals(system) searches for some")
+        survey = survey_drift(file.system, value, point, 10_000 if count is None else count, functions, methods)
+        axes: Axes = plot_drift(survey).axes[0]
+        return axes
+
+    def commute(self, system: SystemLike, other: SystemLike | None = None, *, x0: Any, eps: Any, n: int = 1) -> Axes:
+        """Draw the square x, Phi_f x, Phi_g x with its fourth corners, of two systems or of a member of the family."""
+        from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, plot_squares, squares
+
+        file = as_file(system)
+        pairs = [pair_of_systems(file, as_file(other), eps)] if other is not None else list(pairs_of_member(file))
+        axes: Axes = plot_squares([squares(pair, x0, eps, n) for pair in pairs], Style()).axes[0]
+        return axes
+
+    def invariant_curves(self, system: SystemLike, *, x0: Any, eps: Any, n: int = 1000) -> Axes:
+        """Draw the invariant curves of a member of the family, plane by plane, through one initial point or several."""
+        from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
+        from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
+
+        starts = x0 if hasattr(x0[0], "__len__") and not isinstance(x0[0], str) else [x0]
+        axes: Axes = plot_invariant_curves(find_invariant_curves(as_file(system), starts, eps, n), Style()).axes[0]
+        return axes
+
+    def rotation(self, system: SystemLike, first: Any, last: Any, *, eps: Any, points: int = 200) -> Axes:
+        """Plot the rotation numbers of a system with a normal form along the segment between two initial points."""
+        from kahanmaps.plots.rotation import plot_rotation
+
+        normal_form = as_file(system).normal_form
+        if isinstance(normal_form, NoNormalForm):
+            raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
+        axes: Axes = plot_rotation(normal_form, rational(eps), first, last, Style(), points=points).axes[0]
         return axes
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
@@ -69,22 +163,26 @@ def plot_orbits(
     system: SystemLike,
     starts: Any = None,
     eps: Any = None,
-    steps: int = 1000,
+    steps: int | None = None,
     *,
+    x0: Any = None,
     time_step: Any = None,
+    h: Any = None,
+    n: int | None = None,
     axes: Sequence[int] = (0, 1),
 ) -> Axes:
     """The float orbits of a map as a portrait in two coordinates: `plot portrait` has all that may be drawn beside.
 
     Args:
         system: the map.
-        starts: one start or many; by default those that `plot portrait` takes, around the fixed points of the field.
+        starts, x0: one initial point or many; by default those that `plot portrait` takes, around fixed points.
         eps: an exact number, half the time step where there is one.
-        steps: of each orbit.
+        steps, n: of each orbit, by default 1000.
         axes: the numbers of the two coordinates.
     """
+    starts, steps = either(starts=starts, x0=x0), 1000 if (steps := either(steps=steps, n=n)) is None else steps
     real_approximation = as_file(system).real_approximation
-    value = real_approximation.at(resolve_eps(eps, time_step)).eps
+    value = real_approximation.at(resolve_eps(eps, time_step, h, floats=True)).eps
     if starts is None:
         starts = automatic_starts(real_approximation.system, value, axes)
     x = start_rows(starts)

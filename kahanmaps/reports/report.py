@@ -20,7 +20,8 @@ from kahanmaps.display.latex import formula, latex_polynomial, latex_rational_fu
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.family.system_normal_form import SystemNormalForm
-from kahanmaps.laboratory.analysis import Analysis
+from kahanmaps.laboratory.analysis import Analysis, analyze
+from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.plots.growth import plot_degrees, plot_heights
 from kahanmaps.reports.explore import explore_sections
 from kahanmaps.reports.page import CHARACTERS, Html, Section, page, page_template, system_section, text, wide
@@ -109,6 +110,39 @@ def report_html(
         sections.append(Section("pictures", "Pictures", paragraphs=[drawn.note]))
     title = (title or "").strip() or default_title
     return page(title, lead, sections, command=command, seed=seed, file=file, script=script)
+
+
+def report(
+    system: SystemLike | Analysis | Report | Sequence[Report],
+    path: str | Path | None = None,
+    *,
+    eps: Any = None,
+    time_step: Any = None,
+    h: Any = None,
+    effort: int = 1,
+    seed: int = 0,
+    title: str | None = None,
+    pictures: bool = True,
+    explore: bool = False,
+) -> str:
+    """Return the HTML page about a system or about results, and write it to `path` if that is given.
+
+    Args:
+        system: a system, which is analyzed with `eps` (or `time_step`, `h`), `effort` and `seed` as by `analyze`, or
+            results as for `report_html`.
+        path: the path of the file, which is replaced atomically.
+        title, pictures, explore: see `report_html`.
+
+    Returns:
+        The page. Raises InputError as `analyze` and `report_html` do.
+    """
+    results: Any = system
+    if not isinstance(results, Analysis | Report | list | tuple):
+        results = analyze(results, eps=eps, time_step=time_step, h=h, effort=effort, seed=seed)
+    html = report_html(results, title=title, pictures=pictures, explore=explore)
+    if path is not None:
+        write_atomically(str(path), html.encode())
+    return html
 
 
 def write_report(path: str | Path, results: Any, **options: Any) -> None:

@@ -1,1 +1,21 @@
-"""Differential equations: quadratic and polynomial vector fields, cubic Hamiltonians."""
+"""Differential equations: quadratic and polynomial vector fields, cubic Hamiltonians.
+
+`km.systems()` is the catalogue, and `km.systems(name)` a system of it, as `kahanmaps systems NAME` shows it.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Any
+
+from kahanmaps.function_calls import CallableModule
+
+
+def command(name: str | None = None, **parameters: Any) -> Any:
+    """Return the catalogue, or the system with this name and these values of its parameters."""
+    catalog = import_module("kahanmaps.documents.catalog")
+    return catalog.catalogue() if name is None else catalog.load(name, **parameters)
+
+
+sys.modules[__name__].__class__ = CallableModule

@@ -139,6 +139,21 @@ def test_progress_goes_to_standard_error_only(kahanmaps, slow_clock):
     assert "step 3 of 3" not in outcome.out
 
 
+@pytest.mark.parametrize("form", ["--arithmetic float", "--integral x1^2", ""])
+def test_parquet_holds_the_table_of_csv_and_its_metadata(kahanmaps, tmp_path, form):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table, csv_table = tmp_path / "o.parquet", tmp_path / "o.csv"
+    for path in (table, csv_table):
+        assert kahanmaps(f"{TOP} --steps 5 {form} -q -o", path).status == 0
+    found = parquet.read_table(table)
+    with csv_table.open() as stream:
+        assert [{key: str(value) for key, value in row.items()} for row in found.to_pylist()] == list(
+            csv.DictReader(stream)
+        )
+    known = json.loads((tmp_path / "o.csv.meta.json").read_text())
+    assert json.loads(found.schema.metadata[b"kahanmaps"]) == known
+
+
 def test_npz_is_refused_on_a_terminal():
     outcome = terminal(*shlex.split(f"{TOP} --steps 5 --format npz"))
     assert (outcome.status, outcome.out) == (2, "")

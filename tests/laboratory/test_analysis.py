@@ -259,7 +259,7 @@ WRONG = [
     (find_densities, FILE, TWICE, "found eps both"),
     (find_densities, FILE, {"effort": 41}, "found the effort 41"),
     (find_densities, FILE, {"max_degree": -1}, "found the largest degree -1"),
-    (find_poisson, FILE, {"degree": -1}, "found the degree -1"),
+    (find_poisson, FILE, {"max_degree": -1}, "found the degree -1"),
     (find_poisson, FILE, {"effort": -21}, "found the effort -21"),
     (find_poisson, FILE, {"eps": 0}, "found eps = 0"),
     (degree_growth, FILE.system, {"eps": 0}, "found eps = 0"),

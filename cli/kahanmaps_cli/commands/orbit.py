@@ -17,7 +17,7 @@ from kahanmaps_cli.screen.progress import Progress, TimeLeft, print_stderr
 from kahanmaps_cli.screen.streams import is_read
 from kahanmaps_cli.signals import interruptible
 
-_FORMATS = ("text", "json", "jsonl", "csv", "npz", "npy")
+_FORMATS = ("text", "json", "jsonl", "csv", "npz", "parquet", "npy")
 _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 
@@ -187,8 +187,8 @@ def _form(options: dict[str, Any], output: str | None) -> str:
             raise click.UsageError(f"found --json and the name {output}: use the suffix .json, or leave out --json")
         form = "json"
     form = form or lib.form_of(output or "")
-    if form == "npz" and output is None and sys.stdout.isatty():
-        raise click.UsageError("npz is a binary format: add -o FILE")
+    if form in ("npz", "parquet") and output is None and sys.stdout.isatty():
+        raise click.UsageError(f"{form} is a binary format: add -o FILE")
     if form == "npy":
         if options["arithmetic"].kind != "float":
             raise click.UsageError(

@@ -17,7 +17,7 @@ def exported() -> dict[str, dict[str, list[str]]]:
     """Folder -> module -> names, all in the order of `kahanmaps.__all__`."""
     result: dict[str, dict[str, list[str]]] = {}
     for name in kahanmaps.__all__:
-        if not name.startswith("__"):
+        if not name.startswith("__") and not isinstance(getattr(kahanmaps, name), ModuleType):
             home = module_of(getattr(kahanmaps, name))
             result.setdefault(home.split(".")[1], {}).setdefault(home, []).append(name)
     return result

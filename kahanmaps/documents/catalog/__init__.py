@@ -25,7 +25,7 @@ from __future__ import annotations
 import difflib
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,6 +37,11 @@ if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
     from kahanmaps.documents.files import SystemFile
+
+
+class UnknownSystem(InputError, KeyError):
+    """No system of the catalogue has this name."""
+
 
 _ENDING = ".toml"
 _LIST_THEM = "'kahanmaps systems' lists the catalogue"
@@ -98,12 +103,51 @@ def titles() -> dict[str, tuple[int, str]]:
     return titles_by_name
 
 
+class Catalogue(Mapping[str, "SystemFile"]):
+    """The named systems and maps: a mapping from names to system files, which are read when they are asked for.
+
+    >>> catalogue = Catalogue()
+    >>> "lorenz" in catalogue, catalogue["lorenz"].dim
+    (True, 3)
+    """
+
+    def __getitem__(self, name: str) -> SystemFile:
+        if name not in self:
+            raise UnknownSystem(str(_unknown(name)))
+        return load(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*names(), *map_names()))
+
+    def __len__(self) -> int:
+        return len(names()) + len(map_names())
+
+    def __contains__(self, name: object) -> bool:
+        return name in (*names(), *map_names())
+
+    def __repr__(self) -> str:
+        return f"<Catalogue: {len(names())} systems and {len(map_names())} maps>"
+
+    def __str__(self) -> str:
+        return "\n".join(f"{name}\t{dim}\t{title}" for name, (dim, title) in titles().items())
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return a row for each system: name, dimension and title."""
+        return [{"name": name, "dim": dim, "title": title} for name, (dim, title) in titles().items()]
+
+
+def catalogue() -> Catalogue:
+    """Return the named systems and maps, by name; `print` lists them with their dimensions and titles."""
+    return Catalogue()
+
+
 def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **values: Any) -> SystemFile:
     """Load a system from the catalogue or from a TOML file.
 
     Args:
-        reference: a name of the catalogue, or a path: a `Path`, or text that ends in .toml, contains a path separator
-            or names an existing file. The catalogue takes precedence; write ./name for a file with the same name.
+        reference: a name of the catalogue (euler-top stands for euler_top), or a path: a `Path`, or text that ends in
+            .toml, contains a path separator or names an existing file. The catalogue takes precedence; write ./name for
+            a file with the same name.
         parameters, values: exact numbers (int, Fraction, text such as "2/3") that replace the default values of the
             parameters.
 
@@ -138,6 +182,9 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
     if not isinstance(reference, Path):
         made = family_member(reference)
         name = reference if made is None else made[0]
+        hyphenated = name.replace("-", "_")
+        if made is None and not os.path.exists(name) and hyphenated in (*names(), *map_names()):
+            name = hyphenated
         if made is not None or name in (*names(), *map_names()):
             return parse_system(text_of(name), name, parameters)
         has_ending = "." in reference and "(" not in reference  # the ending of a file, or a mistyped one

@@ -35,6 +35,7 @@ from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.work import Budget, count
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
@@ -55,7 +56,7 @@ _MAX_NEXT_TERMS = 4000  # in a coordinate of the last iterate, which has about d
 
 
 @dataclass(frozen=True)
-class DynamicalDegreeBounds:
+class DynamicalDegreeBounds(ResultPart):
     """Proved bounds of the dynamical degree of a planar map, for the given eps or for all but finitely many eps.
 
     `lower` and `upper` are decimal numbers, rounded down and up; the dynamical degree is more than `lower`. `lower` is

@@ -20,6 +20,7 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import log
 from typing import Any
 
 from flint import fmpq
@@ -72,6 +73,8 @@ class DegreeGrowth(PrintableResult):
     the dynamical degree of a planar map, the lower one above 1, or None. `proof` is a proof of the growth, or None. The
     degrees of monomial maps are exact, and need no primes.
     """
+
+    _parts = "degrees"
 
     degrees: tuple[int, ...]
     eps: fmpq | None
@@ -279,6 +282,7 @@ def degree_growth(
     eps: Any = None,
     *,
     time_step: Any = None,
+    h: Any = None,
     effort: int | Budget = 1,
     max_terms: int | None = None,
     max_degree: int = ITERATE_DEGREE,
@@ -307,7 +311,7 @@ def degree_growth(
     >>> growth.degrees[:6], str(growth.growth), growth.recurrence.closed_form
     ((1, 3, 9, 19, 33, 51), 'quadratic', '2*n^2 + 1')
     """
-    eps = resolve_eps(eps, time_step)
+    eps = resolve_eps(eps, time_step, h)
     exact = None if eps is None else rational(eps)
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
@@ -326,6 +330,33 @@ def degree_growth(
         if search.measured is not None:  # the bounds of the dynamical degree alone were cut
             return replace(search.measured, message=f"{search.measured.message}; {end}")
         return search.result(Ended.STOPPED, f"{end} at iterate {len(search.degrees)}")
+
+
+def dynamical_degree(
+    system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None, effort: int = 1, seed: int = 0
+) -> GrowthRate | DynamicalDegreeBounds | None:
+    """Return the dynamical degree lim d_n^(1/n) of a map, with the arguments of `degree_growth`.
+
+    It is an algebraic number, or proved bounds, or None if it is undecided; `degree_growth(system).known` says how it
+    is known.
+
+    >>> dynamical_degree("euler_top")
+    <GrowthRate: 1>
+    """
+    growth = degree_growth(system, eps, time_step=time_step, h=h, effort=effort, seed=seed)
+    return growth.dynamical_degree or growth.enclosure
+
+
+def algebraic_entropy(
+    system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None, effort: int = 1, seed: int = 0
+) -> float | None:
+    """Return the logarithm of the dynamical degree of a map, rounded; None where at most bounds are known.
+
+    >>> algebraic_entropy("euler_top")
+    0.0
+    """
+    rate = dynamical_degree(system, eps, time_step=time_step, h=h, effort=effort, seed=seed)
+    return log(float(rate)) if isinstance(rate, GrowthRate) else None
 
 
 @dataclass

@@ -67,6 +67,8 @@ class HeightSurvey(PrintableResult):
     no meaning. `heights.height` defines heights over number fields.
     """
 
+    _parts = "orbits"
+
     orbits: tuple[SurveyedOrbit, ...]
     is_complete: bool
     has_eps: bool = True
@@ -121,6 +123,7 @@ def height_survey(
     eps: Any = None,
     *,
     time_step: Any = None,
+    h: Any = None,
     starts: Sequence[Any] | int = DEFAULT_STARTS,
     steps: int = DEFAULT_STEPS,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
@@ -134,7 +137,7 @@ def height_survey(
     Args:
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step (exact), or None for 1/10 and 3/11.
-        time_step: 2 eps, instead of eps.
+        time_step, h: the time step 2 eps, instead of eps.
         starts: the initial points, or how many random ones; a random one whose orbit meets a singular point is
             replaced by another.
         steps: the length of the orbits.
@@ -156,7 +159,7 @@ def height_survey(
     >>> survey.kind, survey.text
     (<Growth.QUADRATIC: 'quadratic'>, 'bit lengths grow quadratically on all 4 exact orbits tried, at 2 values of eps')
     """
-    eps = resolve_eps(eps, time_step)
+    eps = resolve_eps(eps, time_step, h)
     if isinstance(starts, int) and not 1 <= starts <= _MAX_STARTS:
         raise InputError(f"found {starts} starts, expected 1 to {_MAX_STARTS}")
     if not isinstance(starts, int) and len(starts) == 0:

@@ -20,6 +20,7 @@ from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ct
 
 from kahanmaps.algebra.fields import integer
 from kahanmaps.algebra.printing import attributes, format_univariate, plain
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.invariants.growth import Growth
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
@@ -29,7 +30,7 @@ _MAX_CLASSES = 12  # residue classes in a closed form
 
 
 @dataclass(frozen=True)
-class GrowthRate:
+class GrowthRate(ResultPart):
     """The largest modulus of the characteristic roots if it is itself a root: lim a_n^(1/n) for positive sequences.
 
     `minimal_polynomial` is irreducible over Q, `enclosure` is the text of a ball that provably contains the number, and
@@ -47,6 +48,9 @@ class GrowthRate:
         if self.minimal_polynomial.degree() == 1:
             return str(-self.minimal_polynomial[0])
         return f"{self.digits}, root of {format_univariate(fmpq_poly(self.minimal_polynomial))}"
+
+    def __float__(self) -> float:
+        return float(self.digits)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; coefficients are text, from x^0 up."""
@@ -70,7 +74,7 @@ def polynomial_growth(power: int) -> Growth:
 
 
 @dataclass(frozen=True)
-class Recurrence:
+class Recurrence(ResultPart):
     """The shortest linear recurrence of a_0, a_1, ..., which holds for all `terms` given terms.
 
     `characteristic` is monic with integer coefficients; [c_0, c_1, ..., 1] stands for

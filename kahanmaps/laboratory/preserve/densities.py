@@ -39,7 +39,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing_note, closing_period
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 
@@ -49,7 +49,7 @@ _ONCE = CofactorProduct((1,), 1)
 
 
 @dataclass(frozen=True)
-class FoundDensity:
+class FoundDensity(FoundFunction):
     """A denominator phi(x, eps) of an invariant volume form dx/phi, with its verdict; `product` is phi in factors."""
 
     function: RationalFunction
@@ -82,6 +82,8 @@ class DensitySearch(Search):
     orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
     |dx/phi| is invariant.
     """
+
+    _parts, _noun = "densities", ("density", "densities")
 
     densities: tuple[FoundDensity, ...]
     degree: int
@@ -158,6 +160,7 @@ def find_densities(
     symbols: Sequence[str] = (),
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
     flow: bool = False,
     max_degree: int | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
@@ -173,7 +176,7 @@ def find_densities(
         system: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
-        time_step: the time step 2 eps, instead of eps.
+        time_step, h: the time step 2 eps, instead of eps.
         flow: search for densities of the differential equation instead, div(f/phi) = 0.
         max_degree: the largest degree of phi; by default as the number of unknowns allows, at most 12.
         integrals: the known integrals: if nothing else is found, products of powers of their factors are tried. By
@@ -195,7 +198,7 @@ def find_densities(
     >>> [(phi.text, str(phi.verdict)) for phi in result.densities]
     [('x*y', 'proved')]
     """
-    file, eps = as_file(system), resolve_eps(eps, time_step)
+    file, eps = as_file(system), resolve_eps(eps, time_step, h)
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)

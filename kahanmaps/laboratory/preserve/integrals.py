@@ -22,7 +22,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, degree, ring, substi
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
 from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
-from kahanmaps.display_protocols import latex
+from kahanmaps.display_protocols import ResultPart, latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import normalized
@@ -40,7 +40,7 @@ from kahanmaps.laboratory.preserve.iterates import (
 )
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.results import Search, closing_note, closing_period
+from kahanmaps.laboratory.preserve.results import FoundFunction, Search, closing_note, closing_period
 from kahanmaps.laboratory.preserve.search import (
     AFFINE,
     add_relation_spaces,
@@ -54,12 +54,13 @@ from kahanmaps.maps.kahan import SystemLike
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
+_UNFINISHED = "the search was interrupted before all stages were completed"
 Formula = tuple[RationalFunction, str, str]  # a function, its origin, and its factored form (empty if not known)
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo these and the first prime with probability 1/32
 
 
 @dataclass(frozen=True)
-class FoundIntegral:
+class FoundIntegral(FoundFunction):
     """An integral I(x, eps), a function of (variables, symbols, eps), with the verdict on I(x~) = I(x)."""
 
     name: str
@@ -94,7 +95,7 @@ class FoundIntegral:
 
 
 @dataclass(frozen=True)
-class TimeDependentIntegral:
+class TimeDependentIntegral(ResultPart):
     """A time-dependent integral c^-n I(x), where x is the n-th point of an orbit and I(x~) = c I(x) with a number c.
 
     For a flow the integral is exp(-c t) I(x), with I' = c I.
@@ -138,6 +139,8 @@ class IntegralSearch(Search):
     have the values of the file, if orbits close there.
     """
 
+    _parts, _noun = "all_integrals", ("integral", "integrals")
+
     integrals: tuple[FoundIntegral, ...]
     profile: Profile
     reason: str
@@ -163,15 +166,19 @@ class IntegralSearch(Search):
         return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.formula_count)
 
     @property
+    def all_integrals(self) -> list[FoundIntegral | IntegralInIterates]:
+        """The integrals with a formula, those in iterates last."""
+        return [*self.integrals, *self.in_iterates]
+
+    @property
     def formulas(self) -> list[tuple[str, Certainty]]:
         """Each formula with its verdict, those in iterates last."""
-        all_integrals: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
-        return [(integral.text, integral.verdict) for integral in all_integrals]
+        return [(integral.text, integral.verdict) for integral in self.all_integrals]
 
     @property
     def formula_count(self) -> int:
         """The number of integrals with a formula."""
-        return len(self.integrals) + len(self.in_iterates)
+        return len(self.all_integrals)
 
     @property
     def is_exact(self) -> bool:
@@ -227,8 +234,7 @@ class IntegralSearch(Search):
 
         If eps was given, a comment says that the formulas hold at this eps only.
         """
-        all_integrals: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
-        lines = [f'{integral.name} = "{integral.text}"' for integral in all_integrals]
+        lines = [f'{integral.name} = "{integral.text}"' for integral in self.all_integrals]
         return "\n".join([*self.toml_comments, "[integrals]", *lines, ""]) if lines else ""
 
 
@@ -238,11 +244,13 @@ def find_integrals(
     symbols: Sequence[str] = (),
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
     flow: bool = False,
     max_degree: int | None = None,
     effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[IntegralSearch], None] = lambda _: None,
 ) -> IntegralSearch:
     """Search for independent integrals of a map in closed form, and verify each.
 
@@ -250,12 +258,13 @@ def find_integrals(
         system: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
-        time_step: the time step 2 eps, instead of eps.
+        time_step, h: the time step 2 eps, instead of eps.
         flow: search for rational integrals of the differential equation instead.
         max_degree: the largest degree of relations along orbits; by default as the dimension and the budget allow.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
+        on_result: called with the results so far after each stage, for searches that may be interrupted.
 
     Returns:
         An `IntegralSearch`. Its formulas are exact, and proved or supported as identities; the number of integrals
@@ -271,15 +280,19 @@ def find_integrals(
     >>> [(integral.text, str(integral.verdict)) for integral in result.integrals], result.codimension
     ([('-y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
-    file, eps = as_file(system), resolve_eps(eps, time_step)
+    file, eps = as_file(system), resolve_eps(eps, time_step, h)
     if max_degree is not None and max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
-    return integrals_of(laboratory, max_degree, budget_for("integrals", effort), progress)
+    return integrals_of(laboratory, max_degree, budget_for("integrals", effort), progress, on_result)
 
 
 def integrals_of(
-    laboratory: Laboratory, max_degree: int | None, budget: Budget, progress: Callable[[str], None]
+    laboratory: Laboratory,
+    max_degree: int | None,
+    budget: Budget,
+    progress: Callable[[str], None],
+    on_result: Callable[[IntegralSearch], None] = lambda _: None,
 ) -> IntegralSearch:
     """Run `find_integrals` on the maps of a laboratory."""
     flow, seed = laboratory.flow, laboratory.request[3]
@@ -335,6 +348,7 @@ def integrals_of(
         profile = orbit_profile(
             laboratory.maps, max_degree=max_degree, budget=next(stages), known=known, progress=progress
         )
+        on_result(result(profile, _UNFINISHED))
         stage = next(stages)
         cofactors = laboratory.cofactors()
         # For a vector field the candidates would be too many, and few integrals have other denominators than these.
@@ -353,11 +367,13 @@ def integrals_of(
     collected.offer(formulas)
     if inherited and not laboratory.symbols:
         collected.add_by_theorems(inherited[0])
+    on_result(result(profile, _UNFINISHED))
     stage = next(stages)
     if len(collected.integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
         collected.add_products(cofactors, stage)
     result_so_far, stage = result(profile, ""), next(stages)
+    on_result(replace(result_so_far, reason=_UNFINISHED))
     if not result_so_far.is_complete:
         # This may take longer than all earlier stages, so it comes after their formulas.
         steps_before = len(space_search.steps)

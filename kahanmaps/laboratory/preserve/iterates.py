@@ -30,7 +30,7 @@ from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.display_protocols import latex
+from kahanmaps.display_protocols import LatexDisplay, ResultPart, latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.invariants.phase_functions import normalized, orbit_about
@@ -119,7 +119,7 @@ class RatioOfIterates:
 
 
 @dataclass(frozen=True)
-class IntegralInIterates:
+class IntegralInIterates(LatexDisplay, ResultPart):
     """An integral in the iterates of a point, with the verdict on its conservation."""
 
     name: str
@@ -132,6 +132,10 @@ class IntegralInIterates:
     def text(self) -> str:
         """The formula."""
         return self.ratio.text
+
+    def latex(self) -> str:
+        """Return the formula as LaTeX."""
+        return self.ratio.latex
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -8,13 +8,24 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.display_protocols import LatexDisplay, PrintableResult, ResultPart
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.maps.convention import eps_suffix
 from kahanmaps.maps.implicit import MapFamily
 
 _CLOSES_WITHIN = 64  # points of an orbit, about as many as the search for relations of a low degree uses
+
+
+class FoundFunction(LatexDisplay, ResultPart):
+    """Base class of the functions that searches find: `function` is the formula, which can be called as I(x, eps)."""
+
+    function: RationalFunction
+
+    def __call__(self, *point: Any) -> Any:
+        """Return the value at a point and eps: exact, or rounded where a coordinate is a float; None at a pole."""
+        return self.function(*point)
 
 
 @dataclass(frozen=True)
@@ -31,6 +42,14 @@ class Search(PrintableResult):
     seed: int
     primes: tuple[int, ...]
     flow: bool = field(default=False, kw_only=True)
+
+    def latex(self) -> str:
+        """Return the formulas as LaTeX, one on each line."""
+        return "\n".join(part.latex() for part in self)
+
+    def to_sympy(self) -> list[Any]:
+        """Return the formulas as expressions of SymPy."""
+        return [part.to_sympy() for part in self]
 
     @property
     def of_flow(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.work import Budget, units_at
 from kahanmaps.documents.inline import as_file
-from kahanmaps.documents.symbols import map_with_symbols
+from kahanmaps.documents.symbols import map_with_symbols, split_names
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.invariants.growth import OF_DEGREES, Growth
@@ -96,6 +96,7 @@ def scan(
     *,
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
     terms: int | None = None,
     primes: Sequence[int] | None = None,
     effort: int | Budget = 1,
@@ -110,7 +111,7 @@ def scan(
         system: the family; its claims are ignored.
         over: names of the parameters that vary; the others keep the values of the file. eps may be one of them.
         eps: half the time step (exact), or None for generic eps: conditions that hold for every eps.
-        time_step: 2 eps, instead of eps.
+        time_step, h: the time step 2 eps, instead of eps.
         terms: how many iterates are measured, by default as many as have small degrees, at most 7.
         primes: at least three primes; by default there are some ten thousand members modulo them.
         effort: an integer; each increase by 1 doubles the work. What was not done is reported.
@@ -136,8 +137,8 @@ def scan(
     >>> [component.text for component in scanned.components if component.growth.growth == "quadratic"]
     ['2', '1']
     """
-    file, eps = as_file(system), resolve_eps(eps, time_step)
-    names = tuple(dict.fromkeys(over))
+    file, eps = as_file(system), resolve_eps(eps, time_step, h)
+    names = tuple(dict.fromkeys(split_names(over)))
     if not names:
         raise InputError("found no parameter to scan over, expected at least one")
     if len(names) > MAX_PARAMETERS:

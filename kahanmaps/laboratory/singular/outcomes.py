@@ -26,6 +26,7 @@ from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.following import (
     NO_ORBIT_DATA,
@@ -157,7 +158,7 @@ POINTS_DIFFER = "its multiplicities along two curves modulo different primes dif
 
 
 @dataclass(frozen=True)
-class Hypersurface:
+class Hypersurface(ResultPart):
     """An irreducible hypersurface over Q and its singularity pattern, at one exact eps.
 
     `divides_denominator`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian
@@ -188,6 +189,11 @@ class Hypersurface:
     orbit_data: OrbitData = field(default=NO_ORBIT_DATA, repr=False)
     stage: int | None = None
     generic: str = ""
+
+    @property
+    def text(self) -> str:
+        """The polynomial and what became of it."""
+        return f"{self.polynomial} = 0: {self.status}"
 
     def sentence(self, at: str) -> str:
         """Describe its pattern: where its images lie, when they lower the degree, and whether it is confined.

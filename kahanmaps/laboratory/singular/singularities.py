@@ -97,6 +97,8 @@ class SingularityRun(PrintableResult):
     map: then steps of hypersurfaces are single maps.
     """
 
+    _parts, _noun = "hypersurfaces", ("hypersurface", "hypersurfaces")
+
     eps: fmpq
     denominator: str
     map_degree: int
@@ -170,12 +172,15 @@ def singularities(
     eps: Any = None,
     *,
     time_step: Any = None,
+    h: Any = None,
     steps: int | None = None,
     seed: int = 0,
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SingularityRun:
     """Compute the exceptional hypersurfaces and poles of a Kahan map at one exact eps, and their singularity patterns.
+
+    Without eps two values are tried, and the result at the first of them is returned if their patterns agree.
 
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
@@ -189,7 +194,14 @@ def singularities(
     >>> run.denominator, str(run.verdict)
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
-    map_, exact_eps = as_map(system), rational(resolve_eps(eps, time_step))
+    map_, eps = as_map(system), resolve_eps(eps, time_step, h)
+    if eps is None:
+        options: dict[str, Any] = {"steps": steps, "seed": seed, "effort": effort, "progress": progress}
+        runs = [singularities(map_, value, **options) for value in default_eps(map_, seed)]
+        if len({run.shape for run in runs}) > 1:
+            raise InputError(f"found no eps, expected one: {_DIFFERENT.replace('--eps', 'eps=')}")
+        return runs[0]
+    exact_eps = rational(eps)
     if map_.unsupported_reason:
         raise InputError(map_.unsupported_reason)
     if map_.dim > MAX_DIMENSION:

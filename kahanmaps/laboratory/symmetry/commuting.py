@@ -36,7 +36,7 @@ from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.checks.claims import Certainty, Finding, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
-from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.display_protocols import PrintableResult, ResultPart
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.tensor import GENERATOR, over_algebra
 from kahanmaps.laboratory.defaults import budget_for
@@ -63,7 +63,7 @@ MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
 
 
 @dataclass(frozen=True)
-class CommutingField:
+class CommutingField(ResultPart):
     """A system g that commutes with f, the matrix B if the shape is g = B f, and the finding on it.
 
     `trivial` is "0", "f" or "-f" if g is that, else empty.
@@ -89,12 +89,19 @@ class CommutingField:
 
 
 @dataclass(frozen=True)
-class CommutingFamily:
+class CommutingFamily(ResultPart):
     """A linear family of g that commute: `base` + sum t_i `directions[i]`, for all values of the parameters t."""
 
     base: CommutingField
     directions: tuple[CommutingField, ...]
     finding: Finding
+
+    @property
+    def text(self) -> str:
+        """The base and the directions."""
+        terms = [self.base, *self.directions]
+        texts = [f"{f't{k}*' if k else ''}({', '.join(g.rhs)})" for k, g in enumerate(terms)]
+        return " + ".join(texts)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: base, directions (rhs and B), verdict and evidence."""
@@ -114,6 +121,8 @@ class CommutingSystems(PrintableResult):
     `discarded` counts solutions of the equations that do not commute; `every_g_commutes` is True if f = 0, and then
     nothing is listed; `undecided` has a message on each open question.
     """
+
+    _parts, _noun = "nontrivial", ("commuting system", "commuting systems")
 
     system: QuadraticSystem
     shape: str

@@ -23,7 +23,7 @@ from kahanmaps.algebra.polynomials import coefficients_in, linear_combinations, 
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import SolutionComponent, solve_system
 from kahanmaps.algebra.work import Budget, count
-from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.display_protocols import PrintableResult, ResultPart
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
@@ -38,7 +38,7 @@ MATRICES = "rational matrices"
 
 
 @dataclass(frozen=True)
-class Symmetry:
+class Symmetry(ResultPart):
     """T(x) = S x + r with T Phi T^{-1} = Phi, or Phi^{-1} where it is `reversing`; for every eps."""
 
     variables: tuple[str, ...]
@@ -67,7 +67,7 @@ class Symmetry:
 
 
 @dataclass(frozen=True)
-class Infinitesimal:
+class Infinitesimal(ResultPart):
     """A field S x + s with f'(x)(S x + s) - S f(x) = weight f(x).
 
     Its flow T_t gives T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps): a symmetry where the weight is 0.
@@ -103,6 +103,8 @@ class Symmetries(PrintableResult):
     `generators` generate a group whose linear parts are `order` matrices (None: not known): those of `signed`, or of
     `others` as well where there are no infinitesimal symmetries, so that all are finite in number: see `group_of`.
     """
+
+    _parts, _noun = "generators", ("generator", "generators")
 
     system: QuadraticSystem
     infinitesimal: list[Infinitesimal] = field(default_factory=list)

@@ -22,6 +22,7 @@ from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.work import Budget, count
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols
@@ -41,7 +42,7 @@ Monomials = frozenset[tuple[int, ...]]
 
 
 @dataclass(frozen=True)
-class Equivalence:
+class Equivalence(ResultPart):
     """The change of variables y = P x + q, with eps/c for eps, to a system of the catalogue with these parameters."""
 
     name: str

@@ -9,7 +9,7 @@ rational, and sets of positive dimension, are given by equations. Source: cmoq-2
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,7 @@ from kahanmaps.algebra.small_systems import (
     solve_system,
 )
 from kahanmaps.algebra.work import SPENT, Budget
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import counted
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.kahan import SystemLike
@@ -37,7 +38,7 @@ _KINDS = {1: "line", 2: "plane"}
 
 
 @dataclass(frozen=True)
-class FixedPoints:
+class FixedPoints(ResultPart):
     """A point, or a set of points: `coordinates` in some of the variables, for which `equations` vanish.
 
     `dimension` is that of the set, `count` the number of its points over the complex numbers, None where they are
@@ -105,15 +106,29 @@ class FixedPoints:
 
 
 @dataclass(frozen=True)
-class FixedPointSearch:
+class FixedPointSearch(ResultPart):
     """All fixed points, rational ones first; `undecided` is the reason why some may be missing, or empty."""
 
     found: tuple[FixedPoints, ...]
     undecided: str
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
+        """A line for each point or set of points, and what is undecided."""
         texts = [points.text for points in self.found] or ["no fixed point"] * (not self.undecided)
         return "\n".join([*texts, *([f"undecided: {self.undecided}"] if self.undecided else [])])
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __iter__(self) -> Iterator[FixedPoints]:
+        return iter(self.found)
+
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def __getitem__(self, index: int) -> FixedPoints:
+        return self.found[index]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

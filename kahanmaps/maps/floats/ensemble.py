@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.hints import AttributeHints
+from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
 from kahanmaps.maps.floats.planar_blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.floats.steps import (
@@ -77,7 +78,7 @@ def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
     return starts
 
 
-class FloatEnsemble:
+class FloatEnsemble(AttributeHints):
     """The orbits of many initial points in double precision, advanced together.
 
     Args:
@@ -171,6 +172,10 @@ class FloatEnsemble:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._build_step()
+
+    def __repr__(self) -> str:
+        alive = int((self._batch.status == RUNNING).sum())
+        return f"<FloatEnsemble: {self.n} orbits after {counted(self.step, 'step')}, {alive} completed>"
 
     @property
     def n(self) -> int:
@@ -356,24 +361,37 @@ class WatchedFunction:
 
 def ensemble(
     system: SystemLike,
-    starts: Any,
+    starts: Any = None,
     eps: Any = None,
-    steps: int = 0,
+    steps: int | None = None,
     *,
+    x0: Any = None,
     time_step: Any = None,
-    **options: Any,
+    h: Any = None,
+    n: int | None = None,
+    backward: bool = False,
+    form: NormalForm | None = None,
+    kernel: str | None = None,
+    threads: int | None = None,
+    integrals: Mapping[str, Function] | None = None,
+    sampled: int = SAMPLED,
 ) -> FloatEnsemble:
     """Return the float orbits of many initial points after `steps` steps.
 
-    The arguments are those of `FloatEnsemble`, with `time_step` (2 eps) instead of `eps` if preferred. Raises
-    InputError for a negative number of steps and for invalid arguments.
+    The arguments are those of `FloatEnsemble`; `x0` stands for `starts`, `n` for `steps`, and `time_step` or `h` for
+    2 eps. Raises InputError for a negative number of steps and for invalid arguments.
 
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
     >>> ensemble(top, [[1, 0, 0], [0, "1/2", 0]], "1/10", 100, kernel="numpy").x.tolist()
     [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
+    starts, steps = either(starts=starts, x0=x0), either(steps=steps, n=n)
+    if starts is None:
+        raise InputError("found no initial points, expected x0=, an array of shape (points, dimension)")
     require_steps(steps)
-    result = FloatEnsemble(as_map(system), resolve_eps(eps, time_step), starts, **options)
+    options: dict[str, Any] = {"backward": backward, "form": form, "kernel": kernel, "threads": threads}
+    epsilon = resolve_eps(eps, time_step, h, floats=True)
+    result = FloatEnsemble(as_map(system), epsilon, starts, **options, integrals=integrals, sampled=sampled)
     if steps:
         result.advance(steps)
     return result

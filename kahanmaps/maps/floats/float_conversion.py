@@ -30,13 +30,18 @@ def to_float(value: fmpq) -> float:
     return nearest
 
 
+def double(value: Any) -> float:
+    """Return an exact number rounded to the nearest double, and a float of Python or numpy as it is."""
+    return float(value) if isinstance(value, float | np.floating) else to_float(rational(value))
+
+
 def to_floats(values: Sequence[Any]) -> FloatArray:
-    """Round exact numbers to the nearest doubles.
+    """Round exact numbers to the nearest doubles; floats are left as they are.
 
     >>> to_floats(["1/3", "2"])
     array([0.33333333, 2.        ])
     """
-    return np.array([to_float(rational(value)) for value in values], dtype=np.float64)
+    return np.array([double(value) for value in values], dtype=np.float64)
 
 
 def start_rows(starts: Any) -> FloatArray:
@@ -53,7 +58,7 @@ def start_rows(starts: Any) -> FloatArray:
         rows = starts if all(isinstance(row, list | tuple) for row in starts) else [starts]
     if len({len(row) for row in rows}) != 1:
         raise InputError("found initial points of different lengths, expected the same number of coordinates in each")
-    return np.array([[x if isinstance(x, float) else to_float(rational(x)) for x in row] for row in rows])
+    return np.array([to_floats(row) for row in rows])
 
 
 def exact(value: float) -> fmpq:

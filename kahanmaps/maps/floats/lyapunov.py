@@ -21,10 +21,11 @@ import numpy as np
 
 from kahanmaps.algebra.fields import integer, rational
 from kahanmaps.algebra.printing import all_fields
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import InputError
 from kahanmaps.hard_stop import TimeLimit
 from kahanmaps.maps import convention
-from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, start_rows, to_float
@@ -40,7 +41,7 @@ _MIN_COMPILED_WORK = 10_000  # orbits times steps below which compiling does not
 
 
 @dataclass(frozen=True, eq=False)
-class Lyapunov:
+class Lyapunov(ResultPart):
     """The Lyapunov exponents of an ensemble in floating point, largest first.
 
     `unit` is the time of a step: 2 eps, or 1 for a map without a time step, whose exponents are per step. `exponents`
@@ -65,12 +66,21 @@ class Lyapunov:
         """Return plain data."""
         return all_fields(self)
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
+        """The table of the exponents."""
         lines = [f"orbits\t{self.orbits - self.ended} of {self.orbits}", f"steps\t{self.steps} after {self.transient}"]
         lines.append("# exponent\tper unit of time\tper step\tspread\tchange from half")
         table = zip(self.mean, self.per_step, self.spread, self.change, strict=True)
         lines += ["\t".join([str(k), *(f"{number:.6g}" for number in row)]) for k, row in enumerate(table, 1)]
         return "\n".join(lines)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        exponents = ", ".join(f"{x:.6g}" for x in self.mean)
+        return f"<Lyapunov: {exponents} per unit of time, {self.orbits - self.ended} of {self.orbits} orbits>"
 
     @property
     def mean(self) -> FloatArray:
@@ -107,11 +117,14 @@ def _over_orbits(function: Any, values: FloatArray) -> FloatArray:
 
 def lyapunov_exponents(
     system: SystemLike,
-    starts: Any,
+    starts: Any = None,
     eps: Any = None,
-    steps: int = 0,
+    steps: int | None = None,
     *,
+    x0: Any = None,
     time_step: Any = None,
+    h: Any = None,
+    n: int | None = None,
     transient: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Lyapunov:
@@ -122,9 +135,9 @@ def lyapunov_exponents(
 
     Args:
         system: the map; a quadratic system stands for its Kahan map.
-        starts: the initial points, an array (orbits, dim) of floats, or a single point.
-        eps: an exact number of either sign, half the time step if there is one; `time_step` (2 eps) instead of it.
-        steps: the number of counted steps, at least 2.
+        starts, x0: the initial points, an array (orbits, dim) of floats, or a single point.
+        eps: an exact number of either sign, half the time step if there is one; `time_step` or `h` (2 eps) instead.
+        steps, n: the number of counted steps, at least 2.
         transient: the number of uncounted steps before them.
         progress: called with a message for each portion.
 
@@ -142,11 +155,10 @@ def lyapunov_exponents(
     >>> bool(np.abs(exponents.mean).max() < 1e-12), exponents.ended
     (True, 0)
     """
-    eps, steps, transient = (
-        rational(resolve_eps(eps, time_step)),
-        integer(steps, "steps"),
-        integer(transient, "transient"),
-    )
+    starts, steps = either(starts=starts, x0=x0), integer(either(steps=steps, n=n) or 0, "steps")
+    eps, transient = rational(resolve_eps(eps, time_step, h, floats=True)), integer(transient, "transient")
+    if starts is None:
+        raise InputError("found no initial point, expected x0=[...]")
     size = to_float(eps)
     if size == 0.0:
         raise InputError(

@@ -13,13 +13,14 @@ of the portions.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.maps.floats.planar_blocks import PlanarBlocks
@@ -35,7 +36,7 @@ from kahanmaps.maps.floats.straight_line_program import (
     solve,
     solve_two,
 )
-from kahanmaps.maps.implicit import ElementaryMap
+from kahanmaps.maps.implicit import ElementaryMap, Map
 from kahanmaps.maps.kahan import KahanMap
 
 IntArray = NDArray[np.int64]
@@ -251,6 +252,29 @@ def eliminate(M: FloatArray, n: int, count: int) -> FloatArray:
         M[p, n:last_column] /= M[p, p]
         M[:p, n:last_column] -= M[:p, p, None] * M[p, n:last_column]
     return pivots
+
+
+def images_of(map_: Map, points: FloatArray) -> FloatArray:
+    """Return the images of points (dim,) or (points, dim) under a map over Q; NaN where it is not defined.
+
+    Raises InputError for points of another shape, and for a map over another field.
+    """
+    rows = np.atleast_2d(np.asarray(points, dtype=np.float64))
+    if map_.field is not QQ or rows.ndim != 2 or rows.shape[1] != map_.dim:
+        raise InputError(
+            f"found floating-point numbers of shape {points.shape} for {map_!r}, expected rows of {map_.dim} numbers, "
+            "and a map over QQ"
+        )
+    batch = BatchState.of(np.array(rows.T, order="C"))  # a copy: steps are taken in place
+    advance_by_numpy(_step_of(map_), batch, 0, 1, [])
+    images = batch.z.T.copy()
+    images[batch.status != RUNNING] = np.nan
+    return images.reshape(points.shape)
+
+
+@lru_cache(maxsize=16)
+def _step_of(map_: Map) -> FloatStep:
+    return map_step(map_.factors)
 
 
 class BatchState(NamedTuple):

@@ -22,7 +22,7 @@ from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
@@ -128,13 +128,21 @@ class LevelGeometry(PrintableResult):
         return {"planes": [plane.to_json() for plane in self.planes], "height_constant": self.height_constant}
 
 
-def geometry(system: SystemLike, start: Sequence[Any], eps: Any = None, *, time_step: Any = None) -> LevelGeometry:
+def geometry(
+    system: SystemLike,
+    start: Sequence[Any] | None = None,
+    eps: Any = None,
+    *,
+    x0: Sequence[Any] | None = None,
+    time_step: Any = None,
+    h: Any = None,
+) -> LevelGeometry:
     """Return the geometry of the level set through `start`, of a system that has a normal form.
 
     Args:
         system: a member of the commuting family, or a system that is linearly equivalent to one.
-        start: a point with exact coordinates.
-        eps, time_step: half the time step, or the time step; exact and not 0.
+        start, x0: a point with exact coordinates.
+        eps, time_step, h: half the time step, or the time step; exact and not 0.
 
     Returns:
         A `LevelGeometry`: j-invariants and orders of translations are exact, rotation numbers are balls, heights are
@@ -150,7 +158,9 @@ def geometry(system: SystemLike, start: Sequence[Any], eps: Any = None, *, time_
     >>> plane.delta, plane.order, plane.rotations[0].number.str(8, radius=False)
     (-19683/14048504, None, '0.10396157')
     """
-    form, eps = system_normal_form(system), resolve_eps(eps, time_step)
+    form, eps, start = system_normal_form(system), resolve_eps(eps, time_step, h), either(start=start, x0=x0)
+    if start is None or eps is None:
+        raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
     if isinstance(form, NoNormalForm):
         raise InputError(f"found no normal form ({form.reason}), expected a system that has one")
     return geometry_of(form, eps, start)

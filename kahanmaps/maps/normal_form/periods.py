@@ -29,7 +29,7 @@ from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.maps.convention import resolve_eps
+from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
@@ -301,7 +301,14 @@ def period_of(
 
 
 def period(
-    system: SystemLike, start: Sequence[Any], eps: Any = None, prime: int | None = None, *, time_step: Any = None
+    system: SystemLike,
+    start: Sequence[Any] | None = None,
+    eps: Any = None,
+    prime: int | None = None,
+    *,
+    x0: Sequence[Any] | None = None,
+    time_step: Any = None,
+    h: Any = None,
 ) -> OrbitPeriod:
     """Compute the period of an orbit of the Kahan map of a system that has a normal form: see `period_of`.
 
@@ -311,9 +318,11 @@ def period(
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
     'aperiodic'
     """
-    normal_form, eps = system_normal_form(system), resolve_eps(eps, time_step)
+    normal_form, eps, start = system_normal_form(system), resolve_eps(eps, time_step, h), either(start=start, x0=x0)
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
+    if start is None or eps is None:
+        raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
     return period_of(normal_form, eps, start, None if prime is None else integer(prime, "prime"))
 
 

@@ -18,7 +18,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field, integer
-from kahanmaps.display_protocols import HtmlDisplay, shorten
+from kahanmaps.display_protocols import HtmlDisplay, ResultPart, shorten
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import Map, det_of
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -37,7 +37,7 @@ _DIGITS_PER_BIT = 0.30103
 
 
 @dataclass(frozen=True)
-class OrbitEnd:
+class OrbitEnd(ResultPart):
     """How an orbit ended.
 
     `status` is "completed", "periodic" (completed, and the initial point was reached again), "singular", "budget",
@@ -179,6 +179,10 @@ class Orbit(HtmlDisplay):
         self._interrupted = False
         self._busy_in: int | None = None  # the thread that computes an iterate directly
         self._walk: RationalOrbit | None = None
+
+    def __repr__(self) -> str:
+        state = "no point computed yet" if self.last is None else f"computed to step {self.last.step}"
+        return f"<Orbit: {state if self.end is None else self.end.text}>"
 
     @property
     def relations(self) -> str | None:

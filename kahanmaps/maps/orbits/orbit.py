@@ -7,20 +7,23 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import cached_property
+from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, overload
 
-from flint import arb, fmpq
+from flint import arb, fmpq, fmpq_mat, fmpz_mat
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
 from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.printing import json_float
 from kahanmaps.atomic_files import open_append
-from kahanmaps.display_protocols import data_frame
-from kahanmaps.errors import BadPrime, InputError, KahanmapsError
+from kahanmaps.display_protocols import HtmlDisplay, data_frame
+from kahanmaps.errors import BadPrime, InexactNumber, InputError, KahanmapsError
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
-from kahanmaps.maps.convention import eps_record, resolve_eps
+from kahanmaps.maps.convention import either, eps_record, resolve_eps
+from kahanmaps.maps.convention import time_step as time_step_at
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
@@ -34,6 +37,7 @@ from kahanmaps.maps.orbits.iteration import (
 )
 from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
+from kahanmaps.maps.values import point_by_names
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.version import __version__
 
@@ -50,13 +54,17 @@ _BITS_PER_DIGIT = 3.3219281
 
 def orbit(
     system: SystemLike | Map,
-    start: Any,
+    start: Any = None,
     eps: Any = None,
     steps: int | None = None,
     *,
+    x0: Any = None,
     time_step: Any = None,
+    h: Any = None,
+    n: int | None = None,
     at: Sequence[int] | None = None,
     arithmetic: str | Arithmetic | Field | type[float] = "exact",
+    exact: bool | None = None,
     method: str | None = None,
     backward: bool = False,
     every: int = 1,
@@ -73,13 +81,16 @@ def orbit(
     Args:
         system: the map; a quadratic system stands for its Kahan map. A map at a fixed eps, such as phi @ psi, is
             iterated in its own field.
-        start: the initial point: exact numbers, or text such as "1/2,-1/3"; for float orbits also floats.
-        eps: an exact number, for Kahan maps half the time step; None for a map that does not depend on it.
-        time_step: 2 eps, instead of eps.
-        steps: the number of steps, or
+        start, x0: the initial point: exact numbers, by variable in a dict, or text such as "1/2,-1/3"; for float orbits
+            also floats.
+        eps: an exact number, for Kahan maps half the time step; None for a map that does not depend on it. For float
+            orbits a float stands for the decimal that Python prints.
+        time_step, h: the time step 2 eps, instead of eps.
+        steps, n: the number of steps, or
         at: the requested iterates.
         arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field: QQ, GF(p), RR(bits), CC(bits), a
             number field.
+        exact: True for "exact", False for "float", instead of `arithmetic`.
         method: "generic", "normal-form" or "doubling"; by default chosen automatically.
         backward: step by the inverse map.
         every: deliver only the points whose step is a multiple of this number.
@@ -105,7 +116,17 @@ def orbit(
     >>> [point.text for point in orbit(riccati, ["1/5"], "1/2", steps=3, arithmetic="mod:7")]
     [['3'], ['2'], ['5'], ['4']]
     """
-    eps = resolve_eps(eps, time_step)
+    if exact is not None:
+        if arithmetic != "exact":
+            raise InputError(f"found exact = {exact} and arithmetic = {arithmetic!r}, expected one of them")
+        arithmetic = "exact" if exact else "float"
+    start, steps = either(start=start, x0=x0), either(steps=steps, n=n)
+    is_float = Arithmetic.of(arithmetic).kind == "float"
+    if start is None:
+        raise InputError("found the initial point None, expected x0=[...], a sequence of exact numbers")
+    if not is_float:
+        _require_exact(start, eps, time_step, h)
+    eps = resolve_eps(eps, time_step, h, floats=is_float)
     if (steps is None) == (at is None):
         raise InputError("expected either steps=, the number of steps, or at=, the requested iterates")
     require_steps(steps)
@@ -114,9 +135,14 @@ def orbit(
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
     if isinstance(start, str):
         start = parse_point(start)
+    if isinstance(start, fmpq_mat | fmpz_mat):
+        start = start.entries()
+    if isinstance(start, Mapping):
+        start = point_by_names(start, (system if isinstance(system, Map) else as_map(system)).variables)
     if not hasattr(start, "__len__"):
         raise InputError(f"found the initial point {start!r}, expected a sequence of numbers")
-    if arithmetic.kind == "float":  # floats are accepted, and converted exactly
+    if is_float:  # floats are accepted, and converted exactly
+        start = [float(x) if hasattr(x, "dtype") and x.dtype.kind == "f" else x for x in start]
         for x in start:
             if isinstance(x, float) and not math.isfinite(x):
                 raise InputError(f"found {x} in the initial point, expected finite numbers")
@@ -133,7 +159,7 @@ def orbit(
         return _orbit_at_one_eps(request, field)
     map_ = as_map(system)
     if eps is None and map_.has_eps:
-        raise InputError("found no eps, expected an exact number: the map depends on eps")
+        raise InputError('found no eps, expected an exact number, eps="1/10" or h="1/5": the map depends on eps')
     if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
         if at is not None or method not in (None, "generic"):
             raise InputError(f"orbits over {field} are computed step by step: give steps=, without at= and method=")
@@ -160,6 +186,19 @@ def orbit(
             bits, remark = _FALLBACK_BITS, str(error)
         arithmetic = Arithmetic("ball", bits)
     return Trajectory(request.by(chosen.name, used, arithmetic), request, arithmetic, chosen, remark)
+
+
+def _require_exact(start: Any, *numbers: Any) -> None:
+    """Raise InexactNumber for floats, with both ways out: exact numbers, or an orbit in floating point."""
+    for x in (
+        *(start.values() if isinstance(start, Mapping) else start if hasattr(start, "__len__") else ()),
+        *numbers,
+    ):
+        if isinstance(x, float) or getattr(getattr(x, "dtype", None), "kind", "") == "f":
+            try:
+                rational(x)
+            except InexactNumber as error:
+                raise InexactNumber(f"{error}; or exact=False, for an orbit in floating point") from None
 
 
 class OrbitRequest(NamedTuple):
@@ -197,7 +236,7 @@ class OrbitRequest(NamedTuple):
         return Orbit(over, self.start, self.steps, normal_form=normal, is_requested=is_requested, **limits)
 
 
-class Trajectory:
+class Trajectory(HtmlDisplay):
     """The result of `orbit`: points in the given `arithmetic`, computed by `method`, for the reason `why`.
 
     Iterating over it keeps no points in memory; its length, indexing, tables and arrays compute all points and keep
@@ -245,6 +284,12 @@ class Trajectory:
         """All requested points."""
         return [point for point in self._computed() if self._request.is_requested(point.step)]
 
+    def preview(self, count: int) -> list[OrbitPoint]:
+        """Return the first points, if they are known or cost no more than `count` steps; otherwise none."""
+        if "points" in self.__dict__ or (self._request.at is None and self._request.every == 1):
+            return list(islice(self, count))
+        return []
+
     def __len__(self) -> int:
         return len(self.points)
 
@@ -252,8 +297,58 @@ class Trajectory:
     def __getitem__(self, index: int) -> OrbitPoint: ...
     @overload
     def __getitem__(self, index: slice) -> list[OrbitPoint]: ...
-    def __getitem__(self, index: int | slice) -> OrbitPoint | list[OrbitPoint]:
-        return self.points[index]
+    @overload
+    def __getitem__(self, index: str) -> Any: ...
+    def __getitem__(self, index: int | slice | str) -> Any:
+        """Return a point, a list of points, or by the name of a variable the array of its values."""
+        if not isinstance(index, str):
+            return self.points[index]
+        if index not in self.variables:
+            raise UnknownVariable(f"found the variable {index!r}, expected one of {', '.join(self.variables)}")
+        return self.x[:, self.variables.index(index)]
+
+    @property
+    def x(self) -> Any:
+        """The coordinates as an array of shape (points, dim): floats, ints for residues, otherwise exact objects."""
+        return self.to_numpy(None if self.arithmetic.kind in ("float", "mod") else object)
+
+    @property
+    def t(self) -> Any:
+        """The times of the points as an array, exact for exact orbits; the steps where there is no time step."""
+        import numpy as np
+
+        steps = [-point.step if self._request.backward else point.step for point in self.points]
+        map_, eps = self._request.map, self._request.eps
+        h = map_.time_step if isinstance(map_, Map) else time_step_at(eps, map_)
+        if h is None:
+            return np.array(steps)
+        if self.arithmetic.kind == "float":
+            return np.array(steps) * (int(h.p) / int(h.q))
+        return np.array([step * h for step in steps], dtype=object)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The numbers of points and of coordinates."""
+        return len(self), len(self.variables)
+
+    def to_numpy(self, dtype: Any = None) -> Any:
+        """Return the coordinates as an array of shape (points, dim), as `numpy.asarray(orbit, dtype)` does."""
+        return self.__array__(dtype)
+
+    def to_xarray(self) -> Any:
+        """Return the coordinates, rounded to floats, as an xarray.Dataset along `step`; InputError without xarray."""
+        try:
+            xarray: Any = import_module("xarray")
+        except ImportError as error:
+            raise InputError(f"to_xarray needs xarray ({error}): pip install xarray, or take to_pandas()") from error
+        table, steps = self.to_numpy(), [point.step for point in self.points]
+        times = [float(time) for time in self.t]
+        data = {name: ("step", table[:, k]) for k, name in enumerate(self.variables)}
+        return xarray.Dataset(data, coords={"step": steps, "t": ("step", times)})
+
+    def plot(self, x: int = 0, y: int = 1) -> Any:
+        """Draw two of the coordinates and return the axes."""
+        return import_module("kahanmaps.plots.plot").plot.orbit(self, x, y)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row for each point: its step, the coordinates and the values of the integrals (None at poles).
@@ -284,6 +379,10 @@ class Trajectory:
         """Return `rows()` as a pandas DataFrame. Raises InputError if pandas is not installed."""
         return data_frame(self.rows())
 
+    def save(self, path: str | Path) -> OrbitEnd:
+        """Write the orbit to a file in the format of its suffix, as `write` does."""
+        return self.write(path)
+
     def to_csv(self, path: str | Path) -> None:
         """Write step and exact coordinates of the points to a .csv file, without a metadata file."""
         with open_append(path) as stream:
@@ -300,8 +399,8 @@ class Trajectory:
 
         Args:
             to: a path, a stream of text, or a writer. For csv, a file with the metadata is written next to the path.
-            form: "text", "json", "jsonl", "csv", "npz", or (float orbits without integrals) "npy"; by default the
-                format of the suffix of the path, and text for a stream.
+            form: "text", "json", "jsonl", "csv", "npz", "parquet", or (float orbits without integrals) "npy"; by
+                default the format of the suffix of the path, and text for a stream.
             name: the name of the system.
             on_step: called with the number of every step that was computed.
 
@@ -439,6 +538,10 @@ class Trajectory:
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+class UnknownVariable(InputError, KeyError):
+    """An orbit has no variable of this name."""
 
 
 class NotAccurate(Exception):

@@ -1,7 +1,7 @@
-"""Writers of orbit files, one class for each format: text, json, jsonl, csv and npz.
+"""Writers of orbit files, one class for each format: text, json, jsonl, csv, npz and parquet.
 
 Files of text, jsonl and csv are valid after every record, so that a file remains readable however the orbit ends. npz
-files are written at the end.
+and parquet files are written at the end.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
@@ -194,8 +195,42 @@ class Npz(Writer):
         self.stream.write(archive.getvalue())
 
 
-WRITERS: dict[str, type[Writer]] = {"text": Text, "json": Json, "jsonl": JsonLines, "csv": Csv, "npz": Npz}
+class Parquet(Npz):
+    """A table with the columns of csv, and header and end as JSON text in the metadata; written at the end.
+
+    Floats and residues below 2^63 are numbers, exact numbers and balls text. Needs pyarrow.
+    """
+
+    def header(self, header: dict[str, Any]) -> None:
+        super().header(header)
+        if self._convert is str.encode:
+            self._convert = str
+        try:
+            self._arrow: tuple[Any, Any] = import_module("pyarrow"), import_module("pyarrow.parquet")
+        except ImportError as error:
+            raise InputError(f"parquet needs pyarrow ({error}): pip install pyarrow, or write .csv or .npz") from error
+
+    def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
+        arrow, parquet = self._arrow
+        steps: list[Any] = self._steps if max(self._steps, default=0) < 2**63 else list(map(str, self._steps))
+        rows = [(*x, *values) for x, values in zip(self._x, self._values, strict=True)]
+        names = (*self.variables, *self.integrals)
+        columns = dict(zip(names, zip(*rows, strict=True) if rows else [()] * len(names), strict=True))
+        table = arrow.table({"step": steps, **{name: list(column) for name, column in columns.items()}})
+        record = {**_COMMAND, "header": self._header, "end": {**end.to_json(), **extra}}
+        parquet.write_table(table.replace_schema_metadata({"kahanmaps": json.dumps(record)}), self.stream)
+
+
+WRITERS: dict[str, type[Writer]] = {
+    "text": Text,
+    "json": Json,
+    "jsonl": JsonLines,
+    "csv": Csv,
+    "npz": Npz,
+    "parquet": Parquet,
+}
 FORMATS = (*WRITERS, "npy")
+BINARY = ("npz", "parquet")
 
 
 @contextmanager
@@ -204,19 +239,19 @@ def writer_to(
 ) -> Iterator[Writer]:
     """Open a writer in one of the formats `WRITERS` to a path or a stream of text.
 
-    Raises InputError if the format is npz and the stream has no buffer of bytes.
+    Raises InputError if the format is binary and the stream has no buffer of bytes.
     """
     if not isinstance(to, str | Path):
-        stream = getattr(to, "buffer", None) if form == "npz" else to
+        stream = getattr(to, "buffer", None) if form in BINARY else to
         if stream is None:
-            raise InputError("npz is a binary format: give a path, or a stream with a buffer of bytes")
+            raise InputError(f"{form} is a binary format: give a path, or a stream with a buffer of bytes")
         yield WRITERS[form](stream, variables, integrals)
         return
     if form == "csv" and os.path.isdir(meta_of(to)):  # raised before an existing table is overwritten
         raise InputError(
             f"found a folder {meta_of(to)}, expected no folder of this name: the metadata is written there"
         )
-    with atomic_write(to) if form == "npz" else open_append(to) as stream:
+    with atomic_write(to) if form in BINARY else open_append(to) as stream:
         writer = WRITERS[form](stream, variables, integrals)
         if isinstance(writer, Csv):
             writer.metadata_path = meta_of(to)

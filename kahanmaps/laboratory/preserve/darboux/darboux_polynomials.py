@@ -20,7 +20,7 @@ from kahanmaps.algebra.printing import attributes, format_polynomial, format_rat
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.display_protocols import latex
+from kahanmaps.display_protocols import ResultPart, latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory, certified
@@ -50,7 +50,7 @@ Law = tuple[CofactorProduct, int]  # a product of cofactors and its numerical fa
 
 
 @dataclass(frozen=True)
-class DarbouxPolynomials:
+class DarbouxPolynomials(ResultPart):
     """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
 
     For a flow it is K in P' = K P. The verdict concerns the identity for all P: proved by expansion, or supported at
@@ -61,6 +61,11 @@ class DarbouxPolynomials:
     polynomials: tuple[fmpq_mpoly, ...]
     verdict: Certainty
 
+    @property
+    def text(self) -> str:
+        """The polynomials and their cofactor."""
+        return f"{', '.join(map(format_polynomial, self.polynomials))} with cofactor {self.cofactor}"
+
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         formulas = [latex(P) for P in self.polynomials]
@@ -70,6 +75,8 @@ class DarbouxPolynomials:
 @dataclass(frozen=True)
 class DarbouxSearch(Search):
     """The result of `darboux_polynomials`: spaces by the weight of the cofactor; `reason` if the search ended early."""
+
+    _parts, _noun = "spaces", ("cofactor", "cofactors")
 
     degree: int
     cofactors: tuple[str, ...]
@@ -91,27 +98,28 @@ class DarbouxSearch(Search):
 
 def darboux_polynomials(
     system: SystemLike,
-    degree: int,
+    max_degree: int,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
     flow: bool = False,
     effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DarbouxSearch:
-    """Search for the discrete Darboux polynomials of degree at most `degree` with a cofactor of the usual form.
+    """Search for the discrete Darboux polynomials of degree at most `max_degree` with a cofactor of the usual form.
 
     The cofactors are the products of those in cofactors.py; for maps other than Kahan maps these products times any
     number, which may contain the symbols and eps.
 
     Args:
         system: the system.
-        degree: the largest degree of the polynomials, and of the products of cofactors.
+        max_degree: the largest degree of the polynomials, and of the products of cofactors.
         symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
-        time_step: the time step 2 eps, instead of eps.
+        time_step, h: the time step 2 eps, instead of eps.
         flow: search for Darboux polynomials of the differential equation instead, P' = K P with K other than 0
             (flow_polynomials.py).
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
@@ -133,8 +141,8 @@ def darboux_polynomials(
     C[x] x proved
     C[y] y proved
     """
-    degree = integer(degree, "degree")
-    file, eps = as_file(system), resolve_eps(eps, time_step)
+    degree = integer(max_degree, "max_degree")
+    file, eps = as_file(system), resolve_eps(eps, time_step, h)
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
     budget, cofactors = budget_for("Darboux polynomials", effort), laboratory.cofactors()
     spaces = list[DarbouxPolynomials]()

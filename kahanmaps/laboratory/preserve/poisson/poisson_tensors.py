@@ -30,7 +30,7 @@ from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
-from kahanmaps.display_protocols import latex
+from kahanmaps.display_protocols import LatexDisplay, ResultPart, latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
 from kahanmaps.invariants.phase_functions import at_eps
@@ -67,7 +67,7 @@ Exponents = tuple[int, ...]
 
 
 @dataclass(frozen=True)
-class FoundTensor:
+class FoundTensor(LatexDisplay, ResultPart):
     """A tensor that the map preserves, with the verdicts on that and on the Jacobi identity (`jacobi`).
 
     `rank` is the rank at random points. `casimirs` names the known integrals that are Casimirs and, if there are more
@@ -120,9 +120,8 @@ class FoundTensor:
             parts.append("Liouville integrable")
         return "; ".join(parts)
 
-    @property
     def latex(self) -> str:
-        """The matrix in LaTeX."""
+        """Return the matrix in LaTeX."""
         rows = [" & ".join(latex(entry) for entry in row) for row in self.tensor.rows]
         return "\\begin{pmatrix} " + " \\\\ ".join(rows) + " \\end{pmatrix}"
 
@@ -132,7 +131,7 @@ class FoundTensor:
         return {
             **attributes(self, "name"),
             "brackets": brackets,
-            "latex": self.latex,
+            "latex": self.latex(),
             **attributes(self, "rank", "verdict", "evidence"),
             "jacobi": {"verdict": str(self.jacobi), "evidence": self.jacobi_evidence.to_json()},
             **attributes(self, "casimirs", "in_involution", "involution"),
@@ -147,6 +146,8 @@ class PoissonSearch(Search):
     All tensors up to the degree are combinations of these and of products of polynomial integrals with tensors of lower
     degree. `pencil` is the verdict on all combinations of several tensors being Poisson tensors, None if not tested.
     """
+
+    _parts, _noun = "tensors", ("tensor", "tensors")
 
     tensors: tuple[FoundTensor, ...]
     integrals: tuple[FoundIntegral, ...]
@@ -187,11 +188,12 @@ class PoissonSearch(Search):
 
 def find_poisson(
     system: SystemLike,
-    degree: int | None = None,
+    max_degree: int | None = None,
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
     time_step: Any = None,
+    h: Any = None,
     denominator: RationalFunction | None = None,
     integrals: Sequence[FoundIntegral] | None = None,
     effort: int | Budget = 1,
@@ -202,10 +204,10 @@ def find_poisson(
 
     Args:
         system: the map; a differential equation stands for its Kahan map.
-        degree: the largest degree of the entries, or of their numerators; by default 3 in dimension 3, otherwise 2.
+        max_degree: the largest degree of the entries, or of their numerators; by default 3 in dimension 3, otherwise 2.
         symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
-        time_step: the time step 2 eps, instead of eps.
+        time_step, h: the time step 2 eps, instead of eps.
         denominator: a function of the variables and eps by which the entries are divided. None: no denominator; if
             there is no such tensor, the factors of a density that is a product are tried, if that is little work.
         integrals: the integrals whose brackets are computed; None: they are searched for, if there is a tensor.
@@ -226,8 +228,8 @@ def find_poisson(
     >>> [(P.text, str(P.verdict), P.rank) for P in result.tensors]
     [('{x,y} = x*y', 'proved', 2)]
     """
-    file, eps = as_file(system), resolve_eps(eps, time_step)
-    degree = tensor_degree(file.dim) if degree is None else integer(degree, "degree")
+    file, eps = as_file(system), resolve_eps(eps, time_step, h)
+    degree = tensor_degree(file.dim) if max_degree is None else integer(max_degree, "max_degree")
     if degree < 0:
         raise InputError(f"found the degree {degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed)

@@ -1,0 +1,202 @@
+"""Calls of the public functions: wrong arguments are reported in words, and notebooks show progress.
+
+`public_function` wraps a function of `import kahanmaps`; the signature, annotations and docstring stay those of the
+function, and no argument is changed.
+"""
+
+from __future__ import annotations
+
+import inspect
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import copy_context
+from functools import wraps
+from html import escape
+from importlib import import_module
+from types import FunctionType, ModuleType
+from typing import Any
+
+from kahanmaps.algebra.fields import integer
+from kahanmaps.errors import InputError, suggestion
+from kahanmaps.hard_stop import TimeLimit
+
+_BEFORE_PROGRESS, _BETWEEN_UPDATES = 2.0, 0.5  # seconds
+_ARGUMENT_HINTS = {
+    **dict.fromkeys(("seconds", "timeout"), "with km.time_limit(10): ... is a limit in seconds, effort= one of work"),
+    **dict.fromkeys(("dt", "step_size", "stepsize", "tau"), "h= is the time step, eps= half of it"),
+    **dict.fromkeys(("t_span", "t_max", "t_end", "tmax", "t1", "t_eval"), "n= is the number of steps of length h="),
+    **dict.fromkeys(("params", "args", "parameters"), "km.System(equations, a=2) or km.load(name, a=2)"),
+    **dict.fromkeys(("y0", "initial", "init", "ic"), "x0= is the initial point"),
+    **dict.fromkeys(("degree", "deg", "order"), "max_degree= is the largest degree to be searched"),
+    **dict.fromkeys(("n_steps", "num_steps", "nsteps"), "n= is the number of steps"),
+    **dict.fromkeys(("dtype", "float", "floating", "precision"), 'exact=False, or arithmetic="ball:200"'),
+    **dict.fromkeys(("modulus", "p", "mod"), 'arithmetic="mod:10007"'),
+    **dict.fromkeys(("n_jobs", "jobs", "workers"), "processes= is the number of processes, where there is one"),
+    **dict.fromkeys(("random_state", "rng", "random_seed"), "seed= is the random seed"),
+    **dict.fromkeys(("n", "N", "terms", "iterates"), "max_terms= is the number of iterates"),
+    "to": "language= is the language, for example 'pari'",
+    "seed": "settings=km.Settings(seed=3)",
+    **dict.fromkeys(("verbose", "quiet"), "progress=print shows the progress"),
+}
+
+
+class CallError(InputError, TypeError):
+    """A call with a missing, unknown or superfluous argument; the message gives the arguments of the function."""
+
+
+def public_function(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    """Return a function as it is called by users, under its public name."""
+    signature = inspect.signature(function)
+    kinds = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
+    takes_options = inspect.Parameter.VAR_KEYWORD in (parameter.kind for parameter in signature.parameters.values())
+
+    @wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        try:
+            given = signature.bind(*args, **kwargs).arguments
+        except TypeError as error:
+            raise CallError(_wrong_call(name, signature, kwargs, takes_options, error)) from None
+        for argument, value in given.items():
+            if kinds[argument].startswith("bool"):  # any other value would count as one
+                _require_kind(argument, value, kinds[argument])
+        try:
+            return function(*args, **kwargs) if not _is_interactive() else call_interactively(given, args, kwargs)
+        except TypeError as error:
+            if not isinstance(error, InputError):  # the function did not check it
+                for argument, value in given.items():
+                    _require_kind(argument, value, kinds[argument])
+            raise
+
+    def call_interactively(given: dict[str, Any], args: Sequence[Any], kwargs: dict[str, Any]) -> Any:
+        results: list[Any] = []
+        if "on_result" in kinds and "on_result" not in given:
+            kwargs["on_result"] = results.append
+        with _shown_progress(name) as progress, _interrupt_ends_search() as is_interrupted:
+            if "progress" in kinds and "progress" not in given and kinds["progress"].startswith("Callable[[str]"):
+                kwargs["progress"] = progress
+            try:
+                return function(*args, **kwargs)
+            except TimeLimit:
+                if not is_interrupted():
+                    raise
+                if not results:
+                    raise KeyboardInterrupt from None
+                if hasattr(results[-1], "interrupt"):
+                    results[-1].interrupt()
+                return results[-1]  # what was found until then
+
+    # By this name it is pickled: an attribute of `kahanmaps`.
+    call.__module__, call.__qualname__ = "kahanmaps", name
+    return call
+
+
+class CallableModule(ModuleType):
+    """A subpackage with the name of a command, which can be called like the command: its function `command`."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return public_function(self.command, self.__name__.rpartition(".")[2])(*arguments, **options)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # Importing a submodule sets it as an attribute; a function of the same name keeps the name.
+        if not (isinstance(value, ModuleType) and isinstance(vars(self).get(name), FunctionType)):
+            super().__setattr__(name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return import_module, (self.__name__,)
+
+
+def _wrong_call(
+    name: str, signature: inspect.Signature, kwargs: dict[str, Any], takes_options: bool, error: TypeError
+) -> str:
+    known = [argument for argument in signature.parameters if argument != "options"]
+    for argument in () if takes_options else kwargs:
+        if argument not in known:
+            word = _ARGUMENT_HINTS.get(argument, "")
+            applies = word.startswith(("km.", "with ")) or word.partition("=")[0] in known
+            hint = f": {word}" if applies else suggestion(argument, known)
+            return f"km.{name} has no argument {argument}={hint}; it has {', '.join(known)}"
+    return f"km.{name}: {error}; its arguments are {', '.join(known)}"
+
+
+def _require_kind(name: str, value: Any, annotation: str) -> None:
+    """Raise InputError for a value that is no integer, number, truth value or text where the annotation says so."""
+    plain = annotation.removesuffix(" | None")
+    if (value is None and plain != annotation) or plain not in ("int", "bool", "str", "float"):
+        return
+    if plain == "int":
+        integer(value, name)
+    elif plain == "float" and not (isinstance(value, int | float) and not isinstance(value, bool)):
+        raise InputError(f"found {name} = {value!r}, expected a number")
+    elif plain in ("bool", "str") and type(value).__name__ not in (plain, f"{plain}_"):  # with those of numpy
+        expected = "True or False" if plain == "bool" else "a text"
+        raise InputError(f"found {name} = {value!r}, expected {expected}")
+
+
+def _is_interactive() -> bool:
+    """Whether somebody waits for the answer: a notebook, or a prompt of Python."""
+    is_main = threading.current_thread() is threading.main_thread()
+    return is_main and (hasattr(sys, "ps1") or _in_notebook())
+
+
+def _in_notebook() -> bool:
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    return shell is not None and type(shell).__name__ == "ZMQInteractiveShell"
+
+
+@contextmanager
+def _interrupt_ends_search() -> Iterator[Callable[[], bool]]:
+    """Within the block let Ctrl-C, or the button of a notebook, end a search like a time limit: its results are kept.
+
+    A second interrupt is raised as usual. A handler of the caller is left alone.
+    """
+    interrupts: list[bool] = []
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield lambda: False
+        return
+
+    def stop(*_: Any) -> None:
+        interrupts.append(True)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        raise TimeLimit("interrupted")
+
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield lambda: bool(interrupts)
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
+    """Show the last message below a cell of a notebook, once the block has taken two seconds, and remove it after."""
+    if not _in_notebook():
+        yield lambda _: None
+        return
+    ipython: Any = import_module("IPython.display")
+
+    messages, is_done = [f"{name} ..."], threading.Event()
+
+    def show() -> None:
+        if is_done.wait(_BEFORE_PROGRESS):
+            return
+        with suppress(Exception):  # a display that fails must not fail the search
+            handle = ipython.display(ipython.HTML(_bar(messages[-1])), display_id=True)
+            while not is_done.wait(_BETWEEN_UPDATES):
+                handle.update(ipython.HTML(_bar(messages[-1])))
+            handle.update(ipython.HTML(""))
+
+    thread = threading.Thread(target=copy_context().run, args=(show,), daemon=True)
+    thread.start()
+    try:
+        yield lambda message: messages.__setitem__(0, message)
+    finally:
+        is_done.set()
+        thread.join()
+
+
+def _bar(message: str) -> str:
+    return f'<progress style="width: 6em"></progress> <span>{escape(message)}</span>'
