@@ -6,21 +6,33 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from kahanmaps.algebra.polynomials import RationalFunction, ring
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
+from kahanmaps.certificates.combinations import affine_symmetry, bilinear_integral, modified_hamiltonian
 from kahanmaps.certificates.identities import (
-    ConservedFunction,
+    Claim,
     FalseClaim,
-    InvariantVolume,
     MapData,
     conserved_function,
+    darboux_polynomial,
+    invariant_tensor,
     invariant_volume,
     map_data,
 )
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.settings import claimed_functions
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
+from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.kahan import SystemLike
 
@@ -30,6 +42,7 @@ CHECKERS: dict[str, Callable[..., str]] = {
     "sympy": partial(script_certificate, PYTHON),
 }
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
+TENSOR = "poisson"
 
 
 def certificate(
@@ -38,6 +51,7 @@ def certificate(
     claims: Sequence[str] | None = None,
     integrals: Mapping[str, Any] | Any = None,
     *,
+    everything: bool = False,
     command: str = "",
 ) -> str:
     """Write a proof that another program checks: integrals, and the invariant volume form, for every eps.
@@ -46,8 +60,11 @@ def certificate(
         system: the system, which stands for its Kahan map, or a map; of dimension at most 6.
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
-            "volume" for the invariant volume form; None for all of them, or for `integrals` alone if these are given.
+            "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
+            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves. None for all that
+            need no search, or for `integrals` alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
+        everything: also search, for all of these.
         command: the command line that writes this script, for the comment on top.
 
     Returns:
@@ -76,23 +93,27 @@ def certificate(
         )
     names = (*formulas.names, "eps")
     data = map_data(formulas.equation, formulas.variables, formulas.new, names)
-    proved: list[ConservedFunction | InvariantVolume] = []
     further = {} if integrals is None else claimed_functions(file, integrals)
-    for name, function in further.items():
-        proved.append(conserved_function(data, name, function))
-    known = {} if further and claims is None else dict(_known_claims(formulas, data))
+    proved: list[Claim] = [conserved_function(data, name, function) for name, function in further.items()]
+    known = dict(_known_claims(formulas, data))
+    searches = {name: partial(search, file, data) for name, search in _SEARCHES.items() if name not in known}
+    if claims is None:
+        claims = [] if further and not everything else [*known, *(searches if everything else ())]
+        is_required = False
+    else:
+        is_required = True
     skipped = []
-    for name in known if claims is None else claims:
-        if name not in known:
-            expected = f"one of {', '.join(known)}" if known else "none, as nothing is known of it"
-            raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected {expected}")
-        certify = invariant_volume if name == VOLUME else partial(conserved_function, name=name)
+    for name in claims:
+        if name not in known and name not in searches:
+            raise InputError(
+                f"no claim {str(name)[:40]!r} of {file.name}: expected one of {', '.join([*known, *searches])}"
+            )
         try:
-            proved.append(certify(data, function=known[name]))
+            proved += [known[name]()] if name in known else searches[name]()
         except FalseClaim:
             raise
-        except InputError as error:  # of all known claims those that are short enough
-            if claims is not None:
+        except InputError as error:  # of all claims those that are short enough
+            if is_required:
                 raise
             skipped.append(f"{name}: {error}")
     if skipped and not proved:
@@ -107,23 +128,75 @@ def certificate(
     )
 
 
-def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, RationalFunction]]:
-    """The integrals and the density that the file claims, or theorems give, as functions of x and eps."""
-    yield from formulas.integrals.items()
-    n, context = data.dim, ring(data.names)
-    letters = context.gens()
-    for label, _, function in formulas.integrals_by_theorem():
-        # In x and x~, of degree at most 1 in x~: D F(x, N/D) is a polynomial.
-        total = context.constant(0)
-        for exponents, coefficient in function.numerator.terms():
-            term = context.constant(coefficient)
-            for letter, exponent in zip(letters, (*exponents[:n], *exponents[2 * n :]), strict=True):
-                term *= letter ** int(exponent)
-            (image,) = [data.numerators[k] for k in range(n) if exponents[n + k]] or [data.determinant]
-            total += term * image
-        denominator = function.denominator.compose(*letters[:n], *letters, ctx=context)
-        yield label.removeprefix("integral "), RationalFunction.reduced(total, denominator * data.determinant)
+def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Callable[[], Claim]]]:
+    """What the file claims, or theorems give: by name the functions that find the identities."""
+    for name, function in formulas.integrals.items():
+        yield name, partial(conserved_function, data, name, function)
+    H, file = formulas.H, formulas.file
+    if H is not None:
+        yield "modified_hamiltonian", partial(modified_hamiltonian, data, "modified_hamiltonian", H)
+    for name, form in formulas.forms.items():
+        yield name, partial(bilinear_integral, data, name, form)
     if formulas.density is not None:
-        yield VOLUME, formulas.density
-    elif formulas.H is not None:
-        yield VOLUME, RationalFunction(data.determinant, context.constant(1))
+        yield VOLUME, partial(invariant_volume, data, VOLUME, formulas.density)
+    elif H is not None:
+        yield VOLUME, lambda: invariant_volume(data, VOLUME, _polynomial(data.determinant))
+    if file.hamiltonian is not None and theorems.poisson_tensor_invariant(file.hamiltonian, file.member) is not None:
+        yield TENSOR, lambda: invariant_tensor(data, TENSOR, _hamiltonian_tensor(formulas))
+
+
+def _search_integrals(file: SystemFile, data: MapData) -> list[Claim]:
+    found = [found for found in find_integrals(file).integrals if found.verdict is Certainty.PROVED]
+    return [conserved_function(data, integral.name, integral.function) for integral in found]
+
+
+def _search_density(file: SystemFile, data: MapData) -> list[Claim]:
+    found = [found for found in find_densities(file).densities if found.verdict is Certainty.PROVED]
+    return [invariant_volume(data, f"{VOLUME}_{k}", density.function) for k, density in enumerate(found, 1)]
+
+
+def _search_tensors(file: SystemFile, data: MapData) -> list[Claim]:
+    proved = Certainty.PROVED
+    found = [found for found in find_poisson(file).tensors if found.verdict is proved and found.jacobi is proved]
+    return [invariant_tensor(data, tensor.name, tensor.tensor.rows) for tensor in found]
+
+
+def _search_darboux(file: SystemFile, data: MapData) -> list[Claim]:
+    spaces = [space for space in darboux_polynomials(file, 2).spaces if space.verdict is Certainty.PROVED]
+    # The cofactor of a factor of det M has that factor in its denominator: it is no polynomial over D^k.
+    polynomials = [
+        P for space in spaces for P in space.polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0
+    ]
+    return [darboux_polynomial(data, f"D{k}", P) for k, P in enumerate(polynomials, 1)]
+
+
+def _search_symmetries(file: SystemFile, data: MapData) -> list[Claim]:
+    found = [symmetry for symmetry in linear_symmetries(file).generators if not symmetry.is_trivial]
+    return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(found, 1)]
+
+
+_SEARCHES = {
+    "integrals": _search_integrals,
+    "density": _search_density,
+    TENSOR: _search_tensors,
+    "darboux": _search_darboux,
+    "symmetry": _search_symmetries,
+}
+
+
+def _hamiltonian_tensor(formulas: Formulas) -> list[list[RationalFunction]]:
+    """Pi = J - eps^2 f'^2 J."""
+    assert formulas.file.hamiltonian is not None
+    context, J, n = ring((*formulas.names, "eps")), formulas.file.hamiltonian.J, formulas.dim
+    *letters, eps = context.gens()
+    slopes = [[entry.compose(*letters, ctx=context) for entry in row] for row in formulas.jacobian]
+
+    def times(A: Sequence[Sequence[Any]], B: Sequence[Sequence[Any]]) -> list[list[fmpq_mpoly]]:
+        return [[sum((a * B[k][j] for k, a in enumerate(row)), context.constant(0)) for j in range(n)] for row in A]
+
+    square = times(times(slopes, slopes), J.tolist())
+    return [[_polynomial(J[i, j] - eps**2 * square[i][j]) for j in range(n)] for i in range(n)]
+
+
+def _polynomial(polynomial: fmpq_mpoly) -> RationalFunction:
+    return RationalFunction(polynomial, polynomial.context().constant(1))

@@ -8,12 +8,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.algebra.polynomials import names_of, ring
+from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral
 from kahanmaps.certificates.identities import (
+    Claim,
     ConservedFunction,
+    DarbouxPolynomial,
+    InvariantTensor,
     InvariantVolume,
     MapData,
     homogeneous_value,
@@ -35,13 +41,11 @@ class _Script:
     """The lines of a script about one map, and the names that its letters have in it."""
 
     def __init__(self, data: MapData) -> None:
-        self.data = data
-        self.letters = letters_of(data, r"[amnrl]\d+")  # m11, a11, n1, r1, l11 are the script's own
+        self.data, self.is_solved = data, False
+        self.letters = letters_of(data, r"[aelmnpr]\d+")  # a11, e1, ... are the script's own
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
-        n = data.dim
-        self.defined = ["det", *(f"{k}{i + 1}{j + 1}" for k in "ma" for i in range(n) for j in range(n))]
-        self.defined += [f"{k}{i + 1}" for k in "rn" for i in range(n)]
+        self.third = [self.letters[f"{name}2"] for name in data.new]
 
     @property
     def cramer(self) -> str:
@@ -53,16 +57,90 @@ class _Script:
         letters = [self.letters[name] for name in names_of(polynomial)]
         return polynomial_text(polynomial, letters)
 
+    @property
+    def constants(self) -> list[str]:
+        """The symbols and eps, as variables of the section."""
+        letters = [self.letters[name] for name in self.data.names[self.data.dim :]]
+        return [f"Variables {' '.join(letters)} : R."] if letters else []
+
+    def predicate(self) -> list[str]:
+        """The equation of the map as a relation between any two points, with the residuals e1, e2, ..."""
+        data, n = self.data, self.data.dim
+        arguments = " ".join([*self.old, *self.new])
+        lines = [*self.constants, "", "(* The equation of the map, M x~ - r = 0: `maps` x x~ says that it holds. *)"]
+        for i, row in enumerate(data.rows):
+            terms = [f"({self.text(entry)}) * {name}" for entry, name in zip(row[:-1], self.new, strict=True) if entry]
+            lines.append(f"Definition e{i + 1} ({arguments} : R) : R := {' + '.join(terms)} - ({self.text(row[-1])}).")
+        equations = " /\\ ".join(f"e{i + 1} {arguments} = 0" for i in range(n))
+        return [*lines, f"Definition maps ({arguments} : R) : Prop := {equations}."]
+
+    def hypothesis(self, letter: str) -> str:
+        """The pattern that takes the hypothesis `maps` apart: (A1 & A2)."""
+        names = [f"{letter}{i + 1}" for i in range(self.data.dim)]
+        return f"({' & '.join(names)})" if len(names) > 1 else names[0]
+
+    def along_orbit(self, claim: OrbitIntegral, theorem: str) -> list[str]:
+        """The theorem that a function of x and x~ has the same value one step later."""
+        n = self.data.dim
+        x, y, z = (" ".join(letters) for letters in (self.old, self.new, self.third))
+        residuals = [f"e{i + 1}" for i in range(n)]
+        terms = [f"({self.text(c)}) * {e} {x} {y}" for c, e in zip(claim.first, residuals, strict=True) if c]
+        terms += [f"({self.text(c)}) * {e} {y} {z}" for c, e in zip(claim.second, residuals, strict=True) if c]
+        rewriting = ", ".join(f"?{letter}{i + 1}" for letter in "AB" for i in range(n))
+        return [
+            "(* value x x~ = num x x~ / den is an integral. *)",
+            f"Definition num ({x} {y} : R) : R := {self.text(claim.numerator)}.",
+            f"Definition den : R := {self.text(claim.denominator)}.",
+            f"Definition value ({x} {y} : R) : R := num {x} {y} / den.",
+            f"Theorem {theorem} : forall {x} {y} {z},",
+            f"  maps {x} {y} -> maps {y} {z} -> value {y} {z} = value {x} {y}.",
+            "Proof.",
+            f"  intros {x} {y} {z} {self.hypothesis('A')} {self.hypothesis('B')}. unfold value.",
+            f"  replace (num {y} {z}) with (num {x} {y}); [reflexivity |]. apply Rminus_diag_uniq_sym.",
+            f"  transitivity ({' + '.join(terms)}).",
+            f"  - cbv delta [num {' '.join(residuals)}] beta; ring.",
+            f"  - rewrite {rewriting}. ring.",
+            "Qed.",
+        ]
+
+    def symmetric(self, claim: AffineSymmetry, theorem: str) -> list[str]:
+        """The theorem that x -> T x takes the map to itself or to its inverse."""
+        n = self.data.dim
+        x, y = " ".join(self.old), " ".join(self.new)
+        polynomials = self.data.at_points(*claim.image)
+        points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
+        first, second = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
+        lines = [
+            f"(* {'Reversing symmetry' if claim.reversing else 'Symmetry'} T: {', '.join(points[0])} *)",
+            f"Theorem {theorem} : forall {x} {y}, maps {x} {y} ->",
+            f"  maps {first} {second}.",
+            "Proof.",
+            f"  intros {x} {y} {self.hypothesis('A')}.",
+        ]
+        for i, row in enumerate(claim.matrix):
+            terms = [f"({c}) * e{j + 1} {x} {y}" for j, c in enumerate(row) if c]
+            steps = f"transitivity (({' + '.join(terms) or '0'}) / {claim.multiple}); "
+            steps += f"[cbv delta [{' '.join(f'e{j + 1}' for j in range(n))}] beta; field |"
+            steps += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
+            lines.append(f"  split; [{steps[:-1]} |]." if i < n - 1 else f"  {steps}")
+        return [*lines, "Qed."]
+
     def expand(self, *further: str) -> str:
         """The tactic that replaces all definitions by what they stand for, and proves an identity of polynomials."""
-        return f"cbv delta [{' '.join((*further, *self.defined))}] beta; ring."
+        n = self.data.dim
+        defined = [
+            "det",
+            *(f"{k}{i + 1}{j + 1}" for k in "ma"[: 1 + self.is_solved] for i in range(n) for j in range(n)),
+        ]
+        defined += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
+        return f"cbv delta [{' '.join((*further, *defined))}] beta; ring."
 
-    def map(self) -> list[str]:
-        """The variables, the equation, and Cramer's rule."""
+    def map(self, is_solved: bool) -> list[str]:
+        """The variables, the equation, and Cramer's rule where it is needed."""
         data, n = self.data, self.data.dim
-        constants = [self.letters[name] for name in data.names[n:]]
+        self.is_solved = is_solved
         lines = [
-            f"Variables {' '.join(constants)} : R." if constants else "",
+            *self.constants,
             f"Variables {' '.join(self.old)} : R.  (* a point x *)",
             f"Variables {' '.join(self.new)} : R.  (* its image x~ *)",
             "",
@@ -77,9 +155,10 @@ class _Script:
         lines += [
             f"Definition det : R := {determinant_text(entries)}.",
             "Hypothesis regular : det <> 0.",
-            "",
-            "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)",
         ]
+        if not is_solved:
+            return lines
+        lines += ["", "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)"]
         for i in range(n):
             lines += [f"Definition a{i + 1}{j + 1} : R := {self.text(data.adjugate[i][j])}." for j in range(n)]
             lines.append(f"Definition n{i + 1} : R := {self.text(data.numerators[i])}.")
@@ -95,18 +174,22 @@ class _Script:
             ]
         return lines
 
-    def moved(self, label: str, polynomial: fmpq_mpoly, degree: int, value: str, *also: str) -> list[str]:
-        """The lemma det^degree P(x~) = value for the function `label` = P; `also` are definitions in the value."""
+    def moved(self, label: str, polynomial: fmpq_mpoly, degree: int, value: str = "", *also: str) -> list[str]:
+        """The lemma det^degree P(x~) = value for the function `label` = P; `also` are definitions in the value.
+
+        Without a value it is P made homogeneous, at N and det.
+        """
         n = self.data.dim
-        letters = [self.letters[name] for name in self.data.names]
-        scaled = [f"(det * {name})" for name in self.new] + letters[n:]
-        products = _homogeneous_text(polynomial, scaled, degree, n)
+        constants = [self.letters[name] for name in self.data.names[n:]]
+        scaled = [f"(det * {name})" for name in self.new]
+        at_n = _homogeneous_text(polynomial, [*(f"n{i + 1}" for i in range(n)), *constants], degree, n)
+        last = f"{self.expand(label, *also)}" if value else "ring."
         return [
-            f"Lemma {label}_image : {label} {' '.join(self.new)} * det ^ {degree} = {value}.",
+            f"Lemma {label}_image : {label} {' '.join(self.new)} * det ^ {degree} = {value or at_n}.",
             "Proof.",
-            f"  transitivity ({products}).",
+            f"  transitivity ({_homogeneous_text(polynomial, [*scaled, *constants], degree, n)}).",
             f"  - cbv delta [{label}] beta; ring.",
-            f"  - rewrite {self.cramer}. {self.expand(label, *also)}",
+            f"  - rewrite {self.cramer}. {last}",
             "Qed.",
         ]
 
@@ -132,17 +215,133 @@ class _Script:
         ]
         return lines
 
+    def darboux(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
+        """The theorem that P(x~) is P(x) times the cofactor."""
+        old, new = " ".join(self.old), " ".join(self.new)
+        return [
+            "(* A Darboux polynomial, with its cofactor over a power of det. *)",
+            f"Definition num ({old} : R) : R := {self.text(claim.polynomial)}.",
+            f"Definition cofactor : R := {self.text(claim.cofactor)}.",
+            *self.moved("num", claim.polynomial, claim.degree, f"cofactor * num {old}", "cofactor"),
+            f"Theorem {theorem} : num {new} = cofactor / det ^ {claim.degree} * num {old}.",
+            "Proof.",
+            f"  apply (Rmult_eq_reg_r (det ^ {claim.degree})); [| apply pow_nonzero; exact regular].",
+            "  rewrite num_image. field. exact regular.",
+            "Qed.",
+        ]
+
+    def derivative(self) -> tuple[list[str], str]:
+        """The definitions of l11, l12, ..., the entries of L, and all these names."""
+        lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
+        names = []
+        for i, row in enumerate(self.data.derivative):
+            lines += [f"Definition l{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row)]
+            names += [f"l{i + 1}{j + 1}" for j in range(len(row))]
+        return lines, " ".join(names)
+
+    def poisson(self, claim: InvariantTensor, theorem: str) -> list[str]:
+        """The theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
+        n, k, old, new = claim.dim, claim.degree, " ".join(self.old), " ".join(self.new)
+        lines, flat = self.derivative()
+        lines.append("(* The Poisson tensor T: T_ij = pij / den for i < j, T_ji = -T_ij. *)")
+        pairs = {pair: f"p{pair[0] + 1}{pair[1] + 1}" for pair in claim.upper}
+        for pair, name in pairs.items():
+            lines.append(f"Definition {name} ({old} : R) : R := {self.text(claim.upper[pair])}.")
+        lines.append(f"Definition den ({old} : R) : R := {self.text(claim.denominator)}.")
+        names = " ".join([*pairs.values(), "den"])
+
+        def sandwich(letter: str, i: int, j: int, point: str, times: str = "{}", form: str = "{}") -> str:
+            """The entry i, j of A T A^T den, where A has these letters, each in the form `times`, T in another."""
+            a = [[times.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
+            minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in pairs.items())
+            return " + ".join(
+                f"({b} * {c} - {d} * {e}) * {form.format(f'{name} {point}')}" for b, c, d, e, name in minors
+            )
+
+        if not claim.is_free:
+            for i, row in enumerate(self.data.derivative):
+                for j, entry in enumerate(row):
+                    label, forms = f"l{i + 1}{j + 1}", [_scaled_row(entry, self, n, at_n) for at_n in (False, True)]
+                    lines += [
+                        f"Lemma {label}_image : {label} * det = {forms[1]}.",
+                        f"Proof. transitivity ({forms[0]}); [unfold {label}; ring | rewrite {self.cramer}; ring]. Qed.",
+                    ]
+            for name, P in (*((pairs[pair], P) for pair, P in claim.upper.items()), ("den", claim.denominator)):
+                lines += self.moved(name, P, k)
+        for i, j in combinations(range(n), 2):
+            left, right = sandwich("l", i, j, old), sandwich("m", i, j, new)
+            label = f"{theorem}_{i + 1}{j + 1}"
+            lines += [
+                f"Theorem {label} : den {old} <> 0 -> den {new} <> 0 ->",
+                f"  ({left}) / den {old} =",
+                f"  ({right}) / den {new}.",
+                "Proof.",
+                "  intros Hx Hy. apply equal_fractions; [assumption | assumption |].",
+            ]
+            if claim.is_free:
+                lines += [f"  (* This identity holds for any x and x~. *) {self.expand(names, flat)}", "Qed."]
+                continue
+            scaled = sandwich("l", i, j, old, "({} * det)"), sandwich("m", i, j, new, form=f"({{}} * det ^ {k})")
+            images = [f"?l{row + 1}{column + 1}_image" for row in (i, j) for column in range(n)]
+            images += [f"?{name}_image" for name in names.split()]
+            lines += [
+                f"  apply (Rmult_eq_reg_r (det ^ {k + 2})); [| apply pow_nonzero; exact regular].",
+                f"  transitivity (({scaled[0]}) * (den {new} * det ^ {k})); [ring |].",
+                f"  transitivity (({scaled[1]}) * den {old} * det ^ 2); [| ring].",
+                f"  rewrite {', '.join(images)}. {self.expand(names)}",
+                "Qed.",
+            ]
+        if claim.triples:
+            lines += self._jacobi(claim, pairs, theorem)
+        return lines
+
+    def _jacobi(self, claim: InvariantTensor, names: dict[tuple[int, int], str], theorem: str) -> list[str]:
+        """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3.
+
+        Lemmas define the derivatives: the value at x + t e_s is that at x, plus t d, plus t^2 times a polynomial.
+        """
+        old, lines = " ".join(self.old), list[str]()
+        functions = {names[pair]: P for pair, P in claim.upper.items()} | {"den": claim.denominator}
+        context, spare = ring((*names_of(claim.denominator), "t")), "t_"
+        *letters, t = context.gens()
+        for name, P in functions.items():
+            for s in range(claim.dim):
+                moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
+                slope = P.derivative(s)
+                at = [P.compose(*letters, ctx=context), slope.compose(*letters, ctx=context)]
+                rest = polynomial_text(
+                    (moved - at[0] - t * at[1]) / t**2, [*(self.letters[x] for x in names_of(P)), spare]
+                )
+                point = " ".join(f"({x} + {spare})" if k == s else x for k, x in enumerate(self.old))
+                lines += [
+                    f"Definition {name}_{s + 1} : R := {self.text(slope)}.",
+                    f"Lemma derivative_{name}_{s + 1} : forall {spare}, exists rest,",
+                    f"  {name} {point} = {name} {old} + {spare} * {name}_{s + 1} + {spare} ^ 2 * rest.",
+                    f"Proof. intro {spare}. exists ({rest}). cbv delta [{name} {name}_{s + 1}] beta; ring. Qed.",
+                ]
+        used = " ".join([*functions, *(f"{name}_{s + 1}" for name in functions for s in range(claim.dim))])
+
+        def entry(i: int, j: int, ending: str) -> str:
+            return f"{'- ' * (i > j)}{names[min(i, j), max(i, j)]}{ending}"
+
+        for i, j, k in claim.triples:
+            terms = [
+                f"({entry(a, s, f' {old}')}) * (({entry(b, c, f'_{s + 1}')}) * den {old} - "
+                f"({entry(b, c, f' {old}')}) * den_{s + 1})"
+                for a, b, c in ((i, j, k), (j, k, i), (k, i, j))
+                for s in range(claim.dim)
+                if s != a
+            ]
+            lines += [f"Theorem {theorem}_jacobi_{i + 1}{j + 1}{k + 1} :", f"  {' + '.join(terms)} = 0."]
+            lines.append(f"Proof. cbv delta [{used}] beta; ring. Qed.")
+        return lines
+
     def invariant(self, claim: InvariantVolume, theorem: str) -> list[str]:
         """The theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
         n, old, new = self.data.dim, " ".join(self.old), " ".join(self.new)
         entries = [[f"l{i + 1}{j + 1}" for j in range(n)] for i in range(n)]
         power = claim.degree
-        lines = [
-            "(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)",
-        ]
-        for i, row in enumerate(claim.derivative):
-            lines += [f"Definition l{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row)]
-        flat = " ".join(name for row in entries for name in row)
+        lines, flat = self.derivative()
         lines += [
             f"Definition volume : R := {determinant_text(entries)}.  (* det L *)",
             "(* dx/phi with phi = num / den is invariant: phi(x~) = phi(x) det(M^-1 L). *)",
@@ -167,7 +366,7 @@ class _Script:
             image = homogeneous_value(polynomial, power, self.data)
             lines += self.moved(label, polynomial, power, self.text(image))
         # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
-        scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in claim.derivative]
+        scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
         return [
             *lines,
             f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled)}.",
@@ -182,9 +381,7 @@ class _Script:
         ]
 
 
-def rocq_certificate(
-    data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
-) -> str:
+def rocq_certificate(data: MapData, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
     """Write a script that Coq accepts only if it proves the claims about the map.
 
     Args:
@@ -196,17 +393,27 @@ def rocq_certificate(
     safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
-    theorems = []
+    theorems = list[str]()
+    proofs: dict[type[Claim], tuple[Any, str]] = {
+        ConservedFunction: (_Script.conserved, "conserved"),
+        DarbouxPolynomial: (_Script.darboux, "darboux"),
+        InvariantVolume: (_Script.invariant, "invariant"),
+        InvariantTensor: (_Script.poisson, "poisson"),
+        OrbitIntegral: (_Script.along_orbit, "conserved"),
+        AffineSymmetry: (_Script.symmetric, "symmetry"),
+    }
     for k, claim in enumerate(claims, 1):
-        theorem = f"{re.sub(r'[^A-Za-z0-9_]', '_', claim.name)}_"
-        theorem = theorem if re.match("[A-Za-z]", theorem) else f"v_{theorem}"
-        theorem += "conserved" if isinstance(claim, ConservedFunction) else "invariant"
-        theorems.append(theorem)
+        prove, ending = proofs[type(claim)]
+        name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
+        theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
         script = _Script(data)
-        prove = script.conserved if isinstance(claim, ConservedFunction) else script.invariant
-        lines += [f"Module Claim{k}.", "Section Map.", *script.map(), ""]
-        lines += [*prove(claim, theorem), "End Map.", f"End Claim{k}.", ""]  # type: ignore[arg-type]
-    lines += [f"Print Assumptions Claim{k}.{theorem}." for k, theorem in enumerate(theorems, 1)]
+        is_relation = isinstance(claim, OrbitIntegral | AffineSymmetry)
+        lines += [f"Module Claim{k}.", "Section Map."]
+        lines += [*(script.predicate() if is_relation else script.map(claim.is_at_image)), ""]
+        proof = prove(script, claim, theorem)
+        theorems += [f"Claim{k}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
+        lines += [*proof, "End Map.", f"End Claim{k}.", ""]
+    lines += [f"Definition theorems := ({', '.join(theorems)}).", "Print Assumptions theorems."]
     return "\n".join(lines) + "\n"
 
 
@@ -246,10 +453,10 @@ def _homogeneous_text(polynomial: fmpq_mpoly, letters: Sequence[str], degree: in
     return " + ".join(pieces) or "0"
 
 
-def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int) -> str:
-    """det times an entry of L, with det x~ for x~: of degree at most 1 in x~."""
+def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
+    """det times an entry of L, with det x~, or N, for x~: of degree at most 1 in x~."""
     letters = [script.letters[name] for name in names_of(entry)]
-    letters[dim : 2 * dim] = [f"(det * {name})" for name in letters[dim : 2 * dim]]
+    letters[dim : 2 * dim] = [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(script.new)]
     pieces = []
     for exponents, coefficient in entry.terms():
         factors = [name if k == 1 else f"{name} ^ {k}" for name, k in zip(letters, exponents, strict=True) if k]

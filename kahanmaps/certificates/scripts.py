@@ -1,8 +1,8 @@
 """Certificates for PARI/GP and for SymPy: each identity is multiplied out, and `true` printed for it.
 
-The script states M and r, and N and D with M N = D r, so that x~ = N/D where det M is not 0. Then it computes
-D^k P(N/D) by putting N and D into P made homogeneous with a letter h, which stays within polynomials, and compares it
-with C P. It ends with status 1 if an identity does not hold.
+The script states M and r, and where it is needed N and D with M N = D r, so that x~ = N/D where det M is not 0. Then it
+computes D^k P(N/D), a polynomial, and compares it with C P. It ends with status 1 if an identity does not hold. Both
+programs are given functions of the same names, so that the checks are the same text but for the sign of powers.
 """
 
 from __future__ import annotations
@@ -10,99 +10,286 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
-from kahanmaps.certificates.identities import ConservedFunction, InvariantVolume, MapData, letters_of
+from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral
+from kahanmaps.certificates.identities import (
+    Claim,
+    ConservedFunction,
+    DarbouxPolynomial,
+    InvariantTensor,
+    InvariantVolume,
+    MapData,
+    letters_of,
+)
 from kahanmaps.certificates.rocq import polynomial_text
 
 _PARI = """\
 default(recover, 0);  \\\\ an error ends gp with a status that is not 0
 default(parisizemax, 2*10^9);
 ok = 1;
-det(A) = matdet(A);
-check(text, holds) = {{ print(text, ": ", if(holds, "true", "FALSE")); if(!holds, ok = 0); }}
-M = {matrix};
-r = [{right}]~;
-N = [{numerators}]~;
-D = {determinant};
-n = {dim};
-old = [{variables}, h];
-image(P) = substvec(P, old, concat(N~, [D]));  \\\\ of P, homogeneous in x and h
-check("M N = D r", M*N == D*r && D != 0);
+check(text, holds) = { print(text, ": ", if(holds, "true", "FALSE")); if(!holds, ok = 0); }
 """
-_SYMPY = """\
+_PARI_TOOLS = {
+    "put": "put(A, letters, values) = substvec(A, letters, values);",
+    "det": "det(A) = matdet(A);",
+    "mul": "mul(A, B) = A*B;",
+    "transposed": "transposed(A) = A~;",
+    "scale": "scale(c, A) = c*A;",
+    "act": "act(A, v) = (A*v~)~;",
+    "dot": "dot(v, w) = v*w~;",  # concat is a function of PARI
+    "bracket": """\
+bracket(P, Q, i, j, k) = {  \\\\ Q^3 times the sum of T_is d/dx_s T_jk over s, T = P/Q
+  sum(s = 1, n, P[i+1,s]*(deriv(P[j+1,k+1], old[s])*Q - P[j+1,k+1]*deriv(Q, old[s])));
+}""",
+    "image": """\
+image(G, k, letters) = {  \\\\ D^k G, with N/D for the letters, in which G has a degree of at most k
+  my(H = substvec(G, letters, tt*letters));
+  if(poldegree(H, tt) > k, error("degree"));
+  sum(j = 0, k, D^(k-j)*substvec(polcoef(H, j, tt), letters, N));
+}""",
+    "images": "images(A, k, letters) = matrix(#A, #A, i, j, image(A[i,j], k, letters));",
+}
+_PYTHON = """\
 import sys
 from itertools import permutations
 from math import prod
 
-from sympy import ZZ
+from sympy import QQ
 from sympy.polys.rings import ring
 
-R, {letters}, h = ring("{names},h", ZZ)
-old = [{variables}]
+R, {letters} = ring("{names}", QQ)
 one = R.one  # makes a polynomial of a number
-M = {matrix}
-r = [{right}]
-N = [{numerators}]
-D = {determinant}
-n = {dim}
 results = []
 
 
 def check(text, holds):
     results.append(holds)
     print(f"{{text}}: {{'true' if holds else 'FALSE'}}")
-
-
-def image(P):  # of P, homogeneous in x and h: N and D in their places
-    places = [R.gens.index(letter) for letter in (*old, h)]
-    total = R.zero
-    for exponents, coefficient in P.terms():
-        rest = [0 if k in places else e for k, e in enumerate(exponents)]
-        factors = [value ** exponents[k] for value, k in zip((*N, D), places)]
-        total += prod(factors, start=R({{tuple(rest): coefficient}}))
-    return total
-
-
+"""
+_PYTHON_TOOLS = {
+    "put": """\
+def put(A, letters, values):
+    return [put(a, letters, values) for a in A] if isinstance(A, list) else A.compose(list(zip(letters, values)))""",
+    "det": """\
 def det(A):
     n, total = len(A), R.zero
     for p in permutations(range(n)):
         sign = (-1) ** sum(p[i] > p[j] for i in range(n) for j in range(i + 1, n))
         total += prod((A[i][p[i]] for i in range(n)), start=R(sign))
-    return total
-
-
-check("M N = D r", D != 0 and all(sum(M[i][j] * N[j] for j in range(n)) == D * r[i] for i in range(n)))
-"""
+    return total""",
+    "mul": """\
+def mul(A, B):
+    return [[sum((a * b for a, b in zip(row, column)), R.zero) for column in zip(*B)] for row in A]""",
+    "transposed": """\
+def transposed(A):
+    return [list(row) for row in zip(*A)]""",
+    "scale": """\
+def scale(c, A):
+    return [scale(c, a) for a in A] if isinstance(A, list) else c * A""",
+    "act": """\
+def act(A, v):
+    return [dot(row, v) for row in A]""",
+    "concat": """\
+def concat(v, w):
+    return v + w""",
+    "dot": """\
+def dot(v, w):
+    return sum((a * b for a, b in zip(v, w)), R.zero)""",
+    "bracket": """\
+def bracket(P, Q, i, j, k):  # Q^3 times the sum of T_is d/dx_s T_jk over s, T = P/Q
+    return sum((P[i][s] * (P[j][k].diff(old[s]) * Q - P[j][k] * Q.diff(old[s])) for s in range(n)), R.zero)""",
+    "image": """\
+def image(G, k, letters):  # D^k G, with N/D for the letters, in which G has a degree of at most k
+    places = [R.gens.index(letter) for letter in letters]
+    total = R.zero
+    for exponents, coefficient in G.terms():
+        rest = [0 if p in places else e for p, e in enumerate(exponents)]
+        powers = [exponents[p] for p in places]  # a negative power of D is an error
+        factors = [value**e for value, e in zip((*N, D), (*powers, k - sum(powers)))]
+        total += prod(factors, start=R({tuple(rest): coefficient}))
+    return total""",
+    "images": """\
+def images(A, k, letters):
+    return [[image(a, k, letters) for a in row] for row in A]""",
+}
+_NEEDS = {"act": ("dot",), "images": ("image",)}
 
 
 @dataclass(frozen=True)
 class Language:
-    """How a program writes powers, definitions, matrices, the value at h = 1, and comments."""
+    """How a program writes powers, definitions, vectors, matrices, comments, and the functions of the checks."""
 
     start: str
+    tools: dict[str, str]
     end: str
     run: str
     power: str
     comment: str
     definition: str
+    vector: str
     matrix: str
     next_row: str
-    at_one: str
+    residual: str
 
 
-GP = Language(_PARI, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "; ", "subst({}, h, 1)")
+GP = Language(
+    _PARI, _PARI_TOOLS, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "[{}]", "; ", "(M*new~ - r~)~"
+)  # fmt: skip
 PYTHON = Language(
-    _SYMPY, "sys.exit(not all(results))", "python FILE (needs SymPy)", "**", "# ", "{} = {} * one", "[[{}]]", "], [",
-    "{}.subs(h, 1)",
+    _PYTHON, _PYTHON_TOOLS, "sys.exit(not all(results))", "python FILE (needs SymPy)", "**", "# ", "{} = {}",
+    "[one*a for a in [{}]]", "[[one*a for a in row] for row in [[{}]]]", "], [",
+    "[sum(a*b for a, b in zip(row, new)) - c for row, c in zip(M, r)]",
 )  # fmt: skip
 
 
-def script_certificate(
-    to: Language, data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
-) -> str:
+class _Script:
+    """The lines of a script about one map; `define` and `check` add some."""
+
+    def __init__(self, to: Language, data: MapData) -> None:
+        self.to, self.data, self.lines = to, data, list[str]()
+        self.letters = letters_of(data, "[hijknprst]")
+
+    def text(self, polynomial: fmpq_mpoly) -> str:
+        """The polynomial; a long sum in parts, as Python reads no expression that is nested a thousand times."""
+        letters = [self.letters[name] for name in names_of(polynomial)]
+        text = polynomial_text(polynomial, letters, "*", self.to.power)
+        terms = re.split(r" (?=[+-] )", text)
+        parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
+        return text if self.to is GP or len(parts) == 1 else f"sum([{', '.join(parts)}])"
+
+    def vector(self, entries: Sequence[fmpq_mpoly]) -> str:
+        """A vector."""
+        return self.to.vector.format(", ".join(map(self.text, entries)))
+
+    def matrix(self, rows: Sequence[Sequence[str]]) -> str:
+        """A matrix of texts."""
+        if len(rows) == 1 and self.to is GP:  # [a] would be a vector
+            return f"Mat({rows[0][0]})"
+        return self.to.matrix.format(self.to.next_row.join(", ".join(row) for row in rows))
+
+    def polynomials(self, rows: Sequence[Sequence[fmpq_mpoly]]) -> str:
+        """A matrix of polynomials."""
+        return self.matrix([[self.text(entry) for entry in row] for row in rows])
+
+    def define(self, name: str, text: str) -> None:
+        """A definition; of a polynomial if the text is one."""
+        self.lines.append(self.to.definition.format(name, text))
+
+    def polynomial(self, name: str, polynomial: fmpq_mpoly) -> None:
+        """The definition of a polynomial."""
+        self.define(name, f"({self.text(polynomial)})" + " * one" * (self.to is PYTHON))
+
+    def check(self, label: str, identity: str) -> None:
+        """A check; ^ stands for a power."""
+        identity = identity.replace("^", self.to.power)
+        self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
+
+    def map(self, has_three_points: bool, is_solved: bool) -> None:
+        """The equation, the points, and the solution of the equation."""
+        data = self.data
+        self.define("n", str(data.dim))
+        points = {"old": data.variables, "new": data.new}
+        points |= {"third": [f"{name}2" for name in data.new]} if has_three_points else {}
+        for name, letters in points.items():
+            self.define(name, f"[{', '.join(self.letters[letter] for letter in letters)}]")
+        self.define("M", self.polynomials([row[:-1] for row in data.rows]))
+        self.define("r", self.vector([row[-1] for row in data.rows]))
+        self.define("E", self.to.residual)
+        self.lines[-1] += f"  {self.to.comment}0 where new is the image of old"
+        if is_solved:
+            self.define("N", self.vector(data.numerators))
+            self.polynomial("D", data.determinant)
+            self.check("D is not 0", "D != 0")
+            self.check("M N = D r", "act(M, N) == scale(D, r)")
+
+    def claim(self, claim: Claim) -> None:
+        """The definitions and checks of a claim."""
+        label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
+        says, prove = {
+            ConservedFunction: ("P/Q is an integral", self._conserved),
+            DarbouxPolynomial: ("P is a Darboux polynomial, P(x~) = P C/D^k", self._darboux),
+            InvariantVolume: ("dx/phi is invariant, phi = P/Q", self._volume),
+            InvariantTensor: ("the map is Poisson for the tensor P/Q", self._tensor),
+            OrbitIntegral: ("P(x, x~)/Q is an integral", self._along_orbit),
+            AffineSymmetry: ("x -> T is a symmetry, or takes the map to its inverse", self._symmetry),
+        }[type(claim)]
+        self.lines.append(f"{self.to.comment}{label}: {says}")
+        prove(claim, label)
+        self.lines.append("")
+
+    def _conserved(self, claim: Any, label: str) -> None:
+        self.fraction(claim)
+        self.polynomial("C", claim.cofactor)
+        self.check(f"{label}: C is not 0", "C != 0")
+        for name in "PQ":
+            self.check(f"{label}: D^k {name}(N/D) = C {name}", f"image({name}, {claim.degree}, old) == C*{name}")
+
+    def _darboux(self, claim: Any, label: str) -> None:
+        self.polynomial("P", claim.polynomial)
+        self.polynomial("C", claim.cofactor)
+        self.check(f"{label}: D^k P(N/D) = C P", f"image(P, {claim.degree}, old) == C*P")
+
+    def _volume(self, claim: Any, label: str) -> None:
+        self.fraction(claim)
+        self.define("L", self.polynomials(self.data.derivative))
+        says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
+        if claim.is_free:
+            identity = "put(P, old, new)*Q*det(M) == P*put(Q, old, new)*det(L)"
+            self.check(f"{says} for any x and x~", identity)
+            return
+        self.check("D = det M", "D == det(M)")
+        k = claim.degree
+        identity = f"image(P, {k}, old)*Q*D^(n + 1) == P*image(Q, {k}, old)*det(images(L, 1, new))"
+        self.check(f"{says} at x~ = N/D", identity)
+
+    def _tensor(self, claim: Any, label: str) -> None:
+        n, k = claim.dim, claim.degree
+        self.define("P", self.polynomials([[claim.entry(i, j) for j in range(n)] for i in range(n)]))
+        self.polynomial("Q", claim.denominator)
+        self.check(f"{label}: P is skew", "transposed(P) == scale(-1, P)")
+        self.define("L", self.polynomials(self.data.derivative))
+        says = f"{label}: L(x, x~) T(x) L^T = M T(x~) M^T"
+        one, other = "mul(mul({}, P), transposed({}))", "mul(mul(M, {}), transposed(M))"
+        if claim.is_free:
+            left, right = one.format("L", "L"), other.format("put(P, old, new)")
+            self.check(f"{says} for any x and x~", f"scale(put(Q, old, new), {left}) == scale(Q, {right})")
+        else:
+            self.define("S", "images(L, 1, new)")
+            left, right = one.format("S", "S"), other.format(f"images(P, {k}, old)")
+            self.check(f"{says} at x~ = N/D", f"scale(image(Q, {k}, old), {left}) == scale(Q*D^2, {right})")
+        for i, j, l in claim.triples:
+            terms = (f"bracket(P, Q, {i}, {j}, {l})", f"bracket(P, Q, {j}, {l}, {i})", f"bracket(P, Q, {l}, {i}, {j})")
+            self.check(f"{label}: Jacobi identity {i + 1}, {j + 1}, {l + 1}", " + ".join(terms) + " == 0")
+
+    def _along_orbit(self, claim: Any, label: str) -> None:
+        self.fraction(claim)
+        self.define("first", self.vector(claim.first))
+        self.define("second", self.vector(claim.second))
+        after = "put({}, concat(old, new), concat(new, third))"
+        identity = f"{after.format('P')} - P == dot(first, E) + dot(second, {after.format('E')})"
+        self.check(f"{label}: P(y, z) - P(x, y) = first . E(x, y) + second . E(y, z)", identity)
+
+    def _symmetry(self, claim: Any, label: str) -> None:
+        part = f"1/{claim.divisor}" if self.to is GP else f"QQ(1, {claim.divisor})"
+        self.define("T", f"scale({part}, {self.vector(claim.image)})")
+        self.define("Y", "put(T, old, new)")
+        self.define("K", self.matrix([[str(entry) for entry in row] for row in claim.matrix]))
+        pair, points = ("Y, T", "(T y, T x)") if claim.reversing else ("T, Y", "(T x, T y)")
+        identity = f"scale({claim.multiple}, put(E, concat(old, new), concat({pair}))) == act(K, E)"
+        self.check(f"{label}: E{points} is a combination of E(x, y)", identity)
+
+    def fraction(self, claim: Any) -> None:
+        """The numerator P and the denominator Q."""
+        self.polynomial("P", claim.numerator)
+        self.polynomial("Q", claim.denominator)
+        self.check("Q is not 0", "Q != 0")
+
+
+def script_certificate(to: Language, data: MapData, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
     """Write a script that multiplies out the identities of the claims about the map.
 
     Args:
@@ -111,93 +298,18 @@ def script_certificate(
         claims: what is checked.
         header: lines of the comment on top.
     """
-    n = data.dim
-    letters = letters_of(data, "[hijknpr]")
-    old = [letters[name] for name in data.variables]
-
-    def text(polynomial: fmpq_mpoly) -> str:
-        return total(polynomial_text(polynomial, [letters[name] for name in names_of(polynomial)], "*", to.power))
-
-    def total(text: str) -> str:
-        """A sum; of many terms in parts, as Python reads no expression that is nested a thousand times."""
-        terms = re.split(r" (?=[+-] )", text)
-        parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
-        if to is GP or len(parts) == 1:
-            return text
-        return f"sum([{', '.join(parts)}])"
-
-    def homogeneous(polynomial: fmpq_mpoly, degree: int) -> str:
-        """The polynomial with powers of h that make it homogeneous of the degree in the variables."""
-        pieces = []
-        for exponents, coefficient in polynomial.terms():
-            names = [letters[name] for name in names_of(polynomial)]
-            spare = degree - sum(int(k) for k in exponents[:n])
-            powers = [f"{a}{to.power}{k}" for a, k in zip([*names, "h"], [*exponents, spare], strict=True) if k]
-            pieces.append("*".join([f"({coefficient})", *powers]))
-        return total(" + ".join(pieces) or "0")
-
-    def at_numerators(entry: fmpq_mpoly) -> str:
-        """D times an entry of L at x~ = N/D; it is of degree at most 1 in x~."""
-        names = [letters[name] for name in data.variables] + [f"N{k}" for k in range(n)]
-        names += [letters[name] for name in data.names[n:]]
-        pieces = []
-        for exponents, coefficient in entry.terms():
-            powers = [f"{a}{to.power}{k}" for a, k in zip(names, exponents, strict=True) if k]
-            powers += [] if any(exponents[n : 2 * n]) else ["D"]
-            pieces.append("*".join([f"({coefficient})", *powers]))
-        return " + ".join(pieces) or "0"
-
-    def matrix(rows: Sequence[Sequence[str]]) -> str:
-        if n == 1 and to is GP:  # [a] would be a vector
-            return f"Mat({rows[0][0]})"
-        return to.matrix.format(to.next_row.join(", ".join(row) for row in rows))
-
-    names = [letters[name] for name in (*data.names, *data.new)]
-    lines = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
-    lines.append(
-        to.start.format(
-            letters=", ".join(names),
-            names=",".join(names),
-            variables=", ".join(old),
-            dim=n,
-            matrix=matrix([[text(entry) for entry in row[:-1]] for row in data.rows]),
-            right=", ".join(text(row[-1]) for row in data.rows),
-            numerators=", ".join(map(text, data.numerators)),
-            determinant=text(data.determinant),
-        )
-    )
+    script = _Script(to, data)
+    has_three_points = any(isinstance(claim, OrbitIntegral) for claim in claims)
+    script.map(has_three_points, any(claim.is_at_image for claim in claims))
+    script.lines.append("")
     for claim in claims:
-        label = re.sub(r"[^\w ~^*/+()-]", "_", claim.name)
-        is_conserved = isinstance(claim, ConservedFunction)
-        says = "P/Q is an integral" if is_conserved else "dx/phi is invariant, phi = P/Q"
-        lines.append(f"{to.comment}{label}: {says}; k = {claim.degree}")
-        for name, polynomial in (("P", claim.numerator), ("Q", claim.denominator)):
-            lines.append(to.definition.format(name, f"({text(polynomial)})"))
-            lines.append(to.definition.format(f"{name}h", f"({homogeneous(polynomial, claim.degree)})"))
-            lines.append(_check(to, f"{label}: {name}h = {name} at h = 1", f"{to.at_one.format(name + 'h')} == {name}"))
-        if isinstance(claim, ConservedFunction):
-            lines.append(to.definition.format("C", f"({text(claim.cofactor)})"))
-            lines.append(_check(to, f"{label}: C is not 0", "C != 0"))
-            for name in "PQ":
-                lines.append(_check(to, f"{label}: D^k {name}(N/D) = C {name}", f"image({name}h) == C*{name}"))
-        else:
-            lines.append(_check(to, "D = det M", "D == det(M)"))
-            if claim.is_free:
-                entries = [[text(entry) for entry in row] for row in claim.derivative]
-                for name, polynomial in (("Py", claim.numerator), ("Qy", claim.denominator)):
-                    at_new = [letters[name] for name in (*data.new, *data.names[n:])]
-                    lines.append(to.definition.format(name, f"({polynomial_text(polynomial, at_new, '*', to.power)})"))
-                says, identity = "for any x and x~", "Py*Q*D == P*Qy*det(L)"
-            else:
-                lines += [f"N{k} = N[{k if to is PYTHON else k + 1}]" + ";" * (to is GP) for k in range(n)]
-                entries = [[at_numerators(entry) for entry in row] for row in claim.derivative]
-                says, identity = "at x~ = N/D", f"image(Ph)*Q*D{to.power}(n + 1) == P*image(Qh)*det(L)"
-            lines.append(f"L = {matrix(entries)}" + ";" * (to is GP))
-            lines.append(_check(to, f"{label}: phi(x~) det M = phi(x) det L(x, x~) {says}", identity))
-        lines.append("")
-    lines.append(to.end)
-    return "\n".join(lines) + "\n"
-
-
-def _check(to: Language, label: str, identity: str) -> str:
-    return f'check("{label}", {identity})' + ";" * (to is GP)
+        script.claim(claim)
+    used = set(re.findall(r"\w+", "\n".join(script.lines)))
+    used |= {other for name in used for other in _NEEDS.get(name, ())}
+    names = [letter for name, letter in script.letters.items() if has_three_points or name[:-1] not in data.new]
+    top = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
+    top.append(to.start.format(letters=", ".join(names), names=",".join(names)) if to is PYTHON else to.start)
+    for name, text in to.tools.items():
+        if name in used:
+            top += ["", text, ""] if to is PYTHON else [text]
+    return "\n".join([*top, *script.lines, to.end]) + "\n"

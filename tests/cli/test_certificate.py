@@ -29,3 +29,16 @@ def test_a_system_of_which_nothing_is_known_is_refused_with_what_to_type(kahanma
     outcome = kahanmaps("certificate lorenz --for gp")
     assert outcome.status == 2
     assert "kahanmaps find-integrals lorenz --toml" in outcome.err
+
+
+def test_all_certifies_what_searches_prove(kahanmaps):
+    outcome = kahanmaps("certificate lotka_volterra --for gp --all")
+    assert outcome.status == 0
+    for says in (
+        "volume: dx/phi is invariant",
+        "P: the map is Poisson",
+        "D1: P is a Darboux",
+        "T1: x -> T is a symmetry",
+    ):
+        assert says in outcome.out
+    assert kahanmaps("certificate lotka_volterra --for gp --all --claim volume").status == 2
