@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import combinations
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.fields import integer
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
+from kahanmaps.certificates.chains import commuting, periodic
 from kahanmaps.certificates.combinations import affine_symmetry, bilinear_integral, modified_hamiltonian
 from kahanmaps.certificates.identities import (
     Claim,
@@ -22,19 +25,21 @@ from kahanmaps.certificates.identities import (
 )
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
-from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.settings import claimed_functions
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
+from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.laboratory import separated
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 from kahanmaps.languages.formulas import Formulas
-from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 
 CHECKERS: dict[str, Callable[..., str]] = {
     "rocq": rocq_certificate,
@@ -43,6 +48,7 @@ CHECKERS: dict[str, Callable[..., str]] = {
 }
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
 TENSOR = "poisson"
+ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
 
 
 def certificate(
@@ -52,6 +58,8 @@ def certificate(
     integrals: Mapping[str, Any] | Any = None,
     *,
     everything: bool = False,
+    commute: SystemLike | None = None,
+    period: int | None = None,
     command: str = "",
 ) -> str:
     """Write a proof that another program checks: integrals, and the invariant volume form, for every eps.
@@ -65,6 +73,10 @@ def certificate(
             need no search, or for `integrals` alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         everything: also search, for all of these.
+        commute: another system or map, in the same variables: certify that the two maps commute. For members of the
+            commuting family this is written in coordinates in which the planes separate; "associates" stands for all
+            pairs of rational associated systems.
+        period: certify that this iterate of the map is the identity.
         command: the command line that writes this script, for the comment on top.
 
     Returns:
@@ -91,14 +103,21 @@ def certificate(
         raise InputError(
             f"{file.name} is a {formulas.map.kind}: expected a single map, write one file for each of them"
         )
-    names = (*formulas.names, "eps")
-    data = map_data(formulas.equation, formulas.variables, formulas.new, names)
+    data = _map_data(formulas)
+    chains: list[Claim] = []
+    if period is not None:
+        chains.append(periodic(data, _positive(period)))
+    if commute is not None:
+        data, pair = _commuting(file, data, commute)
+        chains += pair
+        if period is not None or claims is not None or integrals is not None or everything:
+            raise InputError("a certificate that two maps commute goes without other claims")
     further = {} if integrals is None else claimed_functions(file, integrals)
-    proved: list[Claim] = [conserved_function(data, name, function) for name, function in further.items()]
+    proved = chains + [conserved_function(data, name, function) for name, function in further.items()]
     known = dict(_known_claims(formulas, data))
     searches = {name: partial(search, file, data) for name, search in _SEARCHES.items() if name not in known}
     if claims is None:
-        claims = [] if further and not everything else [*known, *(searches if everything else ())]
+        claims = [] if (further or chains) and not everything else [*known, *(searches if everything else ())]
         is_required = False
     else:
         is_required = True
@@ -128,6 +147,49 @@ def certificate(
     )
 
 
+def _map_data(formulas: Formulas) -> MapData:
+    return map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+
+
+def _positive(period: Any) -> int:
+    if integer(period, "period") < 1:
+        raise InputError(f"found period = {period}, expected a positive integer")
+    return integer(period, "period")
+
+
+def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> tuple[MapData, list[Claim]]:
+    """The map that the claims are about, and the claims: maps commute, in separate coordinates if there are any."""
+    if isinstance(other, str) and other == ASSOCIATES:
+        if file.member is None:
+            raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
+        others = [associate.system for associate in listed_associates(file.member)]
+        maps: list[MapFamily] = [as_map(system) for system in others]
+    else:
+        second = as_file(other)
+        g, _ = matched(file, second)
+        if g.variables != file.map.variables or not hasattr(g, "rows") or g.symbols:
+            raise InputError(f"expected two single maps in the same variables, got {file.name} and {second.name}")
+        maps = [file.map, g]
+
+    def of(map_: MapFamily) -> MapData:
+        rows = [[*row[:-1], -row[-1]] for row in map_.rows]
+        return map_data(rows, data.variables, data.new, data.names)
+
+    claims: list[Claim] = []
+    given = [of(map_) for map_ in maps]
+    separate = separated(file.system) if file.is_quadratic else None
+    if separate is not None and all(isinstance(map_, KahanFamily) for map_ in maps):
+        T, zero = separate.T, [fmpq(0)] * file.dim
+        moved = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
+        in_planes = [of(as_map(system)) for system in moved]
+        pairs = enumerate(zip(in_planes, given, strict=True), 1)
+        claims += [affine_symmetry(z, f"coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
+        given = in_planes
+    pairs_of = combinations(range(len(given)), 2)
+    claims += [commuting(f"maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
+    return given[0], claims
+
+
 def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Callable[[], Claim]]]:
     """What the file claims, or theorems give: by name the functions that find the identities."""
     for name, function in formulas.integrals.items():
@@ -141,7 +203,7 @@ def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Call
         yield VOLUME, partial(invariant_volume, data, VOLUME, formulas.density)
     elif H is not None:
         yield VOLUME, lambda: invariant_volume(data, VOLUME, _polynomial(data.determinant))
-    if file.hamiltonian is not None and theorems.poisson_tensor_invariant(file.hamiltonian, file.member) is not None:
+    if file.hamiltonian is not None and poisson_tensor_invariant(file.hamiltonian, file.member) is not None:
         yield TENSOR, lambda: invariant_tensor(data, TENSOR, _hamiltonian_tensor(formulas))
 
 

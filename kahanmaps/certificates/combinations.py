@@ -47,8 +47,14 @@ class OrbitIntegral(Claim):
 
 @dataclass(frozen=True)
 class AffineSymmetry(Claim):
-    """T(x) = `image`/`divisor`: `multiple` e(T x, T y) = `matrix` e(x, y), e(T y, T x) if `reversing`."""
+    """T(x) = `image`/`divisor`: `multiple` e(T x, T y) = `matrix` e(x, y), e(T y, T x) if `reversing`.
 
+    The left e is that of `target`, the right one that of `source`: the same map for a symmetry, else T takes one map to
+    the other.
+    """
+
+    source: MapData
+    target: MapData
     image: Row
     divisor: int
     matrix: tuple[tuple[int, ...], ...]
@@ -134,17 +140,24 @@ def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
     return _orbit_integral(data, name, form(0, n), form(n, 2 * n), gens[-1], [-c for c in times(2 * n)], times(0))
 
 
-def affine_symmetry(data: MapData, name: str, S: fmpq_mat, shift: Sequence[fmpq], reversing: bool) -> AffineSymmetry:
-    """The identity for T(x) = S x + shift. Raises FalseClaim if T is no symmetry or reversing symmetry."""
+def affine_symmetry(
+    data: MapData, name: str, S: fmpq_mat, shift: Sequence[fmpq], reversing: bool = False, target: MapData | None = None
+) -> AffineSymmetry:
+    """The identity for T(x) = S x + shift, which takes the map to the target, by default to itself, or its inverse.
+
+    Raises:
+        FalseClaim: if it does not.
+    """
+    target = target or data
     n, names = data.dim, (*data.variables, *data.new, *data.names[data.dim :])
     context = ring(names)
     gens = context.gens()
     divisor = lcm(*(int(entry.q) for entry in (*S.entries(), *shift)))
     at = [[_affine(S, shift, gens[k : k + n], i) for i in range(n)] for k in (0, n)]
     first, second = reversed(at) if reversing else at
-    moved = [P.compose(*first, *second, *gens[2 * n :], ctx=context) for P in residual(data, names, 0, n)]
-    scale = row_multiples(data)
-    K = [[(-1 if reversing else 1) * S[i, j] * scale[i] / scale[j] for j in range(n)] for i in range(n)]
+    moved = [P.compose(*first, *second, *gens[2 * n :], ctx=context) for P in residual(target, names, 0, n)]
+    scale, own_scale = row_multiples(target), row_multiples(data)
+    K = [[(-1 if reversing else 1) * S[i, j] * scale[i] / own_scale[j] for j in range(n)] for i in range(n)]
     multiple = lcm(*(int(entry.q) for row in K for entry in row))
     matrix = tuple(tuple(int(entry * multiple) for entry in row) for row in K)
     own = residual(data, names, 0, n)
@@ -154,7 +167,7 @@ def affine_symmetry(data: MapData, name: str, S: fmpq_mat, shift: Sequence[fmpq]
     image = tuple(
         ring(data.names).constant(0) + divisor * _affine(S, shift, ring(data.names).gens(), i) for i in range(n)
     )
-    return AffineSymmetry(name, image, divisor, matrix, multiple, reversing)
+    return AffineSymmetry(name, data, target, image, divisor, matrix, multiple, reversing)
 
 
 def _affine(S: fmpq_mat, shift: Sequence[fmpq], letters: Sequence[fmpq_mpoly], i: int) -> fmpq_mpoly:

@@ -14,7 +14,8 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of, ring
-from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral
+from kahanmaps.certificates.chains import Chain
+from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral, residual
 from kahanmaps.certificates.identities import (
     Claim,
     ConservedFunction,
@@ -42,7 +43,7 @@ class _Script:
 
     def __init__(self, data: MapData) -> None:
         self.data, self.is_solved = data, False
-        self.letters = letters_of(data, r"[aelmnpr]\d+")  # a11, e1, ... are the script's own
+        self.letters = letters_of(data, r"[ad-hlmnprw]\d+")  # a11, e1, ... are the script's own
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
         self.third = [self.letters[f"{name}2"] for name in data.new]
@@ -63,16 +64,122 @@ class _Script:
         letters = [self.letters[name] for name in self.data.names[self.data.dim :]]
         return [f"Variables {' '.join(letters)} : R."] if letters else []
 
-    def predicate(self) -> list[str]:
+    def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
         """The equation of the map as a relation between any two points, with the residuals e1, e2, ..."""
-        data, n = self.data, self.data.dim
-        arguments = " ".join([*self.old, *self.new])
-        lines = [*self.constants, "", "(* The equation of the map, M x~ - r = 0: `maps` x x~ says that it holds. *)"]
-        for i, row in enumerate(data.rows):
+        rows, arguments = (data or self.data).rows, " ".join([*self.old, *self.new])
+        lines = [f"(* The equation of the map, M x~ - r = 0: `{relation}` x x~ says that it holds. *)"]
+        for i, row in enumerate(rows):
             terms = [f"({self.text(entry)}) * {name}" for entry, name in zip(row[:-1], self.new, strict=True) if entry]
-            lines.append(f"Definition e{i + 1} ({arguments} : R) : R := {' + '.join(terms)} - ({self.text(row[-1])}).")
-        equations = " /\\ ".join(f"e{i + 1} {arguments} = 0" for i in range(n))
-        return [*lines, f"Definition maps ({arguments} : R) : Prop := {equations}."]
+            total = f"{' + '.join(terms)} - ({self.text(row[-1])})"
+            lines.append(f"Definition {letter}{i + 1} ({arguments} : R) : R := {total}.")
+        equations = " /\\ ".join(f"{letter}{i + 1} {arguments} = 0" for i in range(len(rows)))
+        return [*lines, f"Definition {relation} ({arguments} : R) : Prop := {equations}."]
+
+    def unique(self, letter: str, data: MapData) -> list[str]:
+        """The lemma that a point has one image where det M is not 0, by the adjugate of M."""
+        n, x, y = data.dim, " ".join(self.old), " ".join(self.new)
+        z = " ".join(self.third)
+        goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.new, self.third, strict=True))
+        residuals = " ".join(f"{letter}{j + 1}" for j in range(n))
+        lines = [
+            f"Definition {letter}_det ({x} : R) : R := {self.text(data.determinant)}.",
+            f"Lemma {letter}_unique : forall {x} {y} {z}, {letter}_det {x} <> 0 ->",
+            f"  {letter}_maps {x} {y} -> {letter}_maps {x} {z} -> {goal}.",
+            f"Proof. intros {x} {y} {z} H {self.hypothesis('A')} {self.hypothesis('B')}.",
+        ]
+        for i, row in enumerate(data.adjugate):
+            terms = [
+                f"({self.text(a)}) * ({letter}{j + 1} {x} {y} - {letter}{j + 1} {x} {z})"
+                for j, a in enumerate(row)
+                if a
+            ]
+            steps = f"apply (Rmult_eq_reg_l ({letter}_det {x})); [apply Rminus_diag_uniq |assumption]. "
+            steps += f"transitivity ({' + '.join(terms)}); [cbv delta [{letter}_det {residuals}] beta; ring |"
+            steps += f" rewrite {', '.join(f'?{k}{j + 1}' for k in 'AB' for j in range(n))}; ring]."
+            lines.append(f"  split. {{ {steps} }}" if i < n - 1 else f"  {steps}")
+        return [*lines, "Qed."]
+
+    def chain(self, claim: Chain, theorem: str) -> list[str]:
+        """The theorem that two points at the ends of chains of images are equal."""
+        n, lines = self.data.dim, list[str]()
+        for letter, data in claim.maps.items():
+            lines += [*self.predicate(letter, f"{letter}_maps", data), *self.unique(letter, data)]
+        lines += [f"Variables {' '.join(self.old)} : R.  (* a point x *)"]
+        points, denominators = [self.old], [[""] * n]
+        for v, value in enumerate(claim.values[1:], 1):
+            for i, P in enumerate(value.numerators):
+                lines.append(f"Definition w{v}_{i + 1} : R := {self.text(P)}.")
+            for k, Q in enumerate(value.denominators):
+                lines += [
+                    f"Definition d{v}_{k + 1} : R := {self.text(Q)}.",
+                    f"Hypothesis h{v}_{k + 1} : d{v}_{k + 1} <> 0.",
+                ]
+            points.append([f"w{v}_{i + 1}" for i in range(n)])
+            denominators.append([f"d{v}_{k + 1}" for k in value.which])
+        texts = [
+            " ".join(f"({a} / {q})" if q else a for a, q in zip(point, dens, strict=True))
+            for point, dens in zip(points, denominators, strict=True)
+        ]
+        defined = " ".join(dict.fromkeys(name for names in (*points[1:], *denominators) for name in names if name))
+        for k, (letter, source, v) in enumerate(claim.arrows, 1):
+            s, data = claim.value_of(source), claim.maps[letter]
+            names = (*data.variables, *data.new, *data.names[n:])
+            for i, residual_i in enumerate(residual(data, names, 0, n)):
+                moved, powers = self._without_denominators(
+                    residual_i, [*points[s], *points[v]], [*denominators[s], *denominators[v]]
+                )
+                lines += [
+                    f"Lemma arrow{k}_{i + 1} : {letter}{i + 1} {texts[s]} {texts[v]} = 0.",
+                    "Proof.",
+                    f"  transitivity (({moved}) / ({powers})).",
+                    f"  - unfold {letter}{i + 1}. field. repeat split; assumption.",
+                    f"  - replace ({moved}) with 0; [unfold Rdiv; ring |].",
+                    f"    cbv delta [{defined}] beta; ring.",
+                    "Qed.",
+                ]
+            proofs = [f"exact arrow{k}_{i + 1}" for i in range(n)]
+            steps = " ".join(f"split; [{proof} |]." for proof in proofs[:-1])
+            lines.append(f"Lemma arrow{k} : {letter}_maps {texts[s]} {texts[v]}. Proof. {steps} {proofs[-1]}. Qed.")
+        nodes = [self.old, *([f"{a}_p{k}" for a in self.old] for k in range(1, len(claim.arrows) + 1))]
+        hypotheses, proof = [], []
+        for k, (letter, source, _) in enumerate(claim.arrows, 1):
+            before, after = " ".join(nodes[source]), " ".join(nodes[k])
+            hypotheses.append(f"  {letter}_det {before} <> 0 -> {letter}_maps {before} {after} ->")
+            proof.append(f"  intros D M. destruct ({letter}_unique _ _ D M arrow{k}) as {self.hypothesis('A')}.")
+            proof[-1] = proof[-1].replace("_unique _ _", "_unique" + " _" * (3 * n))
+            proof.append(f"  subst {after}. clear D M.")
+        i, j = claim.says
+        conclusion = " /\\ ".join(f"{a} = {b}" for a, b in zip(nodes[i], nodes[j], strict=True))
+        return [
+            *lines,
+            f"Theorem {theorem} : forall {' '.join(name for node in nodes[1:] for name in node)},",
+            *hypotheses,
+            f"  {conclusion}.",
+            f"Proof. intros {' '.join(name for node in nodes[1:] for name in node)}.",
+            *proof,
+            "  repeat (split; [reflexivity |]). reflexivity.",
+            "Qed.",
+        ]
+
+    def _without_denominators(
+        self, polynomial: fmpq_mpoly, numerators: Sequence[str], denominators: Sequence[str]
+    ) -> tuple[str, str]:
+        """The value of a polynomial at fractions, as a numerator and a product of powers of denominators."""
+        distinct = [q for q in dict.fromkeys(denominators) if q]
+        count = len(numerators)
+        constants = [self.letters[name] for name in names_of(polynomial)[count:]]
+        rows = [([int(e) for e in exponents], c) for exponents, c in polynomial.terms()]
+
+        def degree(row: Sequence[int], q: str) -> int:
+            return sum(e for e, other in zip(row[:count], denominators, strict=True) if other == q)
+
+        powers = {q: max((degree(row, q) for row, _ in rows), default=0) for q in distinct}
+        pieces = []
+        for row, coefficient in rows:
+            factors = [*zip([*numerators, *constants], row, strict=True)]
+            factors += [(q, power - degree(row, q)) for q, power in powers.items()]
+            pieces.append(" * ".join([f"({coefficient})", *(a if e == 1 else f"{a} ^ {e}" for a, e in factors if e)]))
+        return " + ".join(pieces), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
 
     def hypothesis(self, letter: str) -> str:
         """The pattern that takes the hypothesis `maps` apart: (A1 & A2)."""
@@ -88,6 +195,7 @@ class _Script:
         terms += [f"({self.text(c)}) * {e} {y} {z}" for c, e in zip(claim.second, residuals, strict=True) if c]
         rewriting = ", ".join(f"?{letter}{i + 1}" for letter in "AB" for i in range(n))
         return [
+            *self.predicate(),
             "(* value x x~ = num x x~ / den is an integral. *)",
             f"Definition num ({x} {y} : R) : R := {self.text(claim.numerator)}.",
             f"Definition den : R := {self.text(claim.denominator)}.",
@@ -104,23 +212,26 @@ class _Script:
         ]
 
     def symmetric(self, claim: AffineSymmetry, theorem: str) -> list[str]:
-        """The theorem that x -> T x takes the map to itself or to its inverse."""
-        n = self.data.dim
+        """The theorem that x -> T x takes the map to itself, to its inverse, or to another map."""
+        n, is_own = self.data.dim, claim.target is claim.source
         x, y = " ".join(self.old), " ".join(self.new)
         polynomials = self.data.at_points(*claim.image)
         points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
         first, second = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
+        target, letters = ("maps", "e") if is_own else ("target", "ef")
         lines = [
-            f"(* {'Reversing symmetry' if claim.reversing else 'Symmetry'} T: {', '.join(points[0])} *)",
+            *self.predicate(data=claim.source),
+            *([] if is_own else self.predicate("f", target, claim.target)),
+            f"(* {'To the inverse' if claim.reversing else 'Map to map'} by T: {', '.join(points[0])} *)",
             f"Theorem {theorem} : forall {x} {y}, maps {x} {y} ->",
-            f"  maps {first} {second}.",
+            f"  {target} {first} {second}.",
             "Proof.",
             f"  intros {x} {y} {self.hypothesis('A')}.",
         ]
         for i, row in enumerate(claim.matrix):
             terms = [f"({c}) * e{j + 1} {x} {y}" for j, c in enumerate(row) if c]
             steps = f"transitivity (({' + '.join(terms) or '0'}) / {claim.multiple}); "
-            steps += f"[cbv delta [{' '.join(f'e{j + 1}' for j in range(n))}] beta; field |"
+            steps += f"[cbv delta [{' '.join(f'{k}{j + 1}' for k in letters for j in range(n))}] beta; field |"
             steps += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
             lines.append(f"  split; [{steps[:-1]} |]." if i < n - 1 else f"  {steps}")
         return [*lines, "Qed."]
@@ -401,15 +512,18 @@ def rocq_certificate(data: MapData, claims: Sequence[Claim], header: Sequence[st
         InvariantTensor: (_Script.poisson, "poisson"),
         OrbitIntegral: (_Script.along_orbit, "conserved"),
         AffineSymmetry: (_Script.symmetric, "symmetry"),
+        Chain: (_Script.chain, "everywhere"),
     }
     for k, claim in enumerate(claims, 1):
         prove, ending = proofs[type(claim)]
         name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
         theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
         script = _Script(data)
-        is_relation = isinstance(claim, OrbitIntegral | AffineSymmetry)
         lines += [f"Module Claim{k}.", "Section Map."]
-        lines += [*(script.predicate() if is_relation else script.map(claim.is_at_image)), ""]
+        if isinstance(claim, Chain | OrbitIntegral | AffineSymmetry):
+            lines += script.constants
+        else:
+            lines += [*script.map(claim.is_at_image), ""]
         proof = prove(script, claim, theorem)
         theorems += [f"Claim{k}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
         lines += [*proof, "End Map.", f"End Claim{k}.", ""]

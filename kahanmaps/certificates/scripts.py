@@ -15,6 +15,7 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.certificates.chains import Chain
 from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral
 from kahanmaps.certificates.identities import (
     Claim,
@@ -35,7 +36,9 @@ check(text, holds) = { print(text, ": ", if(holds, "true", "FALSE")); if(!holds,
 """
 _PARI_TOOLS = {
     "put": "put(A, letters, values) = substvec(A, letters, values);",
+    "at": "at(A, letters, P, Q) = substvec(A, letters, vector(#P, i, P[i]/Q[i]));  \\\\ at the point P/Q",
     "det": "det(A) = matdet(A);",
+    "product": "product(v) = vecprod(v);",
     "mul": "mul(A, B) = A*B;",
     "transposed": "transposed(A) = A~;",
     "scale": "scale(c, A) = c*A;",
@@ -71,9 +74,26 @@ def check(text, holds):
     print(f"{{text}}: {{'true' if holds else 'FALSE'}}")
 """
 _PYTHON_TOOLS = {
+    "at": """\
+def at(A, letters, P, Q):  # A at the point P/Q, times powers of the denominators
+    if isinstance(A, list):
+        return [at(a, letters, P, Q) for a in A]
+    assert all(q != 0 for q in Q)
+    places, distinct, total = [R.gens.index(letter) for letter in letters], list(set(Q)), R.zero
+    degrees = {e: [sum(e[p] for p, q in zip(places, Q) if q == d) for d in distinct] for e, _ in A.terms()}
+    largest = [max(column) for column in zip(*degrees.values())]
+    for e, coefficient in A.terms():
+        rest = tuple(0 if p in places else k for p, k in enumerate(e))
+        factors = [value ** e[p] for p, value in zip(places, P)]
+        factors += [d ** (a - b) for d, a, b in zip(distinct, largest, degrees[e])]
+        total += prod(factors, start=R({rest: coefficient}))
+    return total""",
     "put": """\
 def put(A, letters, values):
     return [put(a, letters, values) for a in A] if isinstance(A, list) else A.compose(list(zip(letters, values)))""",
+    "product": """\
+def product(v):
+    return prod(v, start=R.one)""",
     "det": """\
 def det(A):
     n, total = len(A), R.zero
@@ -137,12 +157,12 @@ class Language:
 
 
 GP = Language(
-    _PARI, _PARI_TOOLS, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "[{}]", "; ", "(M*new~ - r~)~"
+    _PARI, _PARI_TOOLS, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "[{}]", "; ", "(M{0}*new~ - r{0}~)~"
 )  # fmt: skip
 PYTHON = Language(
     _PYTHON, _PYTHON_TOOLS, "sys.exit(not all(results))", "python FILE (needs SymPy)", "**", "# ", "{} = {}",
     "[one*a for a in [{}]]", "[[one*a for a in row] for row in [[{}]]]", "], [",
-    "[sum(a*b for a, b in zip(row, new)) - c for row, c in zip(M, r)]",
+    "[sum(a*b for a, b in zip(row, new)) - c for row, c in zip(M{0}, r{0})]",
 )  # fmt: skip
 
 
@@ -188,23 +208,55 @@ class _Script:
         identity = identity.replace("^", self.to.power)
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
 
-    def map(self, has_three_points: bool, is_solved: bool) -> None:
-        """The equation, the points, and the solution of the equation."""
-        data = self.data
-        self.define("n", str(data.dim))
-        points = {"old": data.variables, "new": data.new}
-        points |= {"third": [f"{name}2" for name in data.new]} if has_three_points else {}
-        for name, letters in points.items():
+    def points(self, count: int) -> None:
+        """The letters of x, x~ and, if requested, of the image of x~."""
+        self.define("n", str(self.data.dim))
+        points = {"old": self.data.variables, "new": self.data.new, "third": [f"{name}2" for name in self.data.new]}
+        for name, letters in [*points.items()][:count]:
             self.define(name, f"[{', '.join(self.letters[letter] for letter in letters)}]")
-        self.define("M", self.polynomials([row[:-1] for row in data.rows]))
-        self.define("r", self.vector([row[-1] for row in data.rows]))
-        self.define("E", self.to.residual)
+
+    def equation(self, data: MapData, letter: str = "") -> None:
+        """M, r and E = M x~ - r, with the letter behind their names."""
+        self.define(f"M{letter}", self.polynomials([row[:-1] for row in data.rows]))
+        self.define(f"r{letter}", self.vector([row[-1] for row in data.rows]))
+        self.define(f"E{letter}", self.to.residual.format(letter))
         self.lines[-1] += f"  {self.to.comment}0 where new is the image of old"
-        if is_solved:
-            self.define("N", self.vector(data.numerators))
-            self.polynomial("D", data.determinant)
-            self.check("D is not 0", "D != 0")
-            self.check("M N = D r", "act(M, N) == scale(D, r)")
+
+    def solution(self) -> None:
+        """N and D."""
+        self.define("N", self.vector(self.data.numerators))
+        self.polynomial("D", self.data.determinant)
+        self.check("D is not 0", "D != 0")
+        self.check("M N = D r", "act(M, N) == scale(D, r)")
+
+    def chain(self, claim: Chain) -> None:
+        """The checks that each point is the image of its preimage."""
+        names = list[tuple[str, str]]()
+        for letter, data in claim.maps.items():
+            self.equation(data, letter)
+        for v, value in enumerate(claim.values):
+            names.append((f"P{v}", f"Q{v}"))
+            self.define(f"P{v}", self.vector(value.numerators))
+            self.define(f"Q{v}", self.vector([value.denominators[k] for k in value.which]))
+        self.define("zero", self.vector([self.data.rows[0][0] * 0] * self.data.dim))
+        for k, (letter, source, v) in enumerate(claim.arrows, 1):
+            (P, Q), (P_image, Q_image) = names[claim.value_of(source)], names[v]
+            points = f"concat({P}, {P_image}), concat({Q}, {Q_image})"
+            says = f"point {k}, {P_image}/{Q_image}, is the image of point {source} under {letter}"
+            self.check(says, f"at(E{letter}, concat(old, new), {points}) == zero")
+            says = f"det M is not 0 at point {source}"
+            eps = self.letters[self.data.names[-1]]
+            determinant = claim.maps[letter].determinant
+            if determinant.subs({"eps": 0}).is_constant():  # a Kahan map: det M is 1 at eps = 0, wherever it is taken
+                self.check(f"{says}, as eps -> 0", f"put(det(M{letter}), [{eps}], [0*{eps}]) != 0")
+                self.check(f"point {source} is defined as eps -> 0", f"put(product({Q}), [{eps}], [0*{eps}]) != 0")
+            else:
+                self.check(says, f"at(det(M{letter}), old, {P}, {Q}) != 0")
+        i, j = claim.says
+        self.lines.append(
+            f"{self.to.comment}So points {i} and {j} are equal: both are P{claim.value_of(i)}/Q{claim.value_of(j)}."
+        )
+        self.lines.append("")
 
     def claim(self, claim: Claim) -> None:
         """The definitions and checks of a claim."""
@@ -215,7 +267,7 @@ class _Script:
             InvariantVolume: ("dx/phi is invariant, phi = P/Q", self._volume),
             InvariantTensor: ("the map is Poisson for the tensor P/Q", self._tensor),
             OrbitIntegral: ("P(x, x~)/Q is an integral", self._along_orbit),
-            AffineSymmetry: ("x -> T is a symmetry, or takes the map to its inverse", self._symmetry),
+            AffineSymmetry: ("x -> T takes the map to itself, its inverse or another map", self._symmetry),
         }[type(claim)]
         self.lines.append(f"{self.to.comment}{label}: {says}")
         prove(claim, label)
@@ -278,9 +330,13 @@ class _Script:
         self.define("T", f"scale({part}, {self.vector(claim.image)})")
         self.define("Y", "put(T, old, new)")
         self.define("K", self.matrix([[str(entry) for entry in row] for row in claim.matrix]))
+        for letter, data in (("s", claim.source), ("t", claim.target)):
+            if data is not self.data:
+                self.equation(data, letter)
+        E, target = (f"E{'' if data is self.data else k}" for k, data in (("s", claim.source), ("t", claim.target)))
         pair, points = ("Y, T", "(T y, T x)") if claim.reversing else ("T, Y", "(T x, T y)")
-        identity = f"scale({claim.multiple}, put(E, concat(old, new), concat({pair}))) == act(K, E)"
-        self.check(f"{label}: E{points} is a combination of E(x, y)", identity)
+        identity = f"scale({claim.multiple}, put({target}, concat(old, new), concat({pair}))) == act(K, {E})"
+        self.check(f"{label}: {target}{points} is a combination of {E}(x, y)", identity)
 
     def fraction(self, claim: Any) -> None:
         """The numerator P and the denominator Q."""
@@ -300,10 +356,19 @@ def script_certificate(to: Language, data: MapData, claims: Sequence[Claim], hea
     """
     script = _Script(to, data)
     has_three_points = any(isinstance(claim, OrbitIntegral) for claim in claims)
-    script.map(has_three_points, any(claim.is_at_image for claim in claims))
+    script.points(2 + has_three_points)
+    if not all(
+        isinstance(claim, Chain) or (isinstance(claim, AffineSymmetry) and claim.source is not data) for claim in claims
+    ):
+        script.equation(data)
+    if any(claim.is_at_image for claim in claims):
+        script.solution()
     script.lines.append("")
     for claim in claims:
-        script.claim(claim)
+        if isinstance(claim, Chain):
+            script.chain(claim)
+        else:
+            script.claim(claim)
     used = set(re.findall(r"\w+", "\n".join(script.lines)))
     used |= {other for name in used for other in _NEEDS.get(name, ())}
     names = [letter for name, letter in script.letters.items() if has_three_points or name[:-1] not in data.new]

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.certificates.certificate import _SEARCHES, CHECKERS, _known_claims, certificate
+from kahanmaps.certificates.certificate import _SEARCHES, CHECKERS, _commuting, _known_claims, _map_data, certificate
+from kahanmaps.certificates.chains import Chain, periodic
 from kahanmaps.certificates.combinations import (
     AffineSymmetry,
     OrbitIntegral,
@@ -119,6 +120,50 @@ def test_each_kind_of_claim_is_accepted_and_refused_with_one_coefficient_changed
     data, (claim,) = claims_of(name, kind)
     assert run(checker, CHECKERS[checker](data, [claim]), tmp_path).returncode == 0
     assert run(checker, CHECKERS[checker](data, [changed(claim)]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+@pytest.mark.parametrize(
+    ("system", "other"),
+    [
+        ("x' = y; y' = -x", "x' = 2*y; y' = -2*x"),
+        pytest.param("paper_m2", "associates", marks=pytest.mark.slow),
+        pytest.param("paper_m3", "associates", marks=pytest.mark.slow),
+    ],
+)
+def test_commuting_maps_are_accepted_and_refused_with_one_coefficient_changed(system, other, checker, tmp_path):
+    file = load(system) if other == "associates" else System(system)
+    data, claims = _commuting(file, _map_data(Formulas(file)), other if other == "associates" else System(other))
+    claims = [*[claim for claim in claims if not isinstance(claim, Chain)][:2], claims[-1]]
+    assert run(checker, CHECKERS[checker](data, claims), tmp_path).returncode == 0
+    chain = claims[-1]
+    point = chain.values[-1]
+    wrong = replace(point, numerators=(point.numerators[0] + 1, *point.numerators[1:]))
+    false = replace(chain, values=(*chain.values[:-1], wrong))
+    assert run(checker, CHECKERS[checker](data, [false]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
+    file = load("lyness", {"a": 1})
+    text = certificate(file, checker, period=5)
+    assert run(checker, text, tmp_path).returncode == 0
+    data = _map_data(Formulas(file))
+    chain = periodic(data, 5)
+    wrong = replace(chain.values[2], numerators=(chain.values[2].numerators[0] + 1, *chain.values[2].numerators[1:]))
+    values = (*chain.values[:2], wrong, *chain.values[3:])
+    assert run(checker, CHECKERS[checker](data, [replace(chain, values=values)]), tmp_path).returncode != 0
+
+
+def test_maps_that_do_not_commute_and_false_periods_have_no_certificate():
+    with pytest.raises(FalseClaim, match="maps_1_and_2_commute: the maps do not commute"):
+        certificate(System("x' = y; y' = -x"), "gp", commute=System("x' = 2*x; y' = x"))
+    with pytest.raises(FalseClaim, match="iterate 4 is not the identity"):
+        certificate(load("lyness", {"a": 1}), "gp", period=4)
+    with pytest.raises(InputError, match="expected a member of the commuting family"):
+        certificate(load("euler_top"), "gp", commute="associates")
+    with pytest.raises(InputError, match="same dimension"):
+        certificate(load("euler_top"), "gp", commute=load("harmonic"))
 
 
 def test_jacobi_identities_are_checked_for_a_tensor_that_is_invariant_but_not_poisson(tmp_path):

@@ -38,7 +38,21 @@ def test_all_certifies_what_searches_prove(kahanmaps):
         "volume: dx/phi is invariant",
         "P: the map is Poisson",
         "D1: P is a Darboux",
-        "T1: x -> T is a symmetry",
+        "T1: x -> T takes the map to itself",
     ):
         assert says in outcome.out
     assert kahanmaps("certificate lotka_volterra --for gp --all --claim volume").status == 2
+
+
+def test_commuting_maps_and_periods(kahanmaps):
+    first = kahanmaps("""certificate "x' = y; y' = -x" --for gp --commute "x' = 2*y; y' = -2*x" """)
+    assert (first.status, first.err) == (0, "")
+    (line,) = [line for line in first.out.splitlines() if "kahanmaps certificate" in line]
+    assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
+    assert "is the image of point 4 under f" in kahanmaps("certificate lyness -p a=1 --for gp --period 5").out
+    outcome = kahanmaps("certificate lyness --for gp --period 5")
+    assert (outcome.status, outcome.err) == (
+        1,
+        "refuted: iterate 5 is not the identity: no certificate can be written\n",
+    )
+    assert kahanmaps("certificate paper_m2 --for gp --commute associates --claim volume").status == 2
