@@ -26,17 +26,18 @@ from kahanmaps.certificates.identities import (
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
 from kahanmaps.checks.claims import Certainty
-from kahanmaps.checks.settings import claimed_functions
+from kahanmaps.checks.settings import claimed_function, claimed_functions, claimed_tensor
 from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
+from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.laboratory import separated
-from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
-from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.laboratory.preserve.integrals import find_integrals
-from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
-from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
+from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
+from kahanmaps.laboratory.symmetry.symmetries import Symmetries, linear_symmetries
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
@@ -48,6 +49,7 @@ CHECKERS: dict[str, Callable[..., str]] = {
 }
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
 TENSOR = "poisson"
+UNPROVED = "Pi"  # J - eps^2 f'^2 J, where no theorem says that it is invariant
 ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
 
 
@@ -57,12 +59,14 @@ def certificate(
     claims: Sequence[str] | None = None,
     integrals: Mapping[str, Any] | Any = None,
     *,
+    density: Any = None,
+    tensor: Any = None,
     everything: bool = False,
     commute: SystemLike | None = None,
     period: int | None = None,
     command: str = "",
 ) -> str:
-    """Write a proof that another program checks: integrals, and the invariant volume form, for every eps.
+    """Write a proof that another program checks: integrals, invariant volume forms and further claims, for every eps.
 
     Args:
         system: the system, which stands for its Kahan map, or a map; of dimension at most 6.
@@ -70,8 +74,10 @@ def certificate(
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
             (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves. None for all that
-            need no search, or for `integrals` alone if these are given.
+            need no search, or for the following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
+        density: phi, as `check_measure` takes it.
+        tensor: a Poisson tensor, as `check_poisson` takes it.
         everything: also search, for all of these.
         commute: another system or map, in the same variables: certify that the two maps commute. For members of the
             commuting family this is written in coordinates in which the planes separate; "associates" stands for all
@@ -84,7 +90,7 @@ def certificate(
         and proves it by identities of polynomials, without kahanmaps. The time step is 2 eps.
 
     Raises:
-        FalseClaim: for a function that is not conserved.
+        FalseClaim: for a claim that is not true.
         InputError: where no claim is known, for a name that is none, and for identities that are too long.
 
     Source: docs/mathematics.md, section "Certificates".
@@ -93,42 +99,34 @@ def certificate(
     >>> print(certificate(load("harmonic"), "gp", ["E"]).splitlines()[-1])
     quit(!ok)
     """
-    if checker not in CHECKERS:
-        raise InputError(f"expected the checker {', '.join(CHECKERS)}, got {str(checker)[:40]!r}")
     file = as_file(system)
-    formulas = Formulas(file)
-    if file.map.root is not None:
-        raise InputError(f"{file.name} has an algebraic number for a parameter: expected rational numbers")
-    if not hasattr(formulas.map, "rows"):
-        raise InputError(
-            f"{file.name} is a {formulas.map.kind}: expected a single map, write one file for each of them"
-        )
-    data = _map_data(formulas)
-    chains: list[Claim] = []
+    formulas, data = _prepared(file, checker)
+    proved: list[Claim] = []
     if period is not None:
-        chains.append(periodic(data, _positive(period)))
+        proved.append(periodic(data, _positive(period)))
     if commute is not None:
-        data, pair = _commuting(file, data, commute)
-        chains += pair
-        if period is not None or claims is not None or integrals is not None or everything:
+        if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
             raise InputError("a certificate that two maps commute goes without other claims")
-    further = {} if integrals is None else claimed_functions(file, integrals)
-    proved = chains + [conserved_function(data, name, function) for name, function in further.items()]
+        data, proved = _commuting(file, data, commute)
+    if integrals is not None:
+        proved += [conserved_function(data, name, f) for name, f in claimed_functions(file, integrals).items()]
+    if density is not None:
+        proved.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
+    if tensor is not None:
+        proved.append(invariant_tensor(data, "P", _rows(claimed_tensor(file, tensor))))
     known = dict(_known_claims(formulas, data))
-    searches = {name: partial(search, file, data) for name, search in _SEARCHES.items() if name not in known}
+    searches = {name: search for name, search in _SEARCHES.items() if name not in known}
+    is_required = claims is not None
     if claims is None:
-        claims = [] if (further or chains) and not everything else [*known, *(searches if everything else ())]
-        is_required = False
-    else:
-        is_required = True
+        claims = [] if proved and not everything else [*known, *(searches if everything else ())]
+        claims = [name for name in claims if name != UNPROVED and (name != "symmetry" or file.is_quadratic)]
     skipped = []
     for name in claims:
         if name not in known and name not in searches:
-            raise InputError(
-                f"no claim {str(name)[:40]!r} of {file.name}: expected one of {', '.join([*known, *searches])}"
-            )
+            expected = ", ".join([*known, *searches])
+            raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected one of {expected}")
         try:
-            proved += [known[name]()] if name in known else searches[name]()
+            proved += [known[name]()] if name in known else _claims_of(searches[name](file), data)
         except FalseClaim:
             raise
         except InputError as error:  # of all claims those that are short enough
@@ -147,8 +145,66 @@ def certificate(
     )
 
 
-def _map_data(formulas: Formulas) -> MapData:
-    return map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+def known_claims(file: SystemFile, check: str) -> list[str]:
+    """The names of the claims of a certificate that a check is about: integrals, measure or poisson.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> known_claims(load("euler_top"), "integrals")
+    ['F1', 'F2']
+    """
+    names = [name for name, _ in _known_claims(*_prepared(file, "gp"))]
+    special = {"measure": {VOLUME}, "poisson": {TENSOR, UNPROVED}}
+    if check in special:
+        return [name for name in names if name in special[check]]
+    return [name for name in names if name not in (VOLUME, TENSOR, UNPROVED)]
+
+
+def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
+    """Write a proof that another program checks, of what a search has found and proved.
+
+    Args:
+        result: what `find_integrals`, `find_density`, `find_poisson`, `darboux_polynomials` or `find_symmetry` returns,
+            for every eps.
+        checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
+        command: the command line that writes this script, for the comment on top.
+
+    Returns:
+        The text of the script, exact, as that of `certificate`. Symbols of the search stay symbols.
+
+    Raises:
+        InputError: where nothing is proved, for results at one eps or about the flow, and for identities that are too
+            long.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])
+    quit(!ok)
+    """
+    if isinstance(result, Symmetries):
+        file, symbols = SystemFile.from_system(result.system, "system"), result.system.symbols
+    else:
+        file, symbols = result.file, result.symbols
+        if result.flow or result.eps is not None:
+            what = "the flow" if result.flow else f"eps = {result.eps}"
+            raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
+    formulas, data = _prepared(file, checker, symbols)
+    claims = _claims_of(result, data)
+    if not claims:
+        raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
+    return CHECKERS[checker](data, claims, formulas.header(command))
+
+
+def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
+    """The formulas of a single map over Q, and its equation."""
+    if checker not in CHECKERS:
+        raise InputError(f"expected the checker {', '.join(CHECKERS)}, got {str(checker)[:40]!r}")
+    if file.map.root is not None:
+        raise InputError(f"{file.name} has an algebraic number for a parameter: expected rational numbers")
+    formulas = Formulas(file, symbols)
+    if not hasattr(formulas.map, "rows"):
+        raise InputError(
+            f"{file.name} is a {formulas.map.kind}: expected a single map, write one file for each of them"
+        )
+    return formulas, map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
 
 
 def _positive(period: Any) -> int:
@@ -203,47 +259,47 @@ def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Call
         yield VOLUME, partial(invariant_volume, data, VOLUME, formulas.density)
     elif H is not None:
         yield VOLUME, lambda: invariant_volume(data, VOLUME, _polynomial(data.determinant))
-    if file.hamiltonian is not None and poisson_tensor_invariant(file.hamiltonian, file.member) is not None:
-        yield TENSOR, lambda: invariant_tensor(data, TENSOR, _hamiltonian_tensor(formulas))
+    if file.hamiltonian is not None:
+        is_theorem = poisson_tensor_invariant(file.hamiltonian, file.member) is not None
+        name = TENSOR if is_theorem else UNPROVED
+        yield name, lambda: invariant_tensor(data, name, _hamiltonian_tensor(formulas))
 
 
-def _search_integrals(file: SystemFile, data: MapData) -> list[Claim]:
-    found = [found for found in find_integrals(file).integrals if found.verdict is Certainty.PROVED]
-    return [conserved_function(data, integral.name, integral.function) for integral in found]
-
-
-def _search_density(file: SystemFile, data: MapData) -> list[Claim]:
-    found = [found for found in find_densities(file).densities if found.verdict is Certainty.PROVED]
-    return [invariant_volume(data, f"{VOLUME}_{k}", density.function) for k, density in enumerate(found, 1)]
-
-
-def _search_tensors(file: SystemFile, data: MapData) -> list[Claim]:
+def _claims_of(result: Any, data: MapData) -> list[Claim]:
+    """What the result of a search proves about the map."""
     proved = Certainty.PROVED
-    found = [found for found in find_poisson(file).tensors if found.verdict is proved and found.jacobi is proved]
-    return [invariant_tensor(data, tensor.name, tensor.tensor.rows) for tensor in found]
+    if isinstance(result, IntegralSearch):
+        found = [integral for integral in result.integrals if integral.verdict is proved]
+        return [conserved_function(data, integral.name, integral.function) for integral in found]
+    if isinstance(result, DensitySearch):
+        densities = [density for density in result.densities if density.verdict is proved]
+        return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
+    if isinstance(result, PoissonSearch):
+        tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]
+        return [invariant_tensor(data, tensor.name, tensor.tensor.rows) for tensor in tensors]
+    if isinstance(result, DarbouxSearch):
+        polynomials = [P for space in result.spaces if space.verdict is proved for P in space.polynomials]
+        # The cofactor of a factor of det M has that factor in its denominator: it is no polynomial over D^k.
+        polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
+        return [darboux_polynomial(data, f"D{k}", P) for k, P in enumerate(polynomials, 1)]
+    if isinstance(result, Symmetries):
+        symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
+        return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]
+    raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
 
 
-def _search_darboux(file: SystemFile, data: MapData) -> list[Claim]:
-    spaces = [space for space in darboux_polynomials(file, 2).spaces if space.verdict is Certainty.PROVED]
-    # The cofactor of a factor of det M has that factor in its denominator: it is no polynomial over D^k.
-    polynomials = [
-        P for space in spaces for P in space.polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0
-    ]
-    return [darboux_polynomial(data, f"D{k}", P) for k, P in enumerate(polynomials, 1)]
-
-
-def _search_symmetries(file: SystemFile, data: MapData) -> list[Claim]:
-    found = [symmetry for symmetry in linear_symmetries(file).generators if not symmetry.is_trivial]
-    return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(found, 1)]
-
-
-_SEARCHES = {
-    "integrals": _search_integrals,
-    "density": _search_density,
-    TENSOR: _search_tensors,
-    "darboux": _search_darboux,
-    "symmetry": _search_symmetries,
+_SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
+    "integrals": find_integrals,
+    "density": find_densities,
+    TENSOR: find_poisson,
+    "darboux": partial(darboux_polynomials, degree=2),
+    "symmetry": linear_symmetries,
 }
+
+
+def _rows(tensor: MatrixPoissonTensor | None) -> Sequence[Sequence[RationalFunction]]:
+    assert tensor is not None
+    return tensor.rows
 
 
 def _hamiltonian_tensor(formulas: Formulas) -> list[list[RationalFunction]]:

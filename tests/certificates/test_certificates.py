@@ -16,7 +16,15 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.certificates.certificate import _SEARCHES, CHECKERS, _commuting, _known_claims, _map_data, certificate
+from kahanmaps.certificates.certificate import (
+    _SEARCHES,
+    CHECKERS,
+    _claims_of,
+    _commuting,
+    _known_claims,
+    _prepared,
+    certificate,
+)
 from kahanmaps.certificates.chains import Chain, periodic
 from kahanmaps.certificates.combinations import (
     AffineSymmetry,
@@ -85,7 +93,7 @@ def claims_of(name: str, *wanted: str):
     formulas = Formulas(file)
     data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
     known = dict(_known_claims(formulas, data))
-    return data, [known[claim]() if claim in known else _SEARCHES[claim](file, data)[0] for claim in wanted]
+    return data, [known[claim]() if claim in known else _claims_of(_SEARCHES[claim](file), data)[0] for claim in wanted]
 
 
 def changed(claim):
@@ -133,7 +141,7 @@ def test_each_kind_of_claim_is_accepted_and_refused_with_one_coefficient_changed
 )
 def test_commuting_maps_are_accepted_and_refused_with_one_coefficient_changed(system, other, checker, tmp_path):
     file = load(system) if other == "associates" else System(system)
-    data, claims = _commuting(file, _map_data(Formulas(file)), other if other == "associates" else System(other))
+    data, claims = _commuting(file, _prepared(file, checker)[1], other if other == "associates" else System(other))
     claims = [*[claim for claim in claims if not isinstance(claim, Chain)][:2], claims[-1]]
     assert run(checker, CHECKERS[checker](data, claims), tmp_path).returncode == 0
     chain = claims[-1]
@@ -148,7 +156,7 @@ def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, 
     file = load("lyness", {"a": 1})
     text = certificate(file, checker, period=5)
     assert run(checker, text, tmp_path).returncode == 0
-    data = _map_data(Formulas(file))
+    data = _prepared(file, checker)[1]
     chain = periodic(data, 5)
     wrong = replace(chain.values[2], numerators=(chain.values[2].numerators[0] + 1, *chain.values[2].numerators[1:]))
     values = (*chain.values[:2], wrong, *chain.values[3:])

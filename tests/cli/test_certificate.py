@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+
+import pytest
+
 
 def test_the_command_in_the_comment_writes_the_same_certificate_again(kahanmaps):
     first = kahanmaps("certificate --vars=x,y '--image=y; (3 + y)/x' --for gp --integral '(x+1)*(y+1)*(x+y+3)/(x*y)'")
@@ -56,3 +61,48 @@ def test_commuting_maps_and_periods(kahanmaps):
         "refuted: iterate 5 is not the identity: no certificate can be written\n",
     )
     assert kahanmaps("certificate paper_m2 --for gp --commute associates --claim volume").status == 2
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "says"),
+    [
+        ("check-integrals euler_top", 0, "F2: P/Q is an integral"),
+        ("check-integrals euler_top --integral J=F1", 0, "J: P/Q is an integral"),
+        ("check-measure lotka_volterra --density 3*x*y", 0, "volume: dx/phi is invariant"),
+        ("check-poisson weierstrass", 0, "poisson: the map is Poisson"),
+        ("check-commute paper_m2", 0, "is the image of point 3 under f"),
+        ("find-integrals euler_top --symbolic a1,a2,a3", 0, "I2: P/Q is an integral"),
+        ("find-integrals volterra_periodic_3 --darboux 1", 0, "D4: P is a Darboux polynomial"),
+        ("find-density lotka_volterra", 0, "volume_1: dx/phi is invariant"),
+        ("find-poisson lotka_volterra", 0, "P: the map is Poisson"),
+        ("find-symmetry lotka_volterra", 0, "T1: x -> T takes the map to itself"),
+    ],
+)
+def test_checks_and_searches_write_a_certificate_of_what_they_prove(command, status, says, kahanmaps, tmp_path):
+    path = tmp_path / "proof.gp"
+    outcome = kahanmaps(f"{command} --certificate", path)
+    assert outcome.status == status
+    text = path.read_text()
+    assert says in text
+    assert outcome.err.endswith(f"a certificate for gp, {len(text.splitlines())} lines\n")
+    if shutil.which("gp") is not None:
+        done = subprocess.run(["gp", "-q", path], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        assert (done.returncode, "FALSE" in done.stdout) == (0, False)
+
+
+@pytest.mark.parametrize(
+    ("command", "ending", "status", "says"),
+    [
+        ("check-integrals euler_top --integral x1", ".gp", 1, "is not written: I1 is not conserved"),
+        ("check-poisson henon_heiles", ".gp", 1, "is not written: Pi is no Poisson tensor"),
+        ("find-integrals lorenz", ".v", 3, "is not written: nothing is proved in this result about lorenz"),
+        ("check-integrals euler_top", ".txt", 2, "expected a file that ends with .v, .gp or .py"),
+        ("check-integrals euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),
+        ("find-integrals euler_top --flow", ".gp", 2, "--certificate goes without --flow"),
+        ("find-density euler_top --flow", ".gp", 2, "--flow goes without --certificate"),
+    ],
+)
+def test_what_is_not_proved_for_every_eps_has_no_certificate(command, ending, status, says, kahanmaps, tmp_path):
+    outcome = kahanmaps(f"{command} --certificate", tmp_path / f"proof{ending}")
+    assert (outcome.status, list(tmp_path.iterdir())) == (status, [])
+    assert says in outcome.err
