@@ -13,6 +13,7 @@ from kahanmaps.algebra.fields import integer
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.certificates.chains import commuting, periodic
 from kahanmaps.certificates.combinations import affine_symmetry, bilinear_integral, modified_hamiltonian
+from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
     Claim,
     FalseClaim,
@@ -49,6 +50,7 @@ CHECKERS: dict[str, Callable[..., str]] = {
 }
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
 TENSOR = "poisson"
+ENTROPY = "entropy"  # positive algebraic entropy, hence not integrable
 UNPROVED = "Pi"  # J - eps^2 f'^2 J, where no theorem says that it is invariant
 ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
 
@@ -73,7 +75,8 @@ def certificate(
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
-            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves. None for all that
+            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for positive
+            entropy of a map of the plane, for gp. None for all that
             need no search, or for the following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         density: phi, as `check_measure` takes it.
@@ -119,7 +122,9 @@ def certificate(
     is_required = claims is not None
     if claims is None:
         claims = [] if proved and not everything else [*known, *(searches if everything else ())]
-        claims = [name for name in claims if name != UNPROVED and (name != "symmetry" or file.is_quadratic)]
+        claims = [
+            name for name in claims if name not in (UNPROVED, ENTROPY) and (name != "symmetry" or file.is_quadratic)
+        ]
     skipped = []
     for name in claims:
         if name not in known and name not in searches:
@@ -156,7 +161,7 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
     special = {"measure": {VOLUME}, "poisson": {TENSOR, UNPROVED}}
     if check in special:
         return [name for name in names if name in special[check]]
-    return [name for name in names if name not in (VOLUME, TENSOR, UNPROVED)]
+    return [name for name in names if name not in (VOLUME, TENSOR, UNPROVED, ENTROPY)]
 
 
 def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
@@ -259,6 +264,8 @@ def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Call
         yield VOLUME, partial(invariant_volume, data, VOLUME, formulas.density)
     elif H is not None:
         yield VOLUME, lambda: invariant_volume(data, VOLUME, _polynomial(data.determinant))
+    if data.dim == 2:
+        yield ENTROPY, lambda: positive_entropy(data, _inverse(formulas, data))
     if file.hamiltonian is not None:
         is_theorem = poisson_tensor_invariant(file.hamiltonian, file.member) is not None
         name = TENSOR if is_theorem else UNPROVED
@@ -300,6 +307,12 @@ _SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
 def _rows(tensor: MatrixPoissonTensor | None) -> Sequence[Sequence[RationalFunction]]:
     assert tensor is not None
     return tensor.rows
+
+
+def _inverse(formulas: Formulas, data: MapData) -> MapData:
+    """The inverse of the map. Raises InputError where it is not known."""
+    rows = formulas.map.inverse_rows
+    return map_data([[*row[:-1], -row[-1]] for row in rows], data.variables, data.new, data.names)
 
 
 def _hamiltonian_tensor(formulas: Formulas) -> list[list[RationalFunction]]:

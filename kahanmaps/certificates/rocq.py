@@ -26,6 +26,7 @@ from kahanmaps.certificates.identities import (
     homogeneous_value,
     letters_of,
 )
+from kahanmaps.errors import InputError
 
 _LEMMA = """\
 Lemma equal_fractions : forall a b c d : R, b <> 0 -> d <> 0 -> a * d = c * b -> a / b = c / d.
@@ -515,6 +516,8 @@ def rocq_certificate(data: MapData, claims: Sequence[Claim], header: Sequence[st
         Chain: (_Script.chain, "everywhere"),
     }
     for k, claim in enumerate(claims, 1):
+        if type(claim) not in proofs:
+            raise InputError(f"{claim.name} is certified for gp only: ask for --for gp")
         prove, ending = proofs[type(claim)]
         name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
         theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"

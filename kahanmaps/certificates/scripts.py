@@ -17,6 +17,7 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.certificates.chains import Chain
 from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral
+from kahanmaps.certificates.entropy import EPS, LINE, PRIME, PositiveEntropy
 from kahanmaps.certificates.identities import (
     Claim,
     ConservedFunction,
@@ -27,6 +28,7 @@ from kahanmaps.certificates.identities import (
     letters_of,
 )
 from kahanmaps.certificates.rocq import polynomial_text
+from kahanmaps.errors import InputError
 
 _PARI = """\
 default(recover, 0);  \\\\ an error ends gp with a status that is not 0
@@ -171,7 +173,7 @@ class _Script:
 
     def __init__(self, to: Language, data: MapData) -> None:
         self.to, self.data, self.lines = to, data, list[str]()
-        self.letters = letters_of(data, "[hijknprst]")
+        self.letters = letters_of(data, "[hijknprst]") | {"h": "h"}
 
     def text(self, polynomial: fmpq_mpoly) -> str:
         """The polynomial; a long sum in parts, as Python reads no expression that is nested a thousand times."""
@@ -266,6 +268,10 @@ class _Script:
             DarbouxPolynomial: ("P is a Darboux polynomial, P(x~) = P C/D^k", self._darboux),
             InvariantVolume: ("dx/phi is invariant, phi = P/Q", self._volume),
             InvariantTensor: ("the map is Poisson for the tensor P/Q", self._tensor),
+            PositiveEntropy: (
+                "positive entropy, hence no rational integral, for all but finitely many eps",
+                self._entropy,
+            ),
             OrbitIntegral: ("P(x, x~)/Q is an integral", self._along_orbit),
             AffineSymmetry: ("x -> T takes the map to itself, its inverse or another map", self._symmetry),
         }[type(claim)]
@@ -338,6 +344,46 @@ class _Script:
         identity = f"scale({claim.multiple}, put({target}, concat(old, new), concat({pair}))) == act(K, {E})"
         self.check(f"{label}: {target}{points} is a combination of {E}(x, y)", identity)
 
+    def _entropy(self, claim: Any, label: str) -> None:
+        """The forms of F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
+        if self.to is not GP:
+            raise InputError("positive entropy is certified for gp only: ask for --for gp")
+        comment, names = self.to.comment, self.data.names
+        n, x, y = len(claim.forms), *(self.letters[name] for name in self.data.variables)
+        eps, degree = self.letters[names[-1]], claim.degree
+        self.lines += [
+            f"{comment}Assumed, a theorem on birational maps f of the plane (docs/mathematics.md): with D_n = deg f^n",
+            f"{comment}and the dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2n - 1)/(D_n - 1).",
+            f"{comment}Here f over Q(eps) is birational, D_{n} <= {degree} and D_{2 * n} >= {claim.line_degree}.",
+        ]
+        self.define("point", f"[{x}, {y}, h]")
+        self.define("B", self.vector(claim.inverse))
+        for k, (forms, factor) in enumerate(zip(claim.forms, claim.factors, strict=True), 1):
+            self.define(f"F{k}", self.vector(forms))
+            self.define(f"c{k}", f"({self.text(factor)})")
+            degree_k = max(sum(e) - sum(e[2:-1]) for e in (list(map(int, m)) for m in forms[0].monoms()))
+            self.check(f"F{k} is homogeneous of degree {degree_k}", f"put(F{k}, point, tt*point) == tt^{degree_k}*F{k}")
+            if k == 1:
+                self.check("c1 F1 = (N : D) at h = 1, not 0", "c1 != 0 && put(c1*F1, [h], [1]) == concat(N, [D])")
+            else:
+                self.check(f"F1(F{k - 1}) = c{k} F{k}, not 0", f"c{k} != 0 && put(F1, point, F{k - 1}) == c{k}*F{k}")
+        self.define("G", "put(B, point, F1)")
+        self.check("f is birational: B(F1) = point", f"G[3] != 0 && G[1]*h == G[3]*{x} && G[2]*h == G[3]*{y}")
+        self.check("the modulus is prime", f"isprime({PRIME})")
+        self.define("curve", f"[{LINE[0][0]} + {LINE[0][1]}*t, {LINE[1][0]} + {LINE[1][1]}*t, 1]*Mod(1, {PRIME})")
+        self.define("image", f"put(F1, [{eps}], [Mod({EPS}, {PRIME})])")
+        self.lines += [
+            f"{{for(k = 1, {2 * n}, curve = put(image, point, curve); common = gcd(gcd(curve[1], curve[2]), curve[3]);",
+            "  curve = apply(P -> P \\ common, curve));}  \\\\ an error if all three are 0",
+        ]
+        says = f"the image of a line under {2 * n} steps modulo a prime has degree {claim.line_degree}"
+        self.check(says, f"vecmax(apply(P -> poldegree(P, t), curve)) == {claim.line_degree}")
+        lower = f"{claim.lower.numerator}/{claim.lower.denominator}"
+        self.check(
+            f"the dynamical degree is more than {lower} > 1",
+            f"{lower} > 1 && ({lower})^{n} + ({lower})^-{n} + 2 < ({claim.line_degree} - 1)/({degree} - 1)",
+        )
+
     def fraction(self, claim: Any) -> None:
         """The numerator P and the denominator Q."""
         self.polynomial("P", claim.numerator)
@@ -371,7 +417,11 @@ def script_certificate(to: Language, data: MapData, claims: Sequence[Claim], hea
             script.claim(claim)
     used = set(re.findall(r"\w+", "\n".join(script.lines)))
     used |= {other for name in used for other in _NEEDS.get(name, ())}
-    names = [letter for name, letter in script.letters.items() if has_three_points or name[:-1] not in data.new]
+    names = [
+        letter
+        for name, letter in script.letters.items()
+        if name != "h" and (has_three_points or name[:-1] not in data.new)
+    ]
     top = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
     top.append(to.start.format(letters=", ".join(names), names=",".join(names)) if to is PYTHON else to.start)
     for name, text in to.tools.items():

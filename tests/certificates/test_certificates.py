@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from fractions import Fraction
 
 import pytest
 from flint import fmpq, fmpq_mat
@@ -47,6 +48,7 @@ from kahanmaps.certificates.identities import (
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
 from kahanmaps.languages.formulas import Formulas
 
 PROGRAMS = {
@@ -161,6 +163,34 @@ def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, 
     wrong = replace(chain.values[2], numerators=(chain.values[2].numerators[0] + 1, *chain.values[2].numerators[1:]))
     values = (*chain.values[:2], wrong, *chain.values[3:])
     assert run(checker, CHECKERS[checker](data, [replace(chain, values=values)]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("name", ["lotka_volterra", "fibonacci", "hietarinta_viallet"])
+def test_positive_entropy_is_accepted_and_refused_with_one_number_changed(name, tmp_path):
+    data, (claim,) = claims_of(name, "entropy")
+    done = run("gp", CHECKERS["gp"](data, [claim]), tmp_path)
+    assert (done.returncode, "FALSE" in done.stdout) == (0, False)
+    (_, *others), first = claim.forms[-1], claim.forms[-1][0]
+    for wrong in (
+        replace(claim, line_degree=claim.line_degree + 1),
+        replace(claim, lower=claim.lower + Fraction(1, 100)),
+        replace(claim, forms=(*claim.forms[:-1], (first * 2, *others))),
+        replace(claim, factors=(*claim.factors[:-1], claim.factors[-1] * 2)),
+        replace(claim, inverse=(claim.inverse[0] + claim.inverse[2], *claim.inverse[1:])),
+    ):
+        assert run("gp", CHECKERS["gp"](data, [wrong]), tmp_path).returncode != 0
+    bounds = bound_dynamical_degree(load(name).map, None)
+    assert bounds is not None
+    assert 1 < claim.lower < Fraction(bounds.upper)
+
+
+def test_positive_entropy_is_certified_for_gp_only_and_not_for_integrable_maps():
+    for checker in ("rocq", "sympy"):
+        with pytest.raises(InputError, match="entropy is certified for gp only"):
+            certificate(load("lotka_volterra"), checker, ["entropy"])
+    for name in ("nahm_octahedral", "mcmillan", "zander_111"):
+        with pytest.raises(InputError, match="which proves nothing"):
+            certificate(load(name), "gp", ["entropy"])
 
 
 def test_maps_that_do_not_commute_and_false_periods_have_no_certificate():
