@@ -75,8 +75,8 @@ def certificate(
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
-            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for positive
-            entropy of a map of the plane, for gp. None for all that
+            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for
+            positive entropy of a map of the plane, for gp. None for all that
             need no search, or for the following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         density: phi, as `check_measure` takes it.
