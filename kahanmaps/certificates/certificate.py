@@ -12,7 +12,12 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.fields import integer
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.certificates.chains import commuting, periodic
-from kahanmaps.certificates.combinations import affine_symmetry, bilinear_integral, modified_hamiltonian
+from kahanmaps.certificates.combinations import (
+    affine_symmetry,
+    bilinear_integral,
+    changed_function,
+    modified_hamiltonian,
+)
 from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
     Claim,
@@ -23,6 +28,7 @@ from kahanmaps.certificates.identities import (
     invariant_tensor,
     invariant_volume,
     map_data,
+    restricted,
 )
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
@@ -110,7 +116,7 @@ def certificate(
     if commute is not None:
         if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
             raise InputError("a certificate that two maps commute goes without other claims")
-        data, proved = _commuting(file, data, commute)
+        proved = _commuting(file, data, commute)
     if integrals is not None:
         proved += [conserved_function(data, name, f) for name, f in claimed_functions(file, integrals).items()]
     if density is not None:
@@ -131,7 +137,7 @@ def certificate(
             expected = ", ".join([*known, *searches])
             raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected one of {expected}")
         try:
-            proved += [known[name]()] if name in known else _claims_of(searches[name](file), data)
+            proved += known[name]() if name in known else _claims_of(searches[name](file), data)
         except FalseClaim:
             raise
         except InputError as error:  # of all claims those that are short enough
@@ -146,7 +152,7 @@ def certificate(
             f"or search with kahanmaps find-integrals {file.name} --toml"
         )
     return CHECKERS[checker](
-        data, proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
+        proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
     )
 
 
@@ -195,7 +201,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
     claims = _claims_of(result, data)
     if not claims:
         raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
-    return CHECKERS[checker](data, claims, formulas.header(command))
+    return CHECKERS[checker](claims, formulas.header(command))
 
 
 def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
@@ -218,8 +224,8 @@ def _positive(period: Any) -> int:
     return integer(period, "period")
 
 
-def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> tuple[MapData, list[Claim]]:
-    """The map that the claims are about, and the claims: maps commute, in separate coordinates if there are any."""
+def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim]:
+    """The claims that maps commute, in separate coordinates if there are any."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
@@ -248,28 +254,49 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> tuple[MapD
         given = in_planes
     pairs_of = combinations(range(len(given)), 2)
     claims += [commuting(f"maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
-    return given[0], claims
+    return claims
 
 
-def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Callable[[], Claim]]]:
+def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
     """What the file claims, or theorems give: by name the functions that find the identities."""
-    for name, function in formulas.integrals.items():
-        yield name, partial(conserved_function, data, name, function)
     H, file = formulas.H, formulas.file
+
+    def one(find: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
+        return lambda: [find(data, *arguments)]
+
+    for name, function in formulas.integrals.items():
+        yield name, partial(_integral, file, data, name, function)
     if H is not None:
-        yield "modified_hamiltonian", partial(modified_hamiltonian, data, "modified_hamiltonian", H)
+        yield "modified_hamiltonian", one(modified_hamiltonian, "modified_hamiltonian", H)
     for name, form in formulas.forms.items():
-        yield name, partial(bilinear_integral, data, name, form)
+        yield name, one(bilinear_integral, name, form)
     if formulas.density is not None:
-        yield VOLUME, partial(invariant_volume, data, VOLUME, formulas.density)
+        yield VOLUME, one(invariant_volume, VOLUME, formulas.density)
     elif H is not None:
-        yield VOLUME, lambda: invariant_volume(data, VOLUME, _polynomial(data.determinant))
+        yield VOLUME, lambda: [invariant_volume(data, VOLUME, _polynomial(data.determinant))]
     if data.dim == 2:
-        yield ENTROPY, lambda: positive_entropy(data, _inverse(formulas, data))
+        yield ENTROPY, lambda: [positive_entropy(data, _inverse(formulas, data))]
     if file.hamiltonian is not None:
         is_theorem = poisson_tensor_invariant(file.hamiltonian, file.member) is not None
         name = TENSOR if is_theorem else UNPROVED
-        yield name, lambda: invariant_tensor(data, name, _hamiltonian_tensor(formulas))
+        yield name, lambda: [invariant_tensor(data, name, _hamiltonian_tensor(formulas))]
+
+
+def _integral(file: SystemFile, data: MapData, name: str, function: RationalFunction) -> list[Claim]:
+    """The claims that a function is conserved: for a member of the family in its plane, if it depends on one only."""
+    separate = separated(file.system) if file.member is not None else None
+    if separate is None:
+        return [conserved_function(data, name, function)]
+    rows = as_map(separate.system).rows
+    in_planes = map_data([[*row[:-1], -row[-1]] for row in rows], data.variables, data.new, data.names)
+    moved = separate.function(function)
+    plane = restricted(in_planes, moved)
+    if plane is in_planes:
+        return [conserved_function(data, name, function)]
+    conserved = conserved_function(plane, f"{name}_in_its_plane", moved)
+    T, zero = separate.T, [fmpq(0)] * file.dim
+    way = affine_symmetry(in_planes, f"coordinates_of_{name}", T, zero, target=data)
+    return [way, changed_function(way, name, function, conserved), conserved]
 
 
 def _claims_of(result: Any, data: MapData) -> list[Claim]:

@@ -76,9 +76,7 @@ def commuting(name: str, f: MapData, g: MapData) -> Chain:
     w = apply(g, y)
     if w != apply(f, z):
         raise FalseClaim(f"{name}: the maps do not commute: no certificate can be written")
-    return Chain(
-        "commute", {"f": f, "g": g}, (("f", 0, 1), ("g", 1, 3), ("g", 0, 2), ("f", 3, 3)), (x, y, z, w), (2, 4)
-    )
+    return Chain(name, f, {"f": f, "g": g}, (("f", 0, 1), ("g", 1, 3), ("g", 0, 2), ("f", 3, 3)), (x, y, z, w), (2, 4))
 
 
 def periodic(f: MapData, period: int) -> Chain:
@@ -94,7 +92,7 @@ def periodic(f: MapData, period: int) -> Chain:
     if values.pop() != values[0]:
         raise FalseClaim(f"iterate {period} is not the identity: no certificate can be written")
     arrows = tuple(("f", k, (k + 1) % period) for k in range(period))
-    return Chain(f"period {period}", {"f": f}, arrows, tuple(values), (0, period))
+    return Chain(f"period {period}", f, {"f": f}, arrows, tuple(values), (0, period))
 
 
 def apply(data: MapData, point: RationalPoint) -> RationalPoint:

@@ -22,8 +22,8 @@ from math import lcm
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import common_denominator, ring
-from kahanmaps.certificates.identities import Claim, FalseClaim, MapData
+from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, ring
+from kahanmaps.certificates.identities import Claim, ConservedFunction, FalseClaim, MapData, coprime
 
 Row = tuple[fmpq_mpoly, ...]
 
@@ -49,17 +49,30 @@ class OrbitIntegral(Claim):
 class AffineSymmetry(Claim):
     """T(x) = `image`/`divisor`: `multiple` e(T x, T y) = `matrix` e(x, y), e(T y, T x) if `reversing`.
 
-    The left e is that of `target`, the right one that of `source`: the same map for a symmetry, else T takes one map to
+    The left e is that of `target`, the right one that of `data`: the same map for a symmetry, else T takes one map to
     the other.
     """
 
-    source: MapData
     target: MapData
     image: Row
     divisor: int
     matrix: tuple[tuple[int, ...], ...]
     multiple: int
     reversing: bool
+
+    @property
+    def is_at_image(self) -> bool:
+        return False
+
+
+@dataclass(frozen=True)
+class ChangedFunction(Claim):
+    """P(T z)/Q(T z) = p(z)/q(z) with T z = `image`/`divisor`; pairs of numerator and denominator over Z."""
+
+    image: Row
+    divisor: int
+    given: tuple[fmpq_mpoly, fmpq_mpoly]
+    moved: tuple[fmpq_mpoly, fmpq_mpoly]
 
     @property
     def is_at_image(self) -> bool:
@@ -170,6 +183,22 @@ def affine_symmetry(
     return AffineSymmetry(name, data, target, image, divisor, matrix, multiple, reversing)
 
 
+def changed_function(
+    way: AffineSymmetry, name: str, function: RationalFunction, moved: ConservedFunction
+) -> ChangedFunction:
+    """The identity that the function of x is the other one of z, x = T z. Raises FalseClaim if it is not."""
+    data = way.data
+    context = ring(data.names)
+    letters = dict(zip(data.names, context.gens(), strict=True))
+    small = [letters[letter] for letter in moved.data.names]
+    p, q = (P.compose(*small, ctx=context) for P in (moved.numerator, moved.denominator))
+    P, Q = coprime(function, data.names)
+    images = [entry / way.divisor for entry in way.image] + [*context.gens()[data.dim :]]
+    if P.compose(*images, ctx=context) * q != p * Q.compose(*images, ctx=context):
+        raise FalseClaim(f"{name} is another function in these coordinates: no certificate can be written")
+    return ChangedFunction(name, data, way.image, way.divisor, (P, Q), (p, q))
+
+
 def _affine(S: fmpq_mat, shift: Sequence[fmpq], letters: Sequence[fmpq_mpoly], i: int) -> fmpq_mpoly:
     """The component i of S x + shift."""
     return sum((S[i, j] * letters[j] for j in range(len(shift))), letters[0] * 0 + shift[i])
@@ -196,4 +225,4 @@ def _orbit_integral(
         raise FalseClaim(f"{name} is not conserved: no certificate can be written")
     multiple = lcm(*(int(common_denominator(c)) for c in (value, *multipliers[0], *multipliers[1])))
     scaled = [tuple(c * multiple for c in side) for side in multipliers]
-    return OrbitIntegral(name, value * multiple, denominator * multiple, scaled[0], scaled[1])
+    return OrbitIntegral(name, data, value * multiple, denominator * multiple, scaled[0], scaled[1])

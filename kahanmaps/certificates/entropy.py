@@ -77,7 +77,7 @@ def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
     _, n, line_degree, lower = best
     backward, _ = _without_common_factor(_forms(inverse))
     forms = tuple(iterates[:n])
-    return PositiveEntropy("entropy", backward, forms, tuple(factors[:n]), _degree(forms[-1]), line_degree, lower)
+    return PositiveEntropy("entropy", data, backward, forms, tuple(factors[:n]), _degree(forms[-1]), line_degree, lower)
 
 
 def _degree(forms: Sequence[fmpq_mpoly]) -> int:

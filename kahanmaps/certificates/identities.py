@@ -113,9 +113,10 @@ class MapData:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim about a map, with its name."""
+    """A claim with its name, about a map."""
 
     name: str
+    data: MapData
 
     @property
     def is_at_image(self) -> bool:
@@ -166,7 +167,6 @@ class InvariantTensor(Claim):
     `is_free`: the identity holds for any two points.
     """
 
-    dim: int
     upper: dict[tuple[int, int], fmpq_mpoly]
     denominator: fmpq_mpoly
     degree: int
@@ -175,6 +175,11 @@ class InvariantTensor(Claim):
     @property
     def is_at_image(self) -> bool:
         return not self.is_free
+
+    @property
+    def dim(self) -> int:
+        """The dimension."""
+        return self.data.dim
 
     def entry(self, i: int, j: int) -> fmpq_mpoly:
         """P_ij."""
@@ -206,6 +211,31 @@ def map_data(
     return MapData(tuple(variables), tuple(new), tuple(names), tuple(tuple(_integral_row(row)) for row in equation))
 
 
+def restricted(data: MapData, function: RationalFunction) -> MapData:
+    """The map of those variables alone that determine the function along orbits, like those of one plane."""
+    n, names = data.dim, data.names
+
+    def occurring(polynomial: fmpq_mpoly) -> set[str]:
+        return set(polynomial.context().names()) - set(polynomial.unused_gens())
+
+    used = (occurring(function.numerator) | occurring(function.denominator)) & set(names[:n])
+    while True:
+        rows = [row for name, row in zip(names, data.rows, strict=False) if name in used]
+        more = {names[j] for row in rows for j in range(n) if row[j]}
+        more |= {name for row in rows for entry in row for name in occurring(entry)} & set(names[:n])
+        if more <= used:
+            break
+        used |= more
+    if len(used) in (0, n):
+        return data
+    kept = [j for j in range(n) if names[j] in used]
+    context = ring((*(names[j] for j in kept), *names[n:]))
+    letters = dict(zip(context.names(), context.gens(), strict=True))
+    images = [letters.get(name, context.constant(0)) for name in names]
+    small = tuple(tuple(row[j].compose(*images, ctx=context) for j in (*kept, n)) for row in rows)
+    return MapData(tuple(names[j] for j in kept), tuple(data.new[j] for j in kept), tuple(context.names()), small)
+
+
 def conserved_function(data: MapData, name: str, function: RationalFunction) -> ConservedFunction:
     """The identities that prove that the map conserves the function.
 
@@ -213,13 +243,13 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
         FalseClaim: if it does not.
         InputError: if the identities have too many terms.
     """
-    P, Q = _coprime(function, data.names)
+    P, Q = coprime(function, data.names)
     k = max(degree_in(P, data.dim), degree_in(Q, data.dim))
     moved = [homogeneous_value(polynomial, k, data) for polynomial in (P, Q)]
     cofactors = [_quotient(image, polynomial) for image, polynomial in zip(moved, (P, Q), strict=True)]
     if not cofactors[0] or cofactors[0] != cofactors[1]:  # 0: the image of the map lies in Q = 0
         raise FalseClaim(f"{name} is not conserved: no certificate can be written")
-    return ConservedFunction(name, P, Q, k, cofactors[0])
+    return ConservedFunction(name, data, P, Q, k, cofactors[0])
 
 
 def darboux_polynomial(data: MapData, name: str, polynomial: fmpq_mpoly) -> DarbouxPolynomial:
@@ -229,12 +259,12 @@ def darboux_polynomial(data: MapData, name: str, polynomial: fmpq_mpoly) -> Darb
         FalseClaim: if it is none.
         InputError: if the identity has too many terms.
     """
-    P, _ = _coprime(RationalFunction(polynomial, polynomial**0), data.names)
+    P, _ = coprime(RationalFunction(polynomial, polynomial**0), data.names)
     k = degree_in(P, data.dim)
     cofactor = _quotient(homogeneous_value(P, k, data), P)
     if not cofactor:
         raise FalseClaim(f"{name} is no Darboux polynomial: no certificate can be written")
-    return DarbouxPolynomial(name, P, k, cofactor)
+    return DarbouxPolynomial(name, data, P, k, cofactor)
 
 
 def invariant_volume(data: MapData, name: str, function: RationalFunction) -> InvariantVolume:
@@ -244,18 +274,18 @@ def invariant_volume(data: MapData, name: str, function: RationalFunction) -> In
         FalseClaim: if it does not.
         InputError: if the identity has too many terms.
     """
-    P, Q = _coprime(function, data.names)
+    P, Q = coprime(function, data.names)
     n, k = data.dim, max(degree_in(P, data.dim), degree_in(Q, data.dim))
     at_old, at_new = data.at_points(P, Q, data.determinant)
     if _times(_times(at_new[0], at_old[1]), at_old[2]) == _times(
         _times(at_old[0], at_new[1]), determinant(data.derivative)
     ):
-        return InvariantVolume(name, P, Q, k, True)
+        return InvariantVolume(name, data, P, Q, k, True)
     left = _times(_times(homogeneous_value(P, k, data), Q), data.determinant ** (n + 1))
     right = _times(_times(homogeneous_value(Q, k, data), P), determinant(_derivative_at_image(data)))
     if left != right:
         raise FalseClaim("dx/phi is not invariant: no certificate can be written")
-    return InvariantVolume(name, P, Q, k, False)
+    return InvariantVolume(name, data, P, Q, k, False)
 
 
 def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalFunction]]) -> InvariantTensor:
@@ -275,7 +305,7 @@ def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalF
     if not any(upper.values()):
         raise InputError(f"the tensor {name} is 0 or has dimension 1: expected another one for a certificate")
     k = max(degree_in(P, n) for P in (*upper.values(), Q))
-    claim = InvariantTensor(name, n, upper, Q, k, True)
+    claim = InvariantTensor(name, data, upper, Q, k, True)
     P = [[claim.entry(i, j) for j in range(n)] for i in range(n)]
     for indices in claim.triples:
         total = context.constant(0)
@@ -367,13 +397,14 @@ def _at_numerators(entry: fmpq_mpoly, data: MapData, point: Sequence[fmpq_mpoly]
     return total
 
 
-def _coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mpoly, fmpq_mpoly]:
+def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mpoly, fmpq_mpoly]:
     """Numerator and denominator in lowest terms, with integral coefficients, in `names`."""
     context = ring(names)
     P, Q = function.numerator, function.denominator
     if function.names != names:
         letters = dict(zip(names, context.gens(), strict=True))
-        P, Q = (polynomial.compose(*(letters[name] for name in function.names), ctx=context) for polynomial in (P, Q))
+        images = [letters.get(name, context.constant(0)) for name in function.names]
+        P, Q = (polynomial.compose(*images, ctx=context) for polynomial in (P, Q))
     common = P.gcd(Q)
     P, Q = P / common, Q / common
     scale = common_denominator(P), common_denominator(Q)

@@ -15,7 +15,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.certificates.chains import Chain
-from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral, residual
+from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral, residual
 from kahanmaps.certificates.identities import (
     Claim,
     ConservedFunction,
@@ -214,14 +214,14 @@ class _Script:
 
     def symmetric(self, claim: AffineSymmetry, theorem: str) -> list[str]:
         """The theorem that x -> T x takes the map to itself, to its inverse, or to another map."""
-        n, is_own = self.data.dim, claim.target is claim.source
+        n, is_own = self.data.dim, claim.target is claim.data
         x, y = " ".join(self.old), " ".join(self.new)
         polynomials = self.data.at_points(*claim.image)
         points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
         first, second = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
         target, letters = ("maps", "e") if is_own else ("target", "ef")
         lines = [
-            *self.predicate(data=claim.source),
+            *self.predicate(),
             *([] if is_own else self.predicate("f", target, claim.target)),
             f"(* {'To the inverse' if claim.reversing else 'Map to map'} by T: {', '.join(points[0])} *)",
             f"Theorem {theorem} : forall {x} {y}, maps {x} {y} ->",
@@ -236,6 +236,18 @@ class _Script:
             steps += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
             lines.append(f"  split; [{steps[:-1]} |]." if i < n - 1 else f"  {steps}")
         return [*lines, "Qed."]
+
+    def changed(self, claim: ChangedFunction, theorem: str) -> list[str]:
+        """The theorem that a function of x is another function of z, x = T z."""
+        z, names = " ".join(self.old), ("num", "den", "num_z", "den_z")
+        at = " ".join(f"(({self.text(P)}) / {claim.divisor})" for P in claim.image)
+        functions = zip(names, (*claim.given, *claim.moved), strict=True)
+        return [
+            *(f"Definition {name} ({z} : R) : R := {self.text(P)}." for name, P in functions),
+            f"Theorem {theorem} : forall {z},",
+            f"  num {at} * den_z {z} = num_z {z} * den {at}.",
+            f"Proof. intros {z}. cbv delta [{' '.join(names)}] beta; field. Qed.",
+        ]
 
     def expand(self, *further: str) -> str:
         """The tactic that replaces all definitions by what they stand for, and proves an identity of polynomials."""
@@ -493,11 +505,10 @@ class _Script:
         ]
 
 
-def rocq_certificate(data: MapData, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
-    """Write a script that Coq accepts only if it proves the claims about the map.
+def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
+    """Write a script that Coq accepts only if it proves the claims.
 
     Args:
-        data: the map.
         claims: what is proved, each in a section of its own.
         header: lines of the comment on top.
     """
@@ -514,6 +525,7 @@ def rocq_certificate(data: MapData, claims: Sequence[Claim], header: Sequence[st
         OrbitIntegral: (_Script.along_orbit, "conserved"),
         AffineSymmetry: (_Script.symmetric, "symmetry"),
         Chain: (_Script.chain, "everywhere"),
+        ChangedFunction: (_Script.changed, "coordinates"),
     }
     for k, claim in enumerate(claims, 1):
         if type(claim) not in proofs:
@@ -521,9 +533,9 @@ def rocq_certificate(data: MapData, claims: Sequence[Claim], header: Sequence[st
         prove, ending = proofs[type(claim)]
         name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
         theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
-        script = _Script(data)
+        script = _Script(claim.data)
         lines += [f"Module Claim{k}.", "Section Map."]
-        if isinstance(claim, Chain | OrbitIntegral | AffineSymmetry):
+        if isinstance(claim, Chain | OrbitIntegral | AffineSymmetry | ChangedFunction):
             lines += script.constants
         else:
             lines += [*script.map(claim.is_at_image), ""]

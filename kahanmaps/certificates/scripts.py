@@ -16,7 +16,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.certificates.chains import Chain
-from kahanmaps.certificates.combinations import AffineSymmetry, OrbitIntegral
+from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral
 from kahanmaps.certificates.entropy import EPS, LINE, PRIME, PositiveEntropy
 from kahanmaps.certificates.identities import (
     Claim,
@@ -173,7 +173,8 @@ class _Script:
 
     def __init__(self, to: Language, data: MapData) -> None:
         self.to, self.data, self.lines = to, data, list[str]()
-        self.letters = letters_of(data, "[hijknprst]") | {"h": "h"}
+        self.has_points = self.has_equation = self.is_solved = False
+        self.letters = letters_of(data, "[hijknpqrst]") | {"h": "h"}
 
     def text(self, polynomial: fmpq_mpoly) -> str:
         """The polynomial; a long sum in parts, as Python reads no expression that is nested a thousand times."""
@@ -210,6 +211,19 @@ class _Script:
         identity = identity.replace("^", self.to.power)
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
 
+    def begin(self, claim: Claim, count: int) -> None:
+        """The map that the claim is about, unless it is that of the claim before, and letters of points."""
+        if claim.data is not self.data or not self.has_points:
+            self.data, self.has_points, self.has_equation, self.is_solved = claim.data, True, False, False
+            self.points(count)
+        if not self.has_equation and not isinstance(claim, Chain | ChangedFunction):
+            self.has_equation = True
+            self.equation(self.data)
+        if not self.is_solved and claim.is_at_image:
+            self.is_solved = True
+            self.solution()
+        self.lines.append("")
+
     def points(self, count: int) -> None:
         """The letters of x, x~ and, if requested, of the image of x~."""
         self.define("n", str(self.data.dim))
@@ -231,8 +245,7 @@ class _Script:
         self.check("D is not 0", "D != 0")
         self.check("M N = D r", "act(M, N) == scale(D, r)")
 
-    def chain(self, claim: Chain) -> None:
-        """The checks that each point is the image of its preimage."""
+    def _chain(self, claim: Any, label: str) -> None:
         names = list[tuple[str, str]]()
         for letter, data in claim.maps.items():
             self.equation(data, letter)
@@ -258,7 +271,6 @@ class _Script:
         self.lines.append(
             f"{self.to.comment}So points {i} and {j} are equal: both are P{claim.value_of(i)}/Q{claim.value_of(j)}."
         )
-        self.lines.append("")
 
     def claim(self, claim: Claim) -> None:
         """The definitions and checks of a claim."""
@@ -272,6 +284,8 @@ class _Script:
                 "positive entropy, hence no rational integral, for all but finitely many eps",
                 self._entropy,
             ),
+            Chain: ("points are images of others", self._chain),
+            ChangedFunction: ("P/Q at x = T z is p/q", self._changed),
             OrbitIntegral: ("P(x, x~)/Q is an integral", self._along_orbit),
             AffineSymmetry: ("x -> T takes the map to itself, its inverse or another map", self._symmetry),
         }[type(claim)]
@@ -331,18 +345,26 @@ class _Script:
         identity = f"{after.format('P')} - P == dot(first, E) + dot(second, {after.format('E')})"
         self.check(f"{label}: P(y, z) - P(x, y) = first . E(x, y) + second . E(y, z)", identity)
 
-    def _symmetry(self, claim: Any, label: str) -> None:
+    def _changed(self, claim: Any, label: str) -> None:
+        self._affine(claim)
+        for name, polynomial in zip(("P", "Q", "p", "q"), (*claim.given, *claim.moved), strict=True):
+            self.polynomial(name, polynomial)
+        self.check(f"{label}: P(T z) q(z) = p(z) Q(T z)", "put(P, old, T)*q == p*put(Q, old, T)")
+
+    def _affine(self, claim: Any) -> None:
         part = f"1/{claim.divisor}" if self.to is GP else f"QQ(1, {claim.divisor})"
         self.define("T", f"scale({part}, {self.vector(claim.image)})")
+
+    def _symmetry(self, claim: Any, label: str) -> None:
+        self._affine(claim)
         self.define("Y", "put(T, old, new)")
         self.define("K", self.matrix([[str(entry) for entry in row] for row in claim.matrix]))
-        for letter, data in (("s", claim.source), ("t", claim.target)):
-            if data is not self.data:
-                self.equation(data, letter)
-        E, target = (f"E{'' if data is self.data else k}" for k, data in (("s", claim.source), ("t", claim.target)))
+        target = "E" if claim.target is self.data else "Et"
+        if target == "Et":
+            self.equation(claim.target, "t")
         pair, points = ("Y, T", "(T y, T x)") if claim.reversing else ("T, Y", "(T x, T y)")
-        identity = f"scale({claim.multiple}, put({target}, concat(old, new), concat({pair}))) == act(K, {E})"
-        self.check(f"{label}: {target}{points} is a combination of {E}(x, y)", identity)
+        identity = f"scale({claim.multiple}, put({target}, concat(old, new), concat({pair}))) == act(K, E)"
+        self.check(f"{label}: {target}{points} is a combination of E(x, y)", identity)
 
     def _entropy(self, claim: Any, label: str) -> None:
         """The forms of F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
@@ -391,30 +413,20 @@ class _Script:
         self.check("Q is not 0", "Q != 0")
 
 
-def script_certificate(to: Language, data: MapData, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
-    """Write a script that multiplies out the identities of the claims about the map.
+def script_certificate(to: Language, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
+    """Write a script that multiplies out the identities of the claims.
 
     Args:
         to: GP, for `gp -q FILE`, or PYTHON, for SymPy.
-        data: the map.
         claims: what is checked.
         header: lines of the comment on top.
     """
+    data = max((claim.data for claim in claims), key=lambda data: data.dim)
     script = _Script(to, data)
     has_three_points = any(isinstance(claim, OrbitIntegral) for claim in claims)
-    script.points(2 + has_three_points)
-    if not all(
-        isinstance(claim, Chain) or (isinstance(claim, AffineSymmetry) and claim.source is not data) for claim in claims
-    ):
-        script.equation(data)
-    if any(claim.is_at_image for claim in claims):
-        script.solution()
-    script.lines.append("")
     for claim in claims:
-        if isinstance(claim, Chain):
-            script.chain(claim)
-        else:
-            script.claim(claim)
+        script.begin(claim, 2 + has_three_points)
+        script.claim(claim)
     used = set(re.findall(r"\w+", "\n".join(script.lines)))
     used |= {other for name in used for other in _NEEDS.get(name, ())}
     names = [
