@@ -55,10 +55,13 @@ def command(name: str) -> click.Command:
                 report = check(file, settings, claim, **extra)
                 if option is not None and claim is not None:
                     proof[_CLAIM_OF_CERTIFICATE[name]] = claim
-                else:
-                    proof["claims"] = lib.known_claims(file, name.removeprefix("check-"))
         status = print_report(report, options["as_json"], options["verbose"], options["quiet"])
-        return write_certificate(options, file.name, lambda checker: lib.certificate(file, checker, **proof), status)
+
+        def write(checker: str) -> str:
+            known: dict[str, Any] = {} if proof else {"claims": lib.known_claims(file, name.removeprefix("check-"))}
+            return lib.certificate(file, checker, **proof, **known)
+
+        return write_certificate(options, file.name, write, status)
 
     run = opt.check_options(certificate_option(run))
     if check.is_of_pair:
