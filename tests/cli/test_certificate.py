@@ -106,3 +106,13 @@ def test_what_is_not_proved_for_every_eps_has_no_certificate(command, ending, st
     outcome = kahanmaps(f"{command} --certificate", tmp_path / f"proof{ending}")
     assert (outcome.status, list(tmp_path.iterdir())) == (status, [])
     assert says in outcome.err
+
+
+def test_a_report_links_the_certificate_that_it_writes(kahanmaps, tmp_path):
+    page, proof = tmp_path / "page.html", tmp_path / "proof 1.gp"
+    command = f"report lotka_volterra --from checks --no-pictures --certificate '{proof}' -o"
+    assert kahanmaps(command, page).status == 0
+    assert '<a href="proof%201.gp">proof 1.gp</a>' in page.read_text()
+    assert "dx/phi is invariant" in proof.read_text()
+    assert "Certificate" not in kahanmaps("report lotka_volterra --from checks --no-pictures").out
+    assert kahanmaps(f"report lotka_volterra --eps 1/2 --certificate '{proof}'").status == 2
