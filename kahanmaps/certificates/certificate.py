@@ -44,6 +44,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSea
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
+from kahanmaps.laboratory.preserve.results import Search
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries, linear_symmetries
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.implicit import MapFamily
@@ -111,12 +112,12 @@ def certificate(
     file = as_file(system)
     formulas, data = _prepared(file, checker)
     proved: list[Claim] = []
-    if period is not None:
-        proved.append(periodic(data, _positive(period)))
     if commute is not None:
         if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
             raise InputError("a certificate that two maps commute goes without other claims")
         proved = _commuting(file, data, commute)
+    if period is not None:
+        proved.append(periodic(data, _positive(period)))
     if integrals is not None:
         proved += [conserved_function(data, name, f) for name, f in claimed_functions(file, integrals).items()]
     if density is not None:
@@ -192,6 +193,8 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
     """
     if isinstance(result, Symmetries):
         file, symbols = SystemFile.from_system(result.system, "system"), result.system.symbols
+    elif not isinstance(result, Search):
+        raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
     else:
         file, symbols = result.file, result.symbols
         if result.flow or result.eps is not None:

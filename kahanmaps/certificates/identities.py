@@ -214,10 +214,6 @@ def map_data(
 def restricted(data: MapData, function: RationalFunction) -> MapData:
     """The map of those variables alone that determine the function along orbits, like those of one plane."""
     n, names = data.dim, data.names
-
-    def occurring(polynomial: fmpq_mpoly) -> set[str]:
-        return set(polynomial.context().names()) - set(polynomial.unused_gens())
-
     used = (occurring(function.numerator) | occurring(function.denominator)) & set(names[:n])
     while True:
         rows = [row for name, row in zip(names, data.rows, strict=False) if name in used]
@@ -245,6 +241,8 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
     """
     P, Q = coprime(function, data.names)
     k = max(degree_in(P, data.dim), degree_in(Q, data.dim))
+    if k == 0:
+        raise InputError(f"{name} is a constant, which every map conserves: no certificate is written")
     moved = [homogeneous_value(polynomial, k, data) for polynomial in (P, Q)]
     cofactors = [_quotient(image, polynomial) for image, polynomial in zip(moved, (P, Q), strict=True)]
     if not cofactors[0] or cofactors[0] != cofactors[1]:  # 0: the image of the map lies in Q = 0
@@ -261,6 +259,8 @@ def darboux_polynomial(data: MapData, name: str, polynomial: fmpq_mpoly) -> Darb
     """
     P, _ = coprime(RationalFunction(polynomial, polynomial**0), data.names)
     k = degree_in(P, data.dim)
+    if k == 0:
+        raise InputError(f"{name} is a constant, expected a polynomial of positive degree: no certificate is written")
     cofactor = _quotient(homogeneous_value(P, k, data), P)
     if not cofactor:
         raise FalseClaim(f"{name} is no Darboux polynomial: no certificate can be written")
@@ -276,6 +276,8 @@ def invariant_volume(data: MapData, name: str, function: RationalFunction) -> In
     """
     P, Q = coprime(function, data.names)
     n, k = data.dim, max(degree_in(P, data.dim), degree_in(Q, data.dim))
+    if not P:
+        raise InputError("found the density 0, expected another function: no certificate is written")
     at_old, at_new = data.at_points(P, Q, data.determinant)
     if _times(_times(at_new[0], at_old[1]), at_old[2]) == _times(
         _times(at_old[0], at_new[1]), determinant(data.derivative)
@@ -397,12 +399,19 @@ def _at_numerators(entry: fmpq_mpoly, data: MapData, point: Sequence[fmpq_mpoly]
     return total
 
 
+def occurring(polynomial: fmpq_mpoly) -> set[str]:
+    """The names that occur in the polynomial."""
+    return set(polynomial.context().names()) - set(polynomial.unused_gens())
+
+
 def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mpoly, fmpq_mpoly]:
     """Numerator and denominator in lowest terms, with integral coefficients, in `names`."""
     context = ring(names)
     P, Q = function.numerator, function.denominator
     if function.names != names:
         letters = dict(zip(names, context.gens(), strict=True))
+        if unknown := sorted((occurring(P) | occurring(Q)) - set(names)):
+            raise InputError(f"found {unknown[0]} in a function, expected {', '.join(names)} for a certificate")
         images = [letters.get(name, context.constant(0)) for name in function.names]
         P, Q = (polynomial.compose(*images, ctx=context) for polynomial in (P, Q))
     common = P.gcd(Q)

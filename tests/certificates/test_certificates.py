@@ -25,6 +25,7 @@ from kahanmaps.certificates.certificate import (
     _known_claims,
     _prepared,
     certificate,
+    certificate_of,
 )
 from kahanmaps.certificates.chains import Chain, periodic
 from kahanmaps.certificates.combinations import (
@@ -49,6 +50,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
+from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.languages.formulas import Formulas
 
 PROGRAMS = {
@@ -334,6 +336,32 @@ def test_a_density_that_is_not_invariant_has_no_certificate():
 def test_what_cannot_be_certified_is_said_in_one_sentence(system, arguments, message):
     with pytest.raises(InputError, match=re.escape(message)):
         certificate(load(system), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"integrals": {"I": "eps^2 + 3"}}, "I is a constant, which every map conserves"),
+        ({"integrals": {"I": "x1*x1~"}}, "found x1~ in a function, expected x1, x2, x3, eps"),
+        ({"density": "0"}, "found the density 0"),
+        ({"tensor": [["0", "0", "0"]] * 3}, "the tensor P is 0"),
+        ({"period": 0}, "found period = 0, expected a positive integer"),
+        ({"commute": "associates", "period": 2}, "goes without other claims"),
+        ({"claims": ["entropy"]}, "no claim 'entropy' of euler_top"),
+    ],
+)
+def test_what_holds_for_every_map_or_means_nothing_has_no_certificate(options, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        certificate(load("euler_top"), "gp", **options)
+
+
+def test_results_about_one_eps_or_the_flow_have_no_certificate():
+    with pytest.raises(InputError, match="for every eps: found a result for eps = 1/2"):
+        certificate_of(find_densities("lotka_volterra", eps="1/2"), "gp")
+    with pytest.raises(InputError, match="for every eps: found a result for the flow"):
+        certificate_of(find_densities("lotka_volterra", flow=True), "gp")
+    with pytest.raises(InputError, match="expected the result of a search, got str"):
+        certificate_of("lotka_volterra", "gp")
 
 
 def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note(monkeypatch):
