@@ -13,7 +13,7 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import names_of, ring
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
 from kahanmaps.certificates.chains import Chain
 from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral, residual
 from kahanmaps.certificates.identities import (
@@ -25,6 +25,7 @@ from kahanmaps.certificates.identities import (
     MapData,
     homogeneous_value,
     letters_of,
+    restricted,
 )
 from kahanmaps.errors import InputError
 
@@ -77,27 +78,39 @@ class _Script:
         return [*lines, f"Definition {relation} ({arguments} : R) : Prop := {equations}."]
 
     def unique(self, letter: str, data: MapData) -> list[str]:
-        """The lemma that a point has one image where det M is not 0, by the adjugate of M."""
-        n, x, y = data.dim, " ".join(self.old), " ".join(self.new)
-        z = " ".join(self.third)
+        """The lemma that a point has one image where det M is not 0, by the adjugates of the blocks of M."""
+        x, y, z = (" ".join(letters) for letters in (self.old, self.new, self.third))
         goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.new, self.third, strict=True))
-        residuals = " ".join(f"{letter}{j + 1}" for j in range(n))
+        one = ring(data.names).constant(1)
+        of_each = [restricted(data, RationalFunction(a, one)) for a in ring(data.names).gens()[: data.dim]]
+        blocks = list({block.variables: block for block in of_each}.values())
+        dets = [f"{letter}_det_{b + 1}" for b in range(len(blocks))]
         lines = [
-            f"Definition {letter}_det ({x} : R) : R := {self.text(data.determinant)}.",
+            f"Definition {name} ({x} : R) : R := {self.text(block.determinant)}."
+            for name, block in zip(dets, blocks, strict=True)
+        ]
+        lines += [
+            f"Definition {letter}_det ({x} : R) : R := {' * '.join(f'{name} {x}' for name in dets)}.",
             f"Lemma {letter}_unique : forall {x} {y} {z}, {letter}_det {x} <> 0 ->",
             f"  {letter}_maps {x} {y} -> {letter}_maps {x} {z} -> {goal}.",
             f"Proof. intros {x} {y} {z} H {self.hypothesis('A')} {self.hypothesis('B')}.",
         ]
-        for i, row in enumerate(data.adjugate):
+        for name in dets:
+            steps = f"intro Z; apply H; unfold {letter}_det; rewrite Z; ring"
+            lines.append(f"  assert (N_{name} : {name} {x} <> 0) by ({steps}).")
+        for i, block in enumerate(of_each):
+            name = dets[[other.variables for other in blocks].index(block.variables)]
+            rows = [data.variables.index(variable) + 1 for variable in block.variables]
             terms = [
-                f"({self.text(a)}) * ({letter}{j + 1} {x} {y} - {letter}{j + 1} {x} {z})"
-                for j, a in enumerate(row)
+                f"({self.text(a)}) * ({letter}{j} {x} {y} - {letter}{j} {x} {z})"
+                for j, a in zip(rows, block.adjugate[rows.index(i + 1)], strict=True)
                 if a
             ]
-            steps = f"apply (Rmult_eq_reg_l ({letter}_det {x})); [apply Rminus_diag_uniq |assumption]. "
-            steps += f"transitivity ({' + '.join(terms)}); [cbv delta [{letter}_det {residuals}] beta; ring |"
-            steps += f" rewrite {', '.join(f'?{k}{j + 1}' for k in 'AB' for j in range(n))}; ring]."
-            lines.append(f"  split. {{ {steps} }}" if i < n - 1 else f"  {steps}")
+            defined = " ".join([name, *(f"{letter}{j}" for j in rows)])
+            steps = f"apply (Rmult_eq_reg_l ({name} {x})); [apply Rminus_diag_uniq | assumption]. "
+            steps += f"transitivity ({' + '.join(terms)}); [cbv delta [{defined}] beta; ring |"
+            steps += f" rewrite {', '.join(f'?{k}{j}' for k in 'AB' for j in rows)}; ring]."
+            lines.append(f"  split. {{ {steps} }}" if i < data.dim - 1 else f"  {steps}")
         return [*lines, "Qed."]
 
     def chain(self, claim: Chain, theorem: str) -> list[str]:
