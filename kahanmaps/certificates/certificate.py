@@ -309,7 +309,7 @@ def _claims_of(result: Any, data: MapData) -> list[Claim]:
         found = [integral for integral in result.integrals if integral.verdict is proved]
         return [conserved_function(data, integral.name, integral.function) for integral in found]
     if isinstance(result, DensitySearch):
-        densities = [density for density in result.densities if density.verdict is proved]
+        densities = [density for density in result.shown if density.verdict is proved]  # the others are multiples
         return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
     if isinstance(result, PoissonSearch):
         tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]
