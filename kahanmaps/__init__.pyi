@@ -15,6 +15,7 @@ from .algebra.parsing import parse_polynomial as parse_polynomial
 from .algebra.parsing import parse_rational_function as parse_rational_function
 from .algebra.work import Budget as Budget
 from .certificates.certificate import certificate as certificate
+from .certificates.certificate import certificate_of as certificate_of
 from .checks.claims import Certainty as Certainty
 from .checks.claims import Finding as Finding
 from .checks.claims import Report as Report

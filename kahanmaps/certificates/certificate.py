@@ -4,25 +4,51 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import combinations
 from typing import Any
 
-from kahanmaps.algebra.polynomials import RationalFunction, ring
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.fields import integer
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
+from kahanmaps.certificates.chains import commuting, periodic
+from kahanmaps.certificates.combinations import (
+    affine_symmetry,
+    bilinear_integral,
+    changed_function,
+    modified_hamiltonian,
+)
+from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
-    ConservedFunction,
+    Claim,
     FalseClaim,
-    InvariantVolume,
     MapData,
     conserved_function,
+    darboux_polynomial,
+    invariant_tensor,
     invariant_volume,
     map_data,
+    restricted,
 )
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
-from kahanmaps.checks.settings import claimed_functions
+from kahanmaps.checks.claims import Certainty
+from kahanmaps.checks.settings import claimed_function, claimed_functions, claimed_tensor
+from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
+from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
+from kahanmaps.invariants.poisson import MatrixPoissonTensor
+from kahanmaps.laboratory.laboratory import separated
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
+from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
+from kahanmaps.laboratory.preserve.results import Search
+from kahanmaps.laboratory.symmetry.symmetries import Symmetries, linear_symmetries
 from kahanmaps.languages.formulas import Formulas
-from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 
 CHECKERS: dict[str, Callable[..., str]] = {
     "rocq": rocq_certificate,
@@ -30,6 +56,10 @@ CHECKERS: dict[str, Callable[..., str]] = {
     "sympy": partial(script_certificate, PYTHON),
 }
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
+TENSOR = "poisson"
+ENTROPY = "entropy"  # positive algebraic entropy, hence not integrable
+UNPROVED = "Pi"  # J - eps^2 f'^2 J, where no theorem says that it is invariant
+ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
 
 
 def certificate(
@@ -38,16 +68,31 @@ def certificate(
     claims: Sequence[str] | None = None,
     integrals: Mapping[str, Any] | Any = None,
     *,
+    density: Any = None,
+    tensor: Any = None,
+    everything: bool = False,
+    commute: SystemLike | None = None,
+    period: int | None = None,
     command: str = "",
 ) -> str:
-    """Write a proof that another program checks: integrals, and the invariant volume form, for every eps.
+    """Write a proof that another program checks: integrals, invariant volume forms and further claims, for every eps.
 
     Args:
         system: the system, which stands for its Kahan map, or a map; of dimension at most 6.
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
-            "volume" for the invariant volume form; None for all of them, or for `integrals` alone if these are given.
+            "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
+            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for
+            positive entropy of a map of the plane, for gp. None for all that
+            need no search, or for the following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
+        density: phi, as `check_measure` takes it.
+        tensor: a Poisson tensor, as `check_poisson` takes it.
+        everything: also search, for all of these.
+        commute: another system or map, in the same variables: certify that the two maps commute. For members of the
+            commuting family this is written in coordinates in which the planes separate; "associates" stands for all
+            pairs of rational associated systems.
+        period: certify that this iterate of the map is the identity.
         command: the command line that writes this script, for the comment on top.
 
     Returns:
@@ -55,7 +100,7 @@ def certificate(
         and proves it by identities of polynomials, without kahanmaps. The time step is 2 eps.
 
     Raises:
-        FalseClaim: for a function that is not conserved.
+        FalseClaim: for a claim that is not true.
         InputError: where no claim is known, for a name that is none, and for identities that are too long.
 
     Source: docs/mathematics.md, section "Certificates".
@@ -64,35 +109,40 @@ def certificate(
     >>> print(certificate(load("harmonic"), "gp", ["E"]).splitlines()[-1])
     quit(!ok)
     """
-    if checker not in CHECKERS:
-        raise InputError(f"expected the checker {', '.join(CHECKERS)}, got {str(checker)[:40]!r}")
     file = as_file(system)
-    formulas = Formulas(file)
-    if file.map.root is not None:
-        raise InputError(f"{file.name} has an algebraic number for a parameter: expected rational numbers")
-    if not hasattr(formulas.map, "rows"):
-        raise InputError(
-            f"{file.name} is a {formulas.map.kind}: expected a single map, write one file for each of them"
-        )
-    names = (*formulas.names, "eps")
-    data = map_data(formulas.equation, formulas.variables, formulas.new, names)
-    proved: list[ConservedFunction | InvariantVolume] = []
-    further = {} if integrals is None else claimed_functions(file, integrals)
-    for name, function in further.items():
-        proved.append(conserved_function(data, name, function))
-    known = {} if further and claims is None else dict(_known_claims(formulas, data))
+    formulas, data = _prepared(file, checker)
+    proved: list[Claim] = []
+    if commute is not None:
+        if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
+            raise InputError("a certificate that two maps commute cannot be combined with other claims")
+        proved = _commuting(file, data, commute)
+    if period is not None:
+        proved.append(periodic(data, _positive(period)))
+    if integrals is not None:
+        proved += [conserved_function(data, name, f) for name, f in claimed_functions(file, integrals).items()]
+    if density is not None:
+        proved.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
+    if tensor is not None:
+        proved.append(invariant_tensor(data, "P", _rows(claimed_tensor(file, tensor))))
+    known = dict(_known_claims(formulas, data))
+    searches = {name: search for name, search in _SEARCHES.items() if name not in known}
+    is_required = claims is not None
+    if claims is None:
+        claims = [] if proved and not everything else [*known, *(searches if everything else ())]
+        claims = [
+            name for name in claims if name not in (UNPROVED, ENTROPY) and (name != "symmetry" or file.is_quadratic)
+        ]
     skipped = []
-    for name in known if claims is None else claims:
-        if name not in known:
-            expected = f"one of {', '.join(known)}" if known else "none, as nothing is known of it"
-            raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected {expected}")
-        certify = invariant_volume if name == VOLUME else partial(conserved_function, name=name)
+    for name in claims:
+        if name not in known and name not in searches:
+            expected = ", ".join([*known, *searches])
+            raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected one of {expected}")
         try:
-            proved.append(certify(data, function=known[name]))
+            proved += known[name]() if name in known else _claims_of(searches[name](file), data)
         except FalseClaim:
             raise
-        except InputError as error:  # of all known claims those that are short enough
-            if claims is not None:
+        except InputError as error:  # of all claims those that are short enough
+            if is_required:
                 raise
             skipped.append(f"{name}: {error}")
     if skipped and not proved:
@@ -103,27 +153,211 @@ def certificate(
             f"or search with kahanmaps find-integrals {file.name} --toml"
         )
     return CHECKERS[checker](
-        data, proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
+        proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
     )
 
 
-def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, RationalFunction]]:
-    """The integrals and the density that the file claims, or theorems give, as functions of x and eps."""
-    yield from formulas.integrals.items()
-    n, context = data.dim, ring(data.names)
-    letters = context.gens()
-    for label, _, function in formulas.integrals_by_theorem():
-        # In x and x~, of degree at most 1 in x~: D F(x, N/D) is a polynomial.
-        total = context.constant(0)
-        for exponents, coefficient in function.numerator.terms():
-            term = context.constant(coefficient)
-            for letter, exponent in zip(letters, (*exponents[:n], *exponents[2 * n :]), strict=True):
-                term *= letter ** int(exponent)
-            (image,) = [data.numerators[k] for k in range(n) if exponents[n + k]] or [data.determinant]
-            total += term * image
-        denominator = function.denominator.compose(*letters[:n], *letters, ctx=context)
-        yield label.removeprefix("integral "), RationalFunction.reduced(total, denominator * data.determinant)
+def known_claims(file: SystemFile, check: str) -> list[str]:
+    """The names of the claims of a certificate that a check is about: integrals, measure or poisson.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> known_claims(load("euler_top"), "integrals")
+    ['F1', 'F2']
+    """
+    names = [name for name, _ in _known_claims(*_prepared(file, "gp"))]
+    special = {"measure": {VOLUME}, "poisson": {TENSOR, UNPROVED}}
+    if check in special:
+        return [name for name in names if name in special[check]]
+    return [name for name in names if name not in (VOLUME, TENSOR, UNPROVED, ENTROPY)]
+
+
+def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
+    """Write a proof that another program checks, of what a search has found and proved.
+
+    Args:
+        result: what `find_integrals`, `find_density`, `find_poisson`, `darboux_polynomials` or `find_symmetry` returns,
+            for every eps.
+        checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
+        command: the command line that writes this script, for the comment on top.
+
+    Returns:
+        The text of the script, exact, as that of `certificate`. Symbols of the search stay symbols.
+
+    Raises:
+        InputError: where nothing is proved, for results at one eps or about the flow, and for identities that are too
+            long.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])
+    quit(!ok)
+    """
+    if isinstance(result, Symmetries):
+        file, symbols = SystemFile.from_system(result.system, "system"), result.system.symbols
+    elif not isinstance(result, Search):
+        raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
+    else:
+        file, symbols = result.file, result.symbols
+        if result.flow or result.eps is not None:
+            what = "the flow" if result.flow else f"eps = {result.eps}"
+            raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
+    formulas, data = _prepared(file, checker, symbols)
+    claims = _claims_of(result, data)
+    if not claims:
+        raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
+    return CHECKERS[checker](claims, formulas.header(command))
+
+
+def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
+    """The formulas of a single map over Q, and its equation."""
+    if checker not in CHECKERS:
+        raise InputError(f"expected the checker {', '.join(CHECKERS)}, got {str(checker)[:40]!r}")
+    if file.map.root is not None:
+        raise InputError(f"{file.name} has an algebraic number for a parameter: expected rational numbers")
+    formulas = Formulas(file, symbols)
+    if not hasattr(formulas.map, "rows"):
+        raise InputError(
+            f"{file.name} is a {formulas.map.kind}: expected a single map, write one file for each of them"
+        )
+    return formulas, map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+
+
+def _positive(period: Any) -> int:
+    if integer(period, "period") < 1:
+        raise InputError(f"found period = {period}, expected a positive integer")
+    return integer(period, "period")
+
+
+def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim]:
+    """The claims that maps commute, in separate coordinates if there are any."""
+    if isinstance(other, str) and other == ASSOCIATES:
+        if file.member is None:
+            raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
+        others = [associate.system for associate in listed_associates(file.member)]
+        maps: list[MapFamily] = [as_map(system) for system in others]
+    else:
+        second = as_file(other)
+        g, _ = matched(file, second)
+        if g.variables != file.map.variables or not hasattr(g, "rows") or g.symbols:
+            raise InputError(f"expected two single maps in the same variables, got {file.name} and {second.name}")
+        maps = [file.map, g]
+
+    def of(map_: MapFamily) -> MapData:
+        rows = [[*row[:-1], -row[-1]] for row in map_.rows]
+        return map_data(rows, data.variables, data.new, data.names)
+
+    claims: list[Claim] = []
+    given = [of(map_) for map_ in maps]
+    separate = separated(file.system) if file.is_quadratic else None
+    if separate is not None and all(isinstance(map_, KahanFamily) for map_ in maps):
+        T, zero = separate.T, [fmpq(0)] * file.dim
+        moved = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
+        in_planes = [of(as_map(system)) for system in moved]
+        pairs = enumerate(zip(in_planes, given, strict=True), 1)
+        claims += [affine_symmetry(z, f"coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
+        given = in_planes
+    pairs_of = combinations(range(len(given)), 2)
+    claims += [commuting(f"maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
+    return claims
+
+
+def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
+    """What the file claims, or theorems give: by name the functions that find the identities."""
+    H, file = formulas.H, formulas.file
+
+    def one(find: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
+        return lambda: [find(data, *arguments)]
+
+    for name, function in formulas.integrals.items():
+        yield name, partial(_integral, file, data, name, function)
+    if H is not None:
+        yield "modified_hamiltonian", one(modified_hamiltonian, "modified_hamiltonian", H)
+    for name, form in formulas.forms.items():
+        yield name, one(bilinear_integral, name, form)
     if formulas.density is not None:
-        yield VOLUME, formulas.density
-    elif formulas.H is not None:
-        yield VOLUME, RationalFunction(data.determinant, context.constant(1))
+        yield VOLUME, one(invariant_volume, VOLUME, formulas.density)
+    elif H is not None:
+        yield VOLUME, lambda: [invariant_volume(data, VOLUME, _polynomial(data.determinant))]
+    if data.dim == 2:
+        yield ENTROPY, lambda: [positive_entropy(data, _inverse(formulas, data))]
+    if file.hamiltonian is not None:
+        is_theorem = poisson_tensor_invariant(file.hamiltonian, file.member) is not None
+        name = TENSOR if is_theorem else UNPROVED
+        yield name, lambda: [invariant_tensor(data, name, _hamiltonian_tensor(formulas))]
+
+
+def _integral(file: SystemFile, data: MapData, name: str, function: RationalFunction) -> list[Claim]:
+    """The claims that a function is conserved: for a member of the family in its plane, if it depends on one only."""
+    separate = separated(file.system) if file.member is not None else None
+    if separate is None:
+        return [conserved_function(data, name, function)]
+    rows = as_map(separate.system).rows
+    in_planes = map_data([[*row[:-1], -row[-1]] for row in rows], data.variables, data.new, data.names)
+    moved = separate.function(function)
+    plane = restricted(in_planes, moved)
+    if plane is in_planes:
+        return [conserved_function(data, name, function)]
+    conserved = conserved_function(plane, f"{name}_in_its_plane", moved)
+    T, zero = separate.T, [fmpq(0)] * file.dim
+    way = affine_symmetry(in_planes, f"coordinates_of_{name}", T, zero, target=data)
+    return [way, changed_function(way, name, function, conserved), conserved]
+
+
+def _claims_of(result: Any, data: MapData) -> list[Claim]:
+    """What the result of a search proves about the map."""
+    proved = Certainty.PROVED
+    if isinstance(result, IntegralSearch):
+        found = [integral for integral in result.integrals if integral.verdict is proved]
+        return [conserved_function(data, integral.name, integral.function) for integral in found]
+    if isinstance(result, DensitySearch):
+        densities = [density for density in result.shown if density.verdict is proved]  # the others are multiples
+        return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
+    if isinstance(result, PoissonSearch):
+        tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]
+        return [invariant_tensor(data, tensor.name, tensor.tensor.rows) for tensor in tensors]
+    if isinstance(result, DarbouxSearch):
+        polynomials = [P for space in result.spaces if space.verdict is proved for P in space.polynomials]
+        # The cofactor of a factor of det M has that factor in its denominator: it is no polynomial over D^k.
+        polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
+        return [darboux_polynomial(data, f"D{k}", P) for k, P in enumerate(polynomials, 1)]
+    if isinstance(result, Symmetries):
+        symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
+        return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]
+    raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
+
+
+_SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
+    "integrals": find_integrals,
+    "density": find_densities,
+    TENSOR: find_poisson,
+    "darboux": partial(darboux_polynomials, max_degree=2),
+    "symmetry": linear_symmetries,
+}
+
+
+def _rows(tensor: MatrixPoissonTensor | None) -> Sequence[Sequence[RationalFunction]]:
+    assert tensor is not None
+    return tensor.rows
+
+
+def _inverse(formulas: Formulas, data: MapData) -> MapData:
+    """The inverse of the map. Raises InputError where it is not known."""
+    rows = formulas.map.inverse_rows
+    return map_data([[*row[:-1], -row[-1]] for row in rows], data.variables, data.new, data.names)
+
+
+def _hamiltonian_tensor(formulas: Formulas) -> list[list[RationalFunction]]:
+    """Pi = J - eps^2 f'^2 J."""
+    assert formulas.file.hamiltonian is not None
+    context, J, n = ring((*formulas.names, "eps")), formulas.file.hamiltonian.J, formulas.dim
+    *letters, eps = context.gens()
+    slopes = [[entry.compose(*letters, ctx=context) for entry in row] for row in formulas.jacobian]
+
+    def times(A: Sequence[Sequence[Any]], B: Sequence[Sequence[Any]]) -> list[list[fmpq_mpoly]]:
+        return [[sum((a * B[k][j] for k, a in enumerate(row)), context.constant(0)) for j in range(n)] for row in A]
+
+    square = times(times(slopes, slopes), J.tolist())
+    return [[_polynomial(J[i, j] - eps**2 * square[i][j]) for j in range(n)] for i in range(n)]
+
+
+def _polynomial(polynomial: fmpq_mpoly) -> RationalFunction:
+    return RationalFunction(polynomial, polynomial.context().constant(1))

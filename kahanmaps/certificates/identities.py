@@ -10,21 +10,27 @@ C (the cofactor of the Darboux polynomials P and Q) with
 These two identities are far shorter than the expanded difference, and they are what a certificate states and another
 program multiplies out. The volume form dx/phi, phi = P/Q, is invariant if phi(x~) = phi(x) det dPhi(x); differentiating
 M x~ = r gives M dPhi = L(x, x~), L_ij = d/dx_j (r_i - sum_k M_ik x~_k), so that the identity is
-P(x~) Q(x) det M = P(x) Q(x~) det L.
+P(x~) Q(x) det M = P(x) Q(x~) det L. Likewise dPhi T dPhi^T = T(x~), T = (P_ij)/Q, becomes
+Q(x~) L P(x) L^T = Q(x) M P(x~) M^T. Where such an identity of x and x~ does not hold for any two points, x~ = N/D is
+inserted, and both sides are multiplied by a power of D.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from math import lcm
 
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, degree_in, ring
+from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, degree_in, over_one_denominator, ring
 from kahanmaps.errors import InputError
 
+Row = Sequence[fmpq_mpoly]
 MAX_DIMENSION = 6
 MAX_TERMS = 20_000  # of one side of an identity, multiplied out: some ten seconds for Coq
 MAX_PRODUCTS = 20_000_000  # of terms, to multiply one side out: some ten seconds for PARI
@@ -36,30 +42,92 @@ class FalseClaim(InputError):
 
 @dataclass(frozen=True)
 class MapData:
-    """A map by its equation: `rows` of (M | r), its determinant D, its adjugate and N = adj(M) r, polynomials over Z.
+    """A map by its equation: `rows` of (M | r), polynomials over Z in `names`: the variables, the symbols and eps.
 
-    All polynomials are in `names`: the variables, the symbols and eps. `new` are names for the coordinates of x~.
+    `new` are names for the coordinates of x~. Its solution x~ = N/D is computed when it is needed; InputError is raised
+    where that has too many terms.
     """
 
     variables: tuple[str, ...]
     new: tuple[str, ...]
     names: tuple[str, ...]
     rows: tuple[tuple[fmpq_mpoly, ...], ...]
-    determinant: fmpq_mpoly
-    adjugate: tuple[tuple[fmpq_mpoly, ...], ...]
-    numerators: tuple[fmpq_mpoly, ...]
 
     @property
     def dim(self) -> int:
         """The dimension."""
         return len(self.variables)
 
+    @cached_property
+    def solution(self) -> tuple[fmpq_mpoly, ...]:
+        """D = det M, then N = adj(M) r."""
+        return tuple(self._solved([row[-1] for row in self.rows]))
+
+    @property
+    def determinant(self) -> fmpq_mpoly:
+        """D = det M."""
+        return self.solution[0]
+
+    @property
+    def numerators(self) -> tuple[fmpq_mpoly, ...]:
+        """N = adj(M) r."""
+        return self.solution[1:]
+
+    @cached_property
+    def adjugate(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+        """The adjugate of M."""
+        zero, one = self.rows[0][0] * 0, self.rows[0][0] ** 0
+        columns = [self._solved([one if i == j else zero for i in range(self.dim)])[1:] for j in range(self.dim)]
+        return tuple(zip(*columns, strict=True))
+
+    @cached_property
+    def derivative(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+        """L, the derivative of r - M x~ in x at fixed x~, in the variables, `new`, the symbols and eps."""
+        n = self.dim
+        context = ring((*self.variables, *self.new, *self.names[n:]))
+        letters = context.gens()
+        old, new = [*letters[:n], *letters[2 * n :]], letters[n : 2 * n]
+        residuals = []
+        for row in self.rows:
+            *entries, right = (entry.compose(*old, ctx=context) for entry in row)
+            residuals.append(right - sum((e * y for e, y in zip(entries, new, strict=True)), context.constant(0)))
+        return tuple(tuple(residual.derivative(j) for j in range(n)) for residual in residuals)
+
+    def at_points(self, *functions: fmpq_mpoly) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
+        """The functions of x as functions of x and of x~, in the ring of `derivative`."""
+        n = self.dim
+        context = ring((*self.variables, *self.new, *self.names[n:]))
+        letters = context.gens()
+        points = letters[:n], letters[n : 2 * n]
+        at_old, at_new = ([F.compose(*x, *letters[2 * n :], ctx=context) for F in functions] for x in points)
+        return at_old, at_new
+
+    def _solved(self, right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
+        """Det M and det M times the solution of M y = right: (M | right) annihilates (y, -1)."""
+        n = self.dim
+        rows = [[*row[:-1], entry] for row, entry in zip(self.rows, right, strict=True)]
+        *minors, last = kernel_minors(rows, _times)
+        sign = -1 if n % 2 else 1  # the last of the signed minors is (-1)^n det M
+        return [sign * last, *(-sign * minor for minor in minors)]
+
 
 @dataclass(frozen=True)
-class ConservedFunction:
-    """F = P/Q with D^k P(N/D) = C P and D^k Q(N/D) = C Q; P, Q and C are polynomials over Z."""
+class Claim:
+    """A claim with its name, about a map."""
 
     name: str
+    data: MapData
+
+    @property
+    def is_at_image(self) -> bool:
+        """Whether the proof inserts x~ = N/D."""
+        return True
+
+
+@dataclass(frozen=True)
+class ConservedFunction(Claim):
+    """F = P/Q with D^k P(N/D) = C P and D^k Q(N/D) = C Q; P, Q and C are polynomials over Z."""
+
     numerator: fmpq_mpoly
     denominator: fmpq_mpoly
     degree: int
@@ -67,24 +135,66 @@ class ConservedFunction:
 
 
 @dataclass(frozen=True)
-class InvariantVolume:
-    """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L; `derivative` is L, in the names and those of x~.
+class DarbouxPolynomial(Claim):
+    """P of degree k with D^k P(N/D) = C P, polynomials over Z: P(x~) is P times the cofactor C/D^k."""
+
+    polynomial: fmpq_mpoly
+    degree: int
+    cofactor: fmpq_mpoly
+
+
+@dataclass(frozen=True)
+class InvariantVolume(Claim):
+    """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L.
 
     `is_free`: the identity holds for any two points, also if x~ is not the image of x, as for Hamiltonian systems.
     """
 
-    name: str
     numerator: fmpq_mpoly
     denominator: fmpq_mpoly
     degree: int
-    derivative: tuple[tuple[fmpq_mpoly, ...], ...]
     is_free: bool
+
+    @property
+    def is_at_image(self) -> bool:
+        return not self.is_free
+
+
+@dataclass(frozen=True)
+class InvariantTensor(Claim):
+    """A Poisson tensor (P_ij)/Q with Q(x~) L P(x) L^T = Q(x) M P(x~) M^T; the entries above the diagonal by (i, j).
+
+    `is_free`: the identity holds for any two points.
+    """
+
+    upper: dict[tuple[int, int], fmpq_mpoly]
+    denominator: fmpq_mpoly
+    degree: int
+    is_free: bool
+
+    @property
+    def is_at_image(self) -> bool:
+        return not self.is_free
+
+    @property
+    def dim(self) -> int:
+        """The dimension."""
+        return self.data.dim
+
+    def entry(self, i: int, j: int) -> fmpq_mpoly:
+        """P_ij."""
+        return self.upper[i, j] if i < j else -self.upper[j, i] if j < i else self.denominator * 0
+
+    @property
+    def triples(self) -> list[tuple[int, int, int]]:
+        """The indices i < j < k of the Jacobi identities."""
+        return list(combinations(range(self.dim), 3))
 
 
 def map_data(
     equation: Sequence[Sequence[fmpq_mpoly]], variables: Sequence[str], new: Sequence[str], names: Sequence[str]
 ) -> MapData:
-    """The determinant, adjugate and numerators of a map given by the rows of (M | r).
+    """The map given by the rows of (M | r), over Z.
 
     Args:
         equation: n rows of n + 1 polynomials over Q in `names`.
@@ -93,24 +203,33 @@ def map_data(
         names: the variables, the symbols and eps.
 
     Raises:
-        InputError: for more than six variables, or too many terms.
+        InputError: for more than six variables.
     """
     n = len(variables)
     if n > MAX_DIMENSION:
         raise InputError(f"expected a map in at most {MAX_DIMENSION} variables for a certificate, got {n}")
-    rows = [tuple(_integral_row(row)) for row in equation]
-    zero, one = rows[0][0] * 0, rows[0][0] ** 0
+    return MapData(tuple(variables), tuple(new), tuple(names), tuple(tuple(_integral_row(row)) for row in equation))
 
-    def solution(right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-        """det M and det M times the solution of M y = right: (M | right) annihilates (y, -1)."""
-        *minors, last = kernel_minors([[*row[:-1], entry] for row, entry in zip(rows, right, strict=True)], _times)
-        sign = -1 if n % 2 else 1  # the last of the signed minors is (-1)^n det M
-        return [sign * last, *(-sign * minor for minor in minors)]
 
-    determinant, *numerators = solution([row[-1] for row in rows])
-    columns = [solution([one if i == j else zero for i in range(n)])[1:] for j in range(n)]
-    adjugate = tuple(tuple(columns[j][i] for j in range(n)) for i in range(n))
-    return MapData(tuple(variables), tuple(new), tuple(names), tuple(rows), determinant, adjugate, tuple(numerators))
+def restricted(data: MapData, function: RationalFunction) -> MapData:
+    """The map of those variables alone that determine the function along orbits, like those of one plane."""
+    n, names = data.dim, data.names
+    used = (occurring(function.numerator) | occurring(function.denominator)) & set(names[:n])
+    while True:
+        rows = [row for name, row in zip(names, data.rows, strict=False) if name in used]
+        more = {names[j] for row in rows for j in range(n) if row[j]}
+        more |= {name for row in rows for entry in row for name in occurring(entry)} & set(names[:n])
+        if more <= used:
+            break
+        used |= more
+    if len(used) in (0, n):
+        return data
+    kept = [j for j in range(n) if names[j] in used]
+    context = ring((*(names[j] for j in kept), *names[n:]))
+    letters = dict(zip(context.names(), context.gens(), strict=True))
+    images = [letters.get(name, context.constant(0)) for name in names]
+    small = tuple(tuple(row[j].compose(*images, ctx=context) for j in (*kept, n)) for row in rows)
+    return MapData(tuple(names[j] for j in kept), tuple(data.new[j] for j in kept), tuple(context.names()), small)
 
 
 def conserved_function(data: MapData, name: str, function: RationalFunction) -> ConservedFunction:
@@ -120,44 +239,108 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
         FalseClaim: if it does not.
         InputError: if the identities have too many terms.
     """
-    P, Q = _coprime(function, data.names)
+    P, Q = coprime(function, data.names)
     k = max(degree_in(P, data.dim), degree_in(Q, data.dim))
+    if k == 0:
+        raise InputError(f"{name} is a constant, which every map conserves: no certificate is written")
     moved = [homogeneous_value(polynomial, k, data) for polynomial in (P, Q)]
     cofactors = [_quotient(image, polynomial) for image, polynomial in zip(moved, (P, Q), strict=True)]
     if not cofactors[0] or cofactors[0] != cofactors[1]:  # 0: the image of the map lies in Q = 0
         raise FalseClaim(f"{name} is not conserved: no certificate can be written")
-    return ConservedFunction(name, P, Q, k, cofactors[0])
+    return ConservedFunction(name, data, P, Q, k, cofactors[0])
 
 
-def invariant_volume(data: MapData, function: RationalFunction) -> InvariantVolume:
+def darboux_polynomial(data: MapData, name: str, polynomial: fmpq_mpoly) -> DarbouxPolynomial:
+    """The identity that proves that the function is a Darboux polynomial of the map.
+
+    Raises:
+        FalseClaim: if it is none.
+        InputError: if the identity has too many terms.
+    """
+    P, _ = coprime(RationalFunction(polynomial, polynomial**0), data.names)
+    k = degree_in(P, data.dim)
+    if k == 0:
+        raise InputError(f"{name} is a constant, expected a polynomial of positive degree: no certificate is written")
+    cofactor = _quotient(homogeneous_value(P, k, data), P)
+    if not cofactor:
+        raise FalseClaim(f"{name} is no Darboux polynomial: no certificate can be written")
+    return DarbouxPolynomial(name, data, P, k, cofactor)
+
+
+def invariant_volume(data: MapData, name: str, function: RationalFunction) -> InvariantVolume:
     """The identity that proves that the map leaves the volume form dx/phi invariant, phi the function.
 
     Raises:
         FalseClaim: if it does not.
         InputError: if the identity has too many terms.
     """
-    P, Q = _coprime(function, data.names)
+    P, Q = coprime(function, data.names)
     n, k = data.dim, max(degree_in(P, data.dim), degree_in(Q, data.dim))
-    context = ring((*data.variables, *data.new, *data.names[n:]))
-    letters = context.gens()
-    old, new = [*letters[:n], *letters[2 * n :]], letters[n : 2 * n]
-    residuals = []
-    for row in data.rows:
-        *entries, right = (entry.compose(*old, ctx=context) for entry in row)
-        residuals.append(right - sum((e * y for e, y in zip(entries, new, strict=True)), context.constant(0)))
-    derivative = tuple(tuple(residual.derivative(j) for j in range(n)) for residual in residuals)
-    at_old, at_new = ([F.compose(*at, ctx=context) for F in (P, Q)] for at in (old, [*new, *letters[2 * n :]]))
-    left = _times(_times(at_new[0], at_old[1]), data.determinant.compose(*old, ctx=context))
-    if left == _times(_times(at_old[0], at_new[1]), determinant(derivative)):
-        return InvariantVolume("volume", P, Q, k, derivative, True)
-    # det L at x~ = N/D: D L(x, N/D) has polynomial entries, as L is of degree 1 in x~.
-    point = [*data.numerators, *ring(data.names).gens()[n:]]
-    entries_at_image = [[_at_numerators(entry, data, point) for entry in row] for row in derivative]
+    if not P:
+        raise InputError("found the density 0, expected another function: no certificate is written")
+    at_old, at_new = data.at_points(P, Q, data.determinant)
+    if _times(_times(at_new[0], at_old[1]), at_old[2]) == _times(
+        _times(at_old[0], at_new[1]), determinant(data.derivative)
+    ):
+        return InvariantVolume(name, data, P, Q, k, True)
     left = _times(_times(homogeneous_value(P, k, data), Q), data.determinant ** (n + 1))
-    right = _times(_times(homogeneous_value(Q, k, data), P), determinant(entries_at_image))
+    right = _times(_times(homogeneous_value(Q, k, data), P), determinant(_derivative_at_image(data)))
     if left != right:
         raise FalseClaim("dx/phi is not invariant: no certificate can be written")
-    return InvariantVolume("volume", P, Q, k, derivative, False)
+    return InvariantVolume(name, data, P, Q, k, False)
+
+
+def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalFunction]]) -> InvariantTensor:
+    """The identities that prove that the map is Poisson for a tensor, and the Jacobi identity.
+
+    Raises:
+        FalseClaim: if one of them does not hold.
+        InputError: if an identity has too many terms.
+    """
+    n, context = data.dim, ring(data.names)
+    letters = dict(zip(data.names, context.gens(), strict=True))
+    entries = {(i, j): rows[i][j] for i, j in combinations(range(n), 2)}
+    used = next(iter(entries.values())).names if entries else ()
+    numerators, Q = over_one_denominator(list(entries.values()), context, [letters[name] for name in used])
+    multiple = lcm(*(int(common_denominator(P)) for P in (*numerators, Q)))
+    Q, upper = Q * multiple, {pair: P * multiple for pair, P in zip(entries, numerators, strict=True)}
+    if not any(upper.values()):
+        raise InputError(f"the tensor {name} is 0 or has dimension 1: expected another one for a certificate")
+    k = max(degree_in(P, n) for P in (*upper.values(), Q))
+    claim = InvariantTensor(name, data, upper, Q, k, True)
+    P = [[claim.entry(i, j) for j in range(n)] for i in range(n)]
+    for indices in claim.triples:
+        total = context.constant(0)
+        for i, j, l in (indices, (*indices[1:], indices[0]), (indices[2], *indices[:2])):
+            for s in range(n):
+                total += _times(P[i][s], _times(P[j][l].derivative(s), Q) - _times(P[j][l], Q.derivative(s)))
+        if total:
+            raise FalseClaim(f"{name} is no Poisson tensor: no certificate can be written")
+    flat, new = data.at_points(*(entry for row in (*P, *data.rows) for entry in row), Q)
+    at_old, M = [flat[n * i : n * i + n] for i in range(n)], [flat[n * n + (n + 1) * i :][:n] for i in range(n)]
+    at_new = [new[n * i : n * i + n] for i in range(n)]
+    if _sandwich(data.derivative, at_old, new[-1]) == _sandwich(M, at_new, flat[-1]):
+        return claim
+    moved = [[homogeneous_value(entry, k, data) for entry in row] for row in P]
+    left = _sandwich(_derivative_at_image(data), P, homogeneous_value(Q, k, data))
+    if left != _sandwich([row[:-1] for row in data.rows], moved, _times(Q, data.determinant**2)):
+        raise FalseClaim(f"the map is not Poisson for {name}: no certificate can be written")
+    return replace(claim, is_free=False)
+
+
+def _sandwich(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fmpq_mpoly]:
+    """The entries above the diagonal of factor A P A^T."""
+    n = len(P)
+    zero = factor * 0
+    AP = [[sum((_times(row[k], P[k][j]) for k in range(n)), zero) for j in range(n)] for row in A]
+    pairs = combinations(range(n), 2)
+    return [_times(factor, sum((_times(AP[i][k], A[j][k]) for k in range(n)), zero)) for i, j in pairs]
+
+
+def _derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
+    """D L(x, N/D), polynomials as L is of degree at most 1 in x~."""
+    point = [*data.numerators, *ring(data.names).gens()[data.dim :]]
+    return [[_at_numerators(entry, data, point) for entry in row] for row in data.derivative]
 
 
 def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
@@ -173,8 +356,8 @@ def letters_of(data: MapData, taken: str) -> dict[str, str]:
     `taken` is a regular expression for the names that the script itself defines.
     """
     letters: dict[str, str] = {}
-    for name in (*data.names, *data.new):
-        is_plain = re.fullmatch(r"eps|[a-z]\d*(_new)?", name) and not re.fullmatch(taken, name)
+    for name in (*data.names, *data.new, *(f"{name}2" for name in data.new)):
+        is_plain = re.fullmatch(r"eps|[a-z]\d*(_new2?)?", name) and not re.fullmatch(taken, name)
         text = name if is_plain else "v_" + re.sub(r"[^A-Za-z0-9_]", "_", name)
         while text in letters.values():
             text += "_"
@@ -216,13 +399,21 @@ def _at_numerators(entry: fmpq_mpoly, data: MapData, point: Sequence[fmpq_mpoly]
     return total
 
 
-def _coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mpoly, fmpq_mpoly]:
+def occurring(polynomial: fmpq_mpoly) -> set[str]:
+    """The names that occur in the polynomial."""
+    return set(polynomial.context().names()) - set(polynomial.unused_gens())
+
+
+def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mpoly, fmpq_mpoly]:
     """Return numerator and denominator in lowest terms, with integral coefficients, in `names`."""
     context = ring(names)
     P, Q = function.numerator, function.denominator
     if function.names != names:
         letters = dict(zip(names, context.gens(), strict=True))
-        P, Q = (polynomial.compose(*(letters[name] for name in function.names), ctx=context) for polynomial in (P, Q))
+        if unknown := sorted((occurring(P) | occurring(Q)) - set(names)):
+            raise InputError(f"found {unknown[0]} in a function, expected {', '.join(names)} for a certificate")
+        images = [letters.get(name, context.constant(0)) for name in function.names]
+        P, Q = (polynomial.compose(*images, ctx=context) for polynomial in (P, Q))
     common = P.gcd(Q)
     P, Q = P / common, Q / common
     scale = common_denominator(P), common_denominator(Q)

@@ -8,17 +8,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
+from kahanmaps.certificates.chains import Chain
+from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral, residual
 from kahanmaps.certificates.identities import (
+    Claim,
     ConservedFunction,
+    DarbouxPolynomial,
+    InvariantTensor,
     InvariantVolume,
     MapData,
     homogeneous_value,
     letters_of,
+    restricted,
 )
+from kahanmaps.errors import InputError
 
 _LEMMA = """\
 Lemma equal_fractions : forall a b c d : R, b <> 0 -> d <> 0 -> a * d = c * b -> a / b = c / d.
@@ -35,13 +44,11 @@ class _Script:
     """The lines of a script about one map, and the names that its letters have in it."""
 
     def __init__(self, data: MapData) -> None:
-        self.data = data
-        self.letters = letters_of(data, r"[amnrl]\d+")  # m11, a11, n1, r1, l11 are the script's own
+        self.data, self.is_solved = data, False
+        self.letters = letters_of(data, r"[ad-hlmnprw]\d+")  # a11, e1, ... are the script's own
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
-        n = data.dim
-        self.defined = ["det", *(f"{k}{i + 1}{j + 1}" for k in "ma" for i in range(n) for j in range(n))]
-        self.defined += [f"{k}{i + 1}" for k in "rn" for i in range(n)]
+        self.third = [self.letters[f"{name}2"] for name in data.new]
 
     @property
     def cramer(self) -> str:
@@ -53,16 +60,224 @@ class _Script:
         letters = [self.letters[name] for name in names_of(polynomial)]
         return polynomial_text(polynomial, letters)
 
+    @property
+    def constants(self) -> list[str]:
+        """The symbols and eps, as variables of the section."""
+        letters = [self.letters[name] for name in self.data.names[self.data.dim :]]
+        return [f"Variables {' '.join(letters)} : R."] if letters else []
+
+    def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
+        """The equation of the map as a relation between any two points, with the residuals e1, e2, ..."""
+        rows, arguments = (data or self.data).rows, " ".join([*self.old, *self.new])
+        lines = [f"(* The equation of the map, M x~ - r = 0: `{relation}` x x~ says that it holds. *)"]
+        for i, row in enumerate(rows):
+            terms = [f"({self.text(entry)}) * {name}" for entry, name in zip(row[:-1], self.new, strict=True) if entry]
+            total = f"{' + '.join(terms)} - ({self.text(row[-1])})"
+            lines.append(f"Definition {letter}{i + 1} ({arguments} : R) : R := {total}.")
+        equations = " /\\ ".join(f"{letter}{i + 1} {arguments} = 0" for i in range(len(rows)))
+        return [*lines, f"Definition {relation} ({arguments} : R) : Prop := {equations}."]
+
+    def unique(self, letter: str, data: MapData) -> list[str]:
+        """The lemma that a point has one image where det M is not 0, by the adjugates of the blocks of M."""
+        x, y, z = (" ".join(letters) for letters in (self.old, self.new, self.third))
+        goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.new, self.third, strict=True))
+        one = ring(data.names).constant(1)
+        of_each = [restricted(data, RationalFunction(a, one)) for a in ring(data.names).gens()[: data.dim]]
+        blocks = list({block.variables: block for block in of_each}.values())
+        dets = [f"{letter}_det_{b + 1}" for b in range(len(blocks))]
+        lines = [
+            f"Definition {name} ({x} : R) : R := {self.text(block.determinant)}."
+            for name, block in zip(dets, blocks, strict=True)
+        ]
+        lines += [
+            f"Definition {letter}_det ({x} : R) : R := {' * '.join(f'{name} {x}' for name in dets)}.",
+            f"Lemma {letter}_unique : forall {x} {y} {z}, {letter}_det {x} <> 0 ->",
+            f"  {letter}_maps {x} {y} -> {letter}_maps {x} {z} -> {goal}.",
+            f"Proof. intros {x} {y} {z} H {self.hypothesis('A')} {self.hypothesis('B')}.",
+        ]
+        for name in dets:
+            steps = f"intro Z; apply H; unfold {letter}_det; rewrite Z; ring"
+            lines.append(f"  assert (N_{name} : {name} {x} <> 0) by ({steps}).")
+        for i, block in enumerate(of_each):
+            name = dets[[other.variables for other in blocks].index(block.variables)]
+            rows = [data.variables.index(variable) + 1 for variable in block.variables]
+            terms = [
+                f"({self.text(a)}) * ({letter}{j} {x} {y} - {letter}{j} {x} {z})"
+                for j, a in zip(rows, block.adjugate[rows.index(i + 1)], strict=True)
+                if a
+            ]
+            defined = " ".join([name, *(f"{letter}{j}" for j in rows)])
+            steps = f"apply (Rmult_eq_reg_l ({name} {x})); [apply Rminus_diag_uniq | assumption]. "
+            steps += f"transitivity ({' + '.join(terms)}); [cbv delta [{defined}] beta; ring |"
+            steps += f" rewrite {', '.join(f'?{k}{j}' for k in 'AB' for j in rows)}; ring]."
+            lines.append(f"  split. {{ {steps} }}" if i < data.dim - 1 else f"  {steps}")
+        return [*lines, "Qed."]
+
+    def chain(self, claim: Chain, theorem: str) -> list[str]:
+        """The theorem that two points at the ends of chains of images are equal."""
+        n, lines = self.data.dim, list[str]()
+        for letter, data in claim.maps.items():
+            lines += [*self.predicate(letter, f"{letter}_maps", data), *self.unique(letter, data)]
+        lines += [f"Variables {' '.join(self.old)} : R.  (* a point x *)"]
+        points, denominators = [self.old], [[""] * n]
+        for v, value in enumerate(claim.values[1:], 1):
+            for i, P in enumerate(value.numerators):
+                lines.append(f"Definition w{v}_{i + 1} : R := {self.text(P)}.")
+            for k, Q in enumerate(value.denominators):
+                lines += [
+                    f"Definition d{v}_{k + 1} : R := {self.text(Q)}.",
+                    f"Hypothesis h{v}_{k + 1} : d{v}_{k + 1} <> 0.",
+                ]
+            points.append([f"w{v}_{i + 1}" for i in range(n)])
+            denominators.append([f"d{v}_{k + 1}" for k in value.which])
+        texts = [
+            " ".join(f"({a} / {q})" if q else a for a, q in zip(point, dens, strict=True))
+            for point, dens in zip(points, denominators, strict=True)
+        ]
+        defined = " ".join(dict.fromkeys(name for names in (*points[1:], *denominators) for name in names if name))
+        for k, (letter, source, v) in enumerate(claim.arrows, 1):
+            s, data = claim.value_of(source), claim.maps[letter]
+            names = (*data.variables, *data.new, *data.names[n:])
+            for i, residual_i in enumerate(residual(data, names, 0, n)):
+                moved, powers = self._without_denominators(
+                    residual_i, [*points[s], *points[v]], [*denominators[s], *denominators[v]]
+                )
+                lines += [
+                    f"Lemma arrow{k}_{i + 1} : {letter}{i + 1} {texts[s]} {texts[v]} = 0.",
+                    "Proof.",
+                    f"  transitivity (({moved}) / ({powers})).",
+                    f"  - unfold {letter}{i + 1}. field. repeat split; assumption.",
+                    f"  - replace ({moved}) with 0; [unfold Rdiv; ring |].",
+                    f"    cbv delta [{defined}] beta; ring.",
+                    "Qed.",
+                ]
+            proofs = [f"exact arrow{k}_{i + 1}" for i in range(n)]
+            steps = " ".join(f"split; [{proof} |]." for proof in proofs[:-1])
+            lines.append(f"Lemma arrow{k} : {letter}_maps {texts[s]} {texts[v]}. Proof. {steps} {proofs[-1]}. Qed.")
+        nodes = [self.old, *([f"{a}_p{k}" for a in self.old] for k in range(1, len(claim.arrows) + 1))]
+        hypotheses, proof = [], []
+        for k, (letter, source, _) in enumerate(claim.arrows, 1):
+            before, after = " ".join(nodes[source]), " ".join(nodes[k])
+            hypotheses.append(f"  {letter}_det {before} <> 0 -> {letter}_maps {before} {after} ->")
+            proof.append(f"  intros D M. destruct ({letter}_unique _ _ D M arrow{k}) as {self.hypothesis('A')}.")
+            proof[-1] = proof[-1].replace("_unique _ _", "_unique" + " _" * (3 * n))
+            proof.append(f"  subst {after}. clear D M.")
+        i, j = claim.says
+        conclusion = " /\\ ".join(f"{a} = {b}" for a, b in zip(nodes[i], nodes[j], strict=True))
+        return [
+            *lines,
+            f"Theorem {theorem} : forall {' '.join(name for node in nodes[1:] for name in node)},",
+            *hypotheses,
+            f"  {conclusion}.",
+            f"Proof. intros {' '.join(name for node in nodes[1:] for name in node)}.",
+            *proof,
+            "  repeat (split; [reflexivity |]). reflexivity.",
+            "Qed.",
+        ]
+
+    def _without_denominators(
+        self, polynomial: fmpq_mpoly, numerators: Sequence[str], denominators: Sequence[str]
+    ) -> tuple[str, str]:
+        """The value of a polynomial at fractions, as a numerator and a product of powers of denominators."""
+        distinct = [q for q in dict.fromkeys(denominators) if q]
+        count = len(numerators)
+        constants = [self.letters[name] for name in names_of(polynomial)[count:]]
+        rows = [([int(e) for e in exponents], c) for exponents, c in polynomial.terms()]
+
+        def degree(row: Sequence[int], q: str) -> int:
+            return sum(e for e, other in zip(row[:count], denominators, strict=True) if other == q)
+
+        powers = {q: max((degree(row, q) for row, _ in rows), default=0) for q in distinct}
+        pieces = []
+        for row, coefficient in rows:
+            factors = [*zip([*numerators, *constants], row, strict=True)]
+            factors += [(q, power - degree(row, q)) for q, power in powers.items()]
+            pieces.append(" * ".join([f"({coefficient})", *(a if e == 1 else f"{a} ^ {e}" for a, e in factors if e)]))
+        return " + ".join(pieces), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
+
+    def hypothesis(self, letter: str) -> str:
+        """The pattern that takes the hypothesis `maps` apart: (A1 & A2)."""
+        names = [f"{letter}{i + 1}" for i in range(self.data.dim)]
+        return f"({' & '.join(names)})" if len(names) > 1 else names[0]
+
+    def along_orbit(self, claim: OrbitIntegral, theorem: str) -> list[str]:
+        """The theorem that a function of x and x~ has the same value one step later."""
+        n = self.data.dim
+        x, y, z = (" ".join(letters) for letters in (self.old, self.new, self.third))
+        residuals = [f"e{i + 1}" for i in range(n)]
+        terms = [f"({self.text(c)}) * {e} {x} {y}" for c, e in zip(claim.first, residuals, strict=True) if c]
+        terms += [f"({self.text(c)}) * {e} {y} {z}" for c, e in zip(claim.second, residuals, strict=True) if c]
+        rewriting = ", ".join(f"?{letter}{i + 1}" for letter in "AB" for i in range(n))
+        return [
+            *self.predicate(),
+            "(* value x x~ = num x x~ / den is an integral. *)",
+            f"Definition num ({x} {y} : R) : R := {self.text(claim.numerator)}.",
+            f"Definition den : R := {self.text(claim.denominator)}.",
+            f"Definition value ({x} {y} : R) : R := num {x} {y} / den.",
+            f"Theorem {theorem} : forall {x} {y} {z},",
+            f"  maps {x} {y} -> maps {y} {z} -> value {y} {z} = value {x} {y}.",
+            "Proof.",
+            f"  intros {x} {y} {z} {self.hypothesis('A')} {self.hypothesis('B')}. unfold value.",
+            f"  replace (num {y} {z}) with (num {x} {y}); [reflexivity |]. apply Rminus_diag_uniq_sym.",
+            f"  transitivity ({' + '.join(terms)}).",
+            f"  - cbv delta [num {' '.join(residuals)}] beta; ring.",
+            f"  - rewrite {rewriting}. ring.",
+            "Qed.",
+        ]
+
+    def symmetric(self, claim: AffineSymmetry, theorem: str) -> list[str]:
+        """The theorem that x -> T x takes the map to itself, to its inverse, or to another map."""
+        n, is_own = self.data.dim, claim.target is claim.data
+        x, y = " ".join(self.old), " ".join(self.new)
+        polynomials = self.data.at_points(*claim.image)
+        points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
+        first, second = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
+        target, letters = ("maps", "e") if is_own else ("target", "ef")
+        lines = [
+            *self.predicate(),
+            *([] if is_own else self.predicate("f", target, claim.target)),
+            f"(* {'To the inverse' if claim.reversing else 'Map to map'} by T: {', '.join(points[0])} *)",
+            f"Theorem {theorem} : forall {x} {y}, maps {x} {y} ->",
+            f"  {target} {first} {second}.",
+            "Proof.",
+            f"  intros {x} {y} {self.hypothesis('A')}.",
+        ]
+        for i, row in enumerate(claim.matrix):
+            terms = [f"({c}) * e{j + 1} {x} {y}" for j, c in enumerate(row) if c]
+            steps = f"transitivity (({' + '.join(terms) or '0'}) / {claim.multiple}); "
+            steps += f"[cbv delta [{' '.join(f'{k}{j + 1}' for k in letters for j in range(n))}] beta; field |"
+            steps += f" rewrite {', '.join(f'?A{j + 1}' for j in range(n))}; field]."
+            lines.append(f"  split; [{steps[:-1]} |]." if i < n - 1 else f"  {steps}")
+        return [*lines, "Qed."]
+
+    def changed(self, claim: ChangedFunction, theorem: str) -> list[str]:
+        """The theorem that a function of x is another function of z, x = T z."""
+        z, names = " ".join(self.old), ("num", "den", "num_z", "den_z")
+        at = " ".join(f"(({self.text(P)}) / {claim.divisor})" for P in claim.image)
+        functions = zip(names, (*claim.given, *claim.moved), strict=True)
+        return [
+            *(f"Definition {name} ({z} : R) : R := {self.text(P)}." for name, P in functions),
+            f"Theorem {theorem} : forall {z},",
+            f"  num {at} * den_z {z} = num_z {z} * den {at}.",
+            f"Proof. intros {z}. cbv delta [{' '.join(names)}] beta; field. Qed.",
+        ]
+
     def expand(self, *further: str) -> str:
         """Return the tactic that unfolds all definitions and proves an identity of polynomials."""
-        return f"cbv delta [{' '.join((*further, *self.defined))}] beta; ring."
+        n = self.data.dim
+        defined = [
+            "det",
+            *(f"{k}{i + 1}{j + 1}" for k in "ma"[: 1 + self.is_solved] for i in range(n) for j in range(n)),
+        ]
+        defined += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
+        return f"cbv delta [{' '.join((*further, *defined))}] beta; ring."
 
-    def map(self) -> list[str]:
-        """The variables, the equation, and Cramer's rule."""
+    def map(self, is_solved: bool) -> list[str]:
+        """The variables, the equation, and Cramer's rule where it is needed."""
         data, n = self.data, self.data.dim
-        constants = [self.letters[name] for name in data.names[n:]]
+        self.is_solved = is_solved
         lines = [
-            f"Variables {' '.join(constants)} : R." if constants else "",
+            *self.constants,
             f"Variables {' '.join(self.old)} : R.  (* a point x *)",
             f"Variables {' '.join(self.new)} : R.  (* its image x~ *)",
             "",
@@ -77,9 +292,10 @@ class _Script:
         lines += [
             f"Definition det : R := {determinant_text(entries)}.",
             "Hypothesis regular : det <> 0.",
-            "",
-            "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)",
         ]
+        if not is_solved:
+            return lines
+        lines += ["", "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)"]
         for i in range(n):
             lines += [f"Definition a{i + 1}{j + 1} : R := {self.text(data.adjugate[i][j])}." for j in range(n)]
             lines.append(f"Definition n{i + 1} : R := {self.text(data.numerators[i])}.")
@@ -95,18 +311,22 @@ class _Script:
             ]
         return lines
 
-    def moved(self, label: str, polynomial: fmpq_mpoly, degree: int, value: str, *also: str) -> list[str]:
-        """The lemma det^degree P(x~) = value for the function `label` = P; `also` are definitions in the value."""
+    def moved(self, label: str, polynomial: fmpq_mpoly, degree: int, value: str = "", *also: str) -> list[str]:
+        """The lemma det^degree P(x~) = value for the function `label` = P; `also` are definitions in the value.
+
+        Without a value it is P made homogeneous, at N and det.
+        """
         n = self.data.dim
-        letters = [self.letters[name] for name in self.data.names]
-        scaled = [f"(det * {name})" for name in self.new] + letters[n:]
-        products = _homogeneous_text(polynomial, scaled, degree, n)
+        constants = [self.letters[name] for name in self.data.names[n:]]
+        scaled = [f"(det * {name})" for name in self.new]
+        at_n = _homogeneous_text(polynomial, [*(f"n{i + 1}" for i in range(n)), *constants], degree, n)
+        last = f"{self.expand(label, *also)}" if value else "ring."
         return [
-            f"Lemma {label}_image : {label} {' '.join(self.new)} * det ^ {degree} = {value}.",
+            f"Lemma {label}_image : {label} {' '.join(self.new)} * det ^ {degree} = {value or at_n}.",
             "Proof.",
-            f"  transitivity ({products}).",
+            f"  transitivity ({_homogeneous_text(polynomial, [*scaled, *constants], degree, n)}).",
             f"  - cbv delta [{label}] beta; ring.",
-            f"  - rewrite {self.cramer}. {self.expand(label, *also)}",
+            f"  - rewrite {self.cramer}. {last}",
             "Qed.",
         ]
 
@@ -132,17 +352,133 @@ class _Script:
         ]
         return lines
 
+    def darboux(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
+        """The theorem that P(x~) is P(x) times the cofactor."""
+        old, new = " ".join(self.old), " ".join(self.new)
+        return [
+            "(* A Darboux polynomial, with its cofactor over a power of det. *)",
+            f"Definition num ({old} : R) : R := {self.text(claim.polynomial)}.",
+            f"Definition cofactor : R := {self.text(claim.cofactor)}.",
+            *self.moved("num", claim.polynomial, claim.degree, f"cofactor * num {old}", "cofactor"),
+            f"Theorem {theorem} : num {new} = cofactor / det ^ {claim.degree} * num {old}.",
+            "Proof.",
+            f"  apply (Rmult_eq_reg_r (det ^ {claim.degree})); [| apply pow_nonzero; exact regular].",
+            "  rewrite num_image. field. exact regular.",
+            "Qed.",
+        ]
+
+    def derivative(self) -> tuple[list[str], str]:
+        """The definitions of l11, l12, ..., the entries of L, and all these names."""
+        lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
+        names = []
+        for i, row in enumerate(self.data.derivative):
+            lines += [f"Definition l{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row)]
+            names += [f"l{i + 1}{j + 1}" for j in range(len(row))]
+        return lines, " ".join(names)
+
+    def poisson(self, claim: InvariantTensor, theorem: str) -> list[str]:
+        """The theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
+        n, k, old, new = claim.dim, claim.degree, " ".join(self.old), " ".join(self.new)
+        lines, flat = self.derivative()
+        lines.append("(* The Poisson tensor T: T_ij = pij / den for i < j, T_ji = -T_ij. *)")
+        pairs = {pair: f"p{pair[0] + 1}{pair[1] + 1}" for pair in claim.upper}
+        for pair, name in pairs.items():
+            lines.append(f"Definition {name} ({old} : R) : R := {self.text(claim.upper[pair])}.")
+        lines.append(f"Definition den ({old} : R) : R := {self.text(claim.denominator)}.")
+        names = " ".join([*pairs.values(), "den"])
+
+        def sandwich(letter: str, i: int, j: int, point: str, times: str = "{}", form: str = "{}") -> str:
+            """The entry i, j of A T A^T den, where A has these letters, each in the form `times`, T in another."""
+            a = [[times.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
+            minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in pairs.items())
+            return " + ".join(
+                f"({b} * {c} - {d} * {e}) * {form.format(f'{name} {point}')}" for b, c, d, e, name in minors
+            )
+
+        if not claim.is_free:
+            for i, row in enumerate(self.data.derivative):
+                for j, entry in enumerate(row):
+                    label, forms = f"l{i + 1}{j + 1}", [_scaled_row(entry, self, n, at_n) for at_n in (False, True)]
+                    lines += [
+                        f"Lemma {label}_image : {label} * det = {forms[1]}.",
+                        f"Proof. transitivity ({forms[0]}); [unfold {label}; ring | rewrite {self.cramer}; ring]. Qed.",
+                    ]
+            for name, P in (*((pairs[pair], P) for pair, P in claim.upper.items()), ("den", claim.denominator)):
+                lines += self.moved(name, P, k)
+        for i, j in combinations(range(n), 2):
+            left, right = sandwich("l", i, j, old), sandwich("m", i, j, new)
+            label = f"{theorem}_{i + 1}{j + 1}"
+            lines += [
+                f"Theorem {label} : den {old} <> 0 -> den {new} <> 0 ->",
+                f"  ({left}) / den {old} =",
+                f"  ({right}) / den {new}.",
+                "Proof.",
+                "  intros Hx Hy. apply equal_fractions; [assumption | assumption |].",
+            ]
+            if claim.is_free:
+                lines += [f"  (* This identity holds for any x and x~. *) {self.expand(names, flat)}", "Qed."]
+                continue
+            scaled = sandwich("l", i, j, old, "({} * det)"), sandwich("m", i, j, new, form=f"({{}} * det ^ {k})")
+            images = [f"?l{row + 1}{column + 1}_image" for row in (i, j) for column in range(n)]
+            images += [f"?{name}_image" for name in names.split()]
+            lines += [
+                f"  apply (Rmult_eq_reg_r (det ^ {k + 2})); [| apply pow_nonzero; exact regular].",
+                f"  transitivity (({scaled[0]}) * (den {new} * det ^ {k})); [ring |].",
+                f"  transitivity (({scaled[1]}) * den {old} * det ^ 2); [| ring].",
+                f"  rewrite {', '.join(images)}. {self.expand(names)}",
+                "Qed.",
+            ]
+        if claim.triples:
+            lines += self._jacobi(claim, pairs, theorem)
+        return lines
+
+    def _jacobi(self, claim: InvariantTensor, names: dict[tuple[int, int], str], theorem: str) -> list[str]:
+        """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3.
+
+        Lemmas define the derivatives: the value at x + t e_s is that at x, plus t d, plus t^2 times a polynomial.
+        """
+        old, lines = " ".join(self.old), list[str]()
+        functions = {names[pair]: P for pair, P in claim.upper.items()} | {"den": claim.denominator}
+        context, spare = ring((*names_of(claim.denominator), "t")), "t_"
+        *letters, t = context.gens()
+        for name, P in functions.items():
+            for s in range(claim.dim):
+                moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
+                slope = P.derivative(s)
+                at = [P.compose(*letters, ctx=context), slope.compose(*letters, ctx=context)]
+                rest = polynomial_text(
+                    (moved - at[0] - t * at[1]) / t**2, [*(self.letters[x] for x in names_of(P)), spare]
+                )
+                point = " ".join(f"({x} + {spare})" if k == s else x for k, x in enumerate(self.old))
+                lines += [
+                    f"Definition {name}_{s + 1} : R := {self.text(slope)}.",
+                    f"Lemma derivative_{name}_{s + 1} : forall {spare}, exists rest,",
+                    f"  {name} {point} = {name} {old} + {spare} * {name}_{s + 1} + {spare} ^ 2 * rest.",
+                    f"Proof. intro {spare}. exists ({rest}). cbv delta [{name} {name}_{s + 1}] beta; ring. Qed.",
+                ]
+        used = " ".join([*functions, *(f"{name}_{s + 1}" for name in functions for s in range(claim.dim))])
+
+        def entry(i: int, j: int, ending: str) -> str:
+            return f"{'- ' * (i > j)}{names[min(i, j), max(i, j)]}{ending}"
+
+        for i, j, k in claim.triples:
+            terms = [
+                f"({entry(a, s, f' {old}')}) * (({entry(b, c, f'_{s + 1}')}) * den {old} - "
+                f"({entry(b, c, f' {old}')}) * den_{s + 1})"
+                for a, b, c in ((i, j, k), (j, k, i), (k, i, j))
+                for s in range(claim.dim)
+                if s != a
+            ]
+            lines += [f"Theorem {theorem}_jacobi_{i + 1}{j + 1}{k + 1} :", f"  {' + '.join(terms)} = 0."]
+            lines.append(f"Proof. cbv delta [{used}] beta; ring. Qed.")
+        return lines
+
     def invariant(self, claim: InvariantVolume, theorem: str) -> list[str]:
         """The theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
         n, old, new = self.data.dim, " ".join(self.old), " ".join(self.new)
         entries = [[f"l{i + 1}{j + 1}" for j in range(n)] for i in range(n)]
         power = claim.degree
-        lines = [
-            "(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)",
-        ]
-        for i, row in enumerate(claim.derivative):
-            lines += [f"Definition l{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row)]
-        flat = " ".join(name for row in entries for name in row)
+        lines, flat = self.derivative()
         lines += [
             f"Definition volume : R := {determinant_text(entries)}.  (* det L *)",
             "(* dx/phi with phi = num / den is invariant: phi(x~) = phi(x) det(M^-1 L). *)",
@@ -167,7 +503,7 @@ class _Script:
             image = homogeneous_value(polynomial, power, self.data)
             lines += self.moved(label, polynomial, power, self.text(image))
         # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
-        scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in claim.derivative]
+        scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
         return [
             *lines,
             f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled)}.",
@@ -182,13 +518,10 @@ class _Script:
         ]
 
 
-def rocq_certificate(
-    data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
-) -> str:
-    """Write a script that Coq accepts only if it proves the claims about the map.
+def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
+    """Write a script that Coq accepts only if it proves the claims.
 
     Args:
-        data: the map.
         claims: the statements to be proved, each in a section of its own.
         header: lines of the comment on top.
     """
@@ -196,17 +529,33 @@ def rocq_certificate(
     safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
-    theorems = []
+    theorems = list[str]()
+    proofs: dict[type[Claim], tuple[Any, str]] = {
+        ConservedFunction: (_Script.conserved, "conserved"),
+        DarbouxPolynomial: (_Script.darboux, "darboux"),
+        InvariantVolume: (_Script.invariant, "invariant"),
+        InvariantTensor: (_Script.poisson, "poisson"),
+        OrbitIntegral: (_Script.along_orbit, "conserved"),
+        AffineSymmetry: (_Script.symmetric, "symmetry"),
+        Chain: (_Script.chain, "everywhere"),
+        ChangedFunction: (_Script.changed, "coordinates"),
+    }
     for k, claim in enumerate(claims, 1):
-        theorem = f"{re.sub(r'[^A-Za-z0-9_]', '_', claim.name)}_"
-        theorem = theorem if re.match("[A-Za-z]", theorem) else f"v_{theorem}"
-        theorem += "conserved" if isinstance(claim, ConservedFunction) else "invariant"
-        theorems.append(theorem)
-        script = _Script(data)
-        prove = script.conserved if isinstance(claim, ConservedFunction) else script.invariant
-        lines += [f"Module Claim{k}.", "Section Map.", *script.map(), ""]
-        lines += [*prove(claim, theorem), "End Map.", f"End Claim{k}.", ""]  # type: ignore[arg-type]
-    lines += [f"Print Assumptions Claim{k}.{theorem}." for k, theorem in enumerate(theorems, 1)]
+        if type(claim) not in proofs:
+            raise InputError(f"{claim.name} is certified for gp only: ask for --for gp")
+        prove, ending = proofs[type(claim)]
+        name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
+        theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
+        script = _Script(claim.data)
+        lines += [f"Module Claim{k}.", "Section Map."]
+        if isinstance(claim, Chain | OrbitIntegral | AffineSymmetry | ChangedFunction):
+            lines += script.constants
+        else:
+            lines += [*script.map(claim.is_at_image), ""]
+        proof = prove(script, claim, theorem)
+        theorems += [f"Claim{k}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
+        lines += [*proof, "End Map.", f"End Claim{k}.", ""]
+    lines += [f"Definition theorems := ({', '.join(theorems)}).", "Print Assumptions theorems."]
     return "\n".join(lines) + "\n"
 
 
@@ -246,10 +595,10 @@ def _homogeneous_text(polynomial: fmpq_mpoly, letters: Sequence[str], degree: in
     return " + ".join(pieces) or "0"
 
 
-def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int) -> str:
-    """det times an entry of L, with det x~ for x~: of degree at most 1 in x~."""
+def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
+    """det times an entry of L, with det x~, or N, for x~: of degree at most 1 in x~."""
     letters = [script.letters[name] for name in names_of(entry)]
-    letters[dim : 2 * dim] = [f"(det * {name})" for name in letters[dim : 2 * dim]]
+    letters[dim : 2 * dim] = [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(script.new)]
     pieces = []
     for exponents, coefficient in entry.terms():
         factors = [name if k == 1 else f"{name} ^ {k}" for name, k in zip(letters, exponents, strict=True) if k]

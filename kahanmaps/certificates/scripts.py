@@ -1,8 +1,8 @@
 """Certificates for PARI/GP and for SymPy: each identity is multiplied out, and `true` printed for it.
 
-The script states M and r, and N and D with M N = D r, so that x~ = N/D where det M is not 0. Then it computes
-D^k P(N/D) by putting N and D into P made homogeneous with a letter h, which stays within polynomials, and compares it
-with C P. It ends with status 1 if an identity does not hold.
+The script states M and r, and where it is needed N and D with M N = D r, so that x~ = N/D where det M is not 0. Then it
+computes D^k P(N/D), a polynomial, and compares it with C P. It ends with status 1 if an identity does not hold. Both
+programs are given functions of the same names, so that the checks are the same text but for the sign of powers.
 """
 
 from __future__ import annotations
@@ -10,194 +10,433 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
-from kahanmaps.certificates.identities import ConservedFunction, InvariantVolume, MapData, letters_of
+from kahanmaps.certificates.chains import Chain
+from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral
+from kahanmaps.certificates.entropy import EPS, LINE, PRIME, PositiveEntropy
+from kahanmaps.certificates.identities import (
+    Claim,
+    ConservedFunction,
+    DarbouxPolynomial,
+    InvariantTensor,
+    InvariantVolume,
+    MapData,
+    letters_of,
+)
 from kahanmaps.certificates.rocq import polynomial_text
+from kahanmaps.errors import InputError
 
 _PARI = """\
 default(recover, 0);  \\\\ an error ends gp with a status that is not 0
 default(parisizemax, 2*10^9);
 ok = 1;
-det(A) = matdet(A);
-check(text, holds) = {{ print(text, ": ", if(holds, "true", "FALSE")); if(!holds, ok = 0); }}
-M = {matrix};
-r = [{right}]~;
-N = [{numerators}]~;
-D = {determinant};
-n = {dim};
-old = [{variables}, h];
-image(P) = substvec(P, old, concat(N~, [D]));  \\\\ of P, homogeneous in x and h
-check("M N = D r", M*N == D*r && D != 0);
+check(text, holds) = { print(text, ": ", if(holds, "true", "FALSE")); if(!holds, ok = 0); }
 """
-_SYMPY = """\
+_PARI_TOOLS = {
+    "put": "put(A, letters, values) = substvec(A, letters, values);",
+    "at": "at(A, letters, P, Q) = substvec(A, letters, vector(#P, i, P[i]/Q[i]));  \\\\ at the point P/Q",
+    "det": "det(A) = matdet(A);",
+    "product": "product(v) = vecprod(v);",
+    "mul": "mul(A, B) = A*B;",
+    "transposed": "transposed(A) = A~;",
+    "scale": "scale(c, A) = c*A;",
+    "act": "act(A, v) = (A*v~)~;",
+    "dot": "dot(v, w) = v*w~;",  # concat is a function of PARI
+    "bracket": """\
+bracket(P, Q, i, j, k) = {  \\\\ Q^3 times the sum of T_is d/dx_s T_jk over s, T = P/Q
+  sum(s = 1, n, P[i+1,s]*(deriv(P[j+1,k+1], old[s])*Q - P[j+1,k+1]*deriv(Q, old[s])));
+}""",
+    "image": """\
+image(G, k, letters) = {  \\\\ D^k G, with N/D for the letters, in which G has a degree of at most k
+  my(H = substvec(G, letters, tt*letters));
+  if(poldegree(H, tt) > k, error("degree"));
+  sum(j = 0, k, D^(k-j)*substvec(polcoef(H, j, tt), letters, N));
+}""",
+    "images": "images(A, k, letters) = matrix(#A, #A, i, j, image(A[i,j], k, letters));",
+}
+_PYTHON = """\
 import sys
 from itertools import permutations
 from math import prod
 
-from sympy import ZZ
+from sympy import QQ
 from sympy.polys.rings import ring
 
-R, {letters}, h = ring("{names},h", ZZ)
-old = [{variables}]
+R, {letters} = ring("{names}", QQ)
 one = R.one  # makes a polynomial of a number
-M = {matrix}
-r = [{right}]
-N = [{numerators}]
-D = {determinant}
-n = {dim}
 results = []
 
 
 def check(text, holds):
     results.append(holds)
     print(f"{{text}}: {{'true' if holds else 'FALSE'}}")
-
-
-def image(P):  # of P, homogeneous in x and h: N and D in their places
-    places = [R.gens.index(letter) for letter in (*old, h)]
-    total = R.zero
-    for exponents, coefficient in P.terms():
-        rest = [0 if k in places else e for k, e in enumerate(exponents)]
-        factors = [value ** exponents[k] for value, k in zip((*N, D), places)]
-        total += prod(factors, start=R({{tuple(rest): coefficient}}))
-    return total
-
-
+"""
+_PYTHON_TOOLS = {
+    "at": """\
+def at(A, letters, P, Q):  # A at the point P/Q, times powers of the denominators
+    if isinstance(A, list):
+        return [at(a, letters, P, Q) for a in A]
+    assert all(q != 0 for q in Q)
+    places, distinct, total = [R.gens.index(letter) for letter in letters], list(set(Q)), R.zero
+    degrees = {e: [sum(e[p] for p, q in zip(places, Q) if q == d) for d in distinct] for e, _ in A.terms()}
+    largest = [max(column) for column in zip(*degrees.values())]
+    for e, coefficient in A.terms():
+        rest = tuple(0 if p in places else k for p, k in enumerate(e))
+        factors = [value ** e[p] for p, value in zip(places, P)]
+        factors += [d ** (a - b) for d, a, b in zip(distinct, largest, degrees[e])]
+        total += prod(factors, start=R({rest: coefficient}))
+    return total""",
+    "put": """\
+def put(A, letters, values):
+    return [put(a, letters, values) for a in A] if isinstance(A, list) else A.compose(list(zip(letters, values)))""",
+    "product": """\
+def product(v):
+    return prod(v, start=R.one)""",
+    "det": """\
 def det(A):
     n, total = len(A), R.zero
     for p in permutations(range(n)):
         sign = (-1) ** sum(p[i] > p[j] for i in range(n) for j in range(i + 1, n))
         total += prod((A[i][p[i]] for i in range(n)), start=R(sign))
-    return total
-
-
-check("M N = D r", D != 0 and all(sum(M[i][j] * N[j] for j in range(n)) == D * r[i] for i in range(n)))
-"""
+    return total""",
+    "mul": """\
+def mul(A, B):
+    return [[sum((a * b for a, b in zip(row, column)), R.zero) for column in zip(*B)] for row in A]""",
+    "transposed": """\
+def transposed(A):
+    return [list(row) for row in zip(*A)]""",
+    "scale": """\
+def scale(c, A):
+    return [scale(c, a) for a in A] if isinstance(A, list) else c * A""",
+    "act": """\
+def act(A, v):
+    return [dot(row, v) for row in A]""",
+    "concat": """\
+def concat(v, w):
+    return v + w""",
+    "dot": """\
+def dot(v, w):
+    return sum((a * b for a, b in zip(v, w)), R.zero)""",
+    "bracket": """\
+def bracket(P, Q, i, j, k):  # Q^3 times the sum of T_is d/dx_s T_jk over s, T = P/Q
+    return sum((P[i][s] * (P[j][k].diff(old[s]) * Q - P[j][k] * Q.diff(old[s])) for s in range(n)), R.zero)""",
+    "image": """\
+def image(G, k, letters):  # D^k G, with N/D for the letters, in which G has a degree of at most k
+    places = [R.gens.index(letter) for letter in letters]
+    total = R.zero
+    for exponents, coefficient in G.terms():
+        rest = [0 if p in places else e for p, e in enumerate(exponents)]
+        powers = [exponents[p] for p in places]  # a negative power of D is an error
+        factors = [value**e for value, e in zip((*N, D), (*powers, k - sum(powers)))]
+        total += prod(factors, start=R({tuple(rest): coefficient}))
+    return total""",
+    "images": """\
+def images(A, k, letters):
+    return [[image(a, k, letters) for a in row] for row in A]""",
+}
+_NEEDS = {"act": ("dot",), "images": ("image",)}
 
 
 @dataclass(frozen=True)
 class Language:
-    """How a program writes powers, definitions, matrices, the value at h = 1, and comments."""
+    """How a program writes powers, definitions, vectors, matrices, comments, and the functions of the checks."""
 
     start: str
+    tools: dict[str, str]
     end: str
     run: str
     power: str
     comment: str
     definition: str
+    vector: str
     matrix: str
     next_row: str
-    at_one: str
+    residual: str
 
 
-GP = Language(_PARI, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "; ", "subst({}, h, 1)")
+GP = Language(
+    _PARI, _PARI_TOOLS, "quit(!ok)", "gp -q FILE", "^", r"\\ ", "{} = {};", "[{}]", "[{}]", "; ", "(M{0}*new~ - r{0}~)~"
+)  # fmt: skip
 PYTHON = Language(
-    _SYMPY, "sys.exit(not all(results))", "python FILE (needs SymPy)", "**", "# ", "{} = {} * one", "[[{}]]", "], [",
-    "{}.subs(h, 1)",
+    _PYTHON, _PYTHON_TOOLS, "sys.exit(not all(results))", "python FILE (needs SymPy)", "**", "# ", "{} = {}",
+    "[one*a for a in [{}]]", "[[one*a for a in row] for row in [[{}]]]", "], [",
+    "[sum(a*b for a, b in zip(row, new)) - c for row, c in zip(M{0}, r{0})]",
 )  # fmt: skip
 
 
-def script_certificate(
-    to: Language, data: MapData, claims: Sequence[ConservedFunction | InvariantVolume], header: Sequence[str] = ()
-) -> str:
-    """Write a script that multiplies out the identities of the claims about the map.
+class _Script:
+    """The lines of a script about one map; `define` and `check` add some."""
+
+    def __init__(self, to: Language, data: MapData) -> None:
+        self.to, self.data, self.lines = to, data, list[str]()
+        self.has_points = self.has_equation = self.is_solved = False
+        self.letters = letters_of(data, "[hijknpqrst]") | {"h": "h"}
+
+    def text(self, polynomial: fmpq_mpoly) -> str:
+        """The polynomial; a long sum in parts, as Python reads no expression that is nested a thousand times."""
+        letters = [self.letters[name] for name in names_of(polynomial)]
+        text = polynomial_text(polynomial, letters, "*", self.to.power)
+        terms = re.split(r" (?=[+-] )", text)
+        parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
+        return text if self.to is GP or len(parts) == 1 else f"sum([{', '.join(parts)}])"
+
+    def vector(self, entries: Sequence[fmpq_mpoly]) -> str:
+        """A vector."""
+        return self.to.vector.format(", ".join(map(self.text, entries)))
+
+    def matrix(self, rows: Sequence[Sequence[str]]) -> str:
+        """A matrix of texts."""
+        if len(rows) == 1 and self.to is GP:  # [a] would be a vector
+            return f"Mat({rows[0][0]})"
+        return self.to.matrix.format(self.to.next_row.join(", ".join(row) for row in rows))
+
+    def polynomials(self, rows: Sequence[Sequence[fmpq_mpoly]]) -> str:
+        """A matrix of polynomials."""
+        return self.matrix([[self.text(entry) for entry in row] for row in rows])
+
+    def define(self, name: str, text: str) -> None:
+        """A definition; of a polynomial if the text is one."""
+        self.lines.append(self.to.definition.format(name, text))
+
+    def polynomial(self, name: str, polynomial: fmpq_mpoly) -> None:
+        """The definition of a polynomial."""
+        self.define(name, f"({self.text(polynomial)})" + " * one" * (self.to is PYTHON))
+
+    def check(self, label: str, identity: str) -> None:
+        """A check; ^ stands for a power."""
+        identity = identity.replace("^", self.to.power)
+        self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
+
+    def begin(self, claim: Claim, count: int) -> None:
+        """The map that the claim is about, unless it is that of the claim before, and letters of points."""
+        if claim.data is not self.data or not self.has_points:
+            self.data, self.has_points, self.has_equation, self.is_solved = claim.data, True, False, False
+            self.points(count)
+        if not self.has_equation and not isinstance(claim, Chain | ChangedFunction):
+            self.has_equation = True
+            self.equation(self.data)
+        if not self.is_solved and claim.is_at_image:
+            self.is_solved = True
+            self.solution()
+        self.lines.append("")
+
+    def points(self, count: int) -> None:
+        """The letters of x, x~ and, if requested, of the image of x~."""
+        self.define("n", str(self.data.dim))
+        points = {"old": self.data.variables, "new": self.data.new, "third": [f"{name}2" for name in self.data.new]}
+        for name, letters in [*points.items()][:count]:
+            self.define(name, f"[{', '.join(self.letters[letter] for letter in letters)}]")
+
+    def equation(self, data: MapData, letter: str = "") -> None:
+        """M, r and E = M x~ - r, with the letter behind their names."""
+        self.define(f"M{letter}", self.polynomials([row[:-1] for row in data.rows]))
+        self.define(f"r{letter}", self.vector([row[-1] for row in data.rows]))
+        self.define(f"E{letter}", self.to.residual.format(letter))
+        self.lines[-1] += f"  {self.to.comment}0 where new is the image of old"
+
+    def solution(self) -> None:
+        """N and D."""
+        self.define("N", self.vector(self.data.numerators))
+        self.polynomial("D", self.data.determinant)
+        self.check("D is not 0", "D != 0")
+        self.check("M N = D r", "act(M, N) == scale(D, r)")
+
+    def _chain(self, claim: Any, label: str) -> None:
+        names = list[tuple[str, str]]()
+        for letter, data in claim.maps.items():
+            self.equation(data, letter)
+        for v, value in enumerate(claim.values):
+            names.append((f"P{v}", f"Q{v}"))
+            self.define(f"P{v}", self.vector(value.numerators))
+            self.define(f"Q{v}", self.vector([value.denominators[k] for k in value.which]))
+        self.define("zero", self.vector([self.data.rows[0][0] * 0] * self.data.dim))
+        for k, (letter, source, v) in enumerate(claim.arrows, 1):
+            (P, Q), (P_image, Q_image) = names[claim.value_of(source)], names[v]
+            points = f"concat({P}, {P_image}), concat({Q}, {Q_image})"
+            says = f"point {k}, {P_image}/{Q_image}, is the image of point {source} under {letter}"
+            self.check(says, f"at(E{letter}, concat(old, new), {points}) == zero")
+            says = f"det M is not 0 at point {source}"
+            eps = self.letters[self.data.names[-1]]
+            determinant = claim.maps[letter].determinant
+            if determinant.subs({"eps": 0}).is_constant():  # a Kahan map: det M is 1 at eps = 0, wherever it is taken
+                self.check(f"{says}, as eps -> 0", f"put(det(M{letter}), [{eps}], [0*{eps}]) != 0")
+                self.check(f"point {source} is defined as eps -> 0", f"put(product({Q}), [{eps}], [0*{eps}]) != 0")
+            else:
+                self.check(says, f"at(det(M{letter}), old, {P}, {Q}) != 0")
+        i, j = claim.says
+        self.lines.append(
+            f"{self.to.comment}So points {i} and {j} are equal: both are P{claim.value_of(i)}/Q{claim.value_of(j)}."
+        )
+
+    def claim(self, claim: Claim) -> None:
+        """The definitions and checks of a claim."""
+        label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
+        says, prove = {
+            ConservedFunction: ("P/Q is an integral", self._conserved),
+            DarbouxPolynomial: ("P is a Darboux polynomial, P(x~) = P C/D^k", self._darboux),
+            InvariantVolume: ("dx/phi is invariant, phi = P/Q", self._volume),
+            InvariantTensor: ("the map is Poisson for the tensor P/Q", self._tensor),
+            PositiveEntropy: (
+                "positive entropy, hence no rational integral, for all but finitely many eps",
+                self._entropy,
+            ),
+            Chain: ("points are images of others", self._chain),
+            ChangedFunction: ("P/Q at x = T z is p/q", self._changed),
+            OrbitIntegral: ("P(x, x~)/Q is an integral", self._along_orbit),
+            AffineSymmetry: ("x -> T takes the map to itself, its inverse or another map", self._symmetry),
+        }[type(claim)]
+        self.lines.append(f"{self.to.comment}{label}: {says}")
+        prove(claim, label)
+        self.lines.append("")
+
+    def _conserved(self, claim: Any, label: str) -> None:
+        self.fraction(claim)
+        self.polynomial("C", claim.cofactor)
+        self.check(f"{label}: C is not 0", "C != 0")
+        for name in "PQ":
+            self.check(f"{label}: D^k {name}(N/D) = C {name}", f"image({name}, {claim.degree}, old) == C*{name}")
+
+    def _darboux(self, claim: Any, label: str) -> None:
+        self.polynomial("P", claim.polynomial)
+        self.polynomial("C", claim.cofactor)
+        self.check(f"{label}: D^k P(N/D) = C P", f"image(P, {claim.degree}, old) == C*P")
+
+    def _volume(self, claim: Any, label: str) -> None:
+        self.fraction(claim)
+        self.define("L", self.polynomials(self.data.derivative))
+        says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
+        if claim.is_free:
+            identity = "put(P, old, new)*Q*det(M) == P*put(Q, old, new)*det(L)"
+            self.check(f"{says} for any x and x~", identity)
+            return
+        self.check("D = det M", "D == det(M)")
+        k = claim.degree
+        identity = f"image(P, {k}, old)*Q*D^(n + 1) == P*image(Q, {k}, old)*det(images(L, 1, new))"
+        self.check(f"{says} at x~ = N/D", identity)
+
+    def _tensor(self, claim: Any, label: str) -> None:
+        n, k = claim.dim, claim.degree
+        self.define("P", self.polynomials([[claim.entry(i, j) for j in range(n)] for i in range(n)]))
+        self.polynomial("Q", claim.denominator)
+        self.check(f"{label}: P is skew", "transposed(P) == scale(-1, P)")
+        self.define("L", self.polynomials(self.data.derivative))
+        says = f"{label}: L(x, x~) T(x) L^T = M T(x~) M^T"
+        one, other = "mul(mul({}, P), transposed({}))", "mul(mul(M, {}), transposed(M))"
+        if claim.is_free:
+            left, right = one.format("L", "L"), other.format("put(P, old, new)")
+            self.check(f"{says} for any x and x~", f"scale(put(Q, old, new), {left}) == scale(Q, {right})")
+        else:
+            self.define("S", "images(L, 1, new)")
+            left, right = one.format("S", "S"), other.format(f"images(P, {k}, old)")
+            self.check(f"{says} at x~ = N/D", f"scale(image(Q, {k}, old), {left}) == scale(Q*D^2, {right})")
+        for i, j, l in claim.triples:
+            terms = (f"bracket(P, Q, {i}, {j}, {l})", f"bracket(P, Q, {j}, {l}, {i})", f"bracket(P, Q, {l}, {i}, {j})")
+            self.check(f"{label}: Jacobi identity {i + 1}, {j + 1}, {l + 1}", " + ".join(terms) + " == 0")
+
+    def _along_orbit(self, claim: Any, label: str) -> None:
+        self.fraction(claim)
+        self.define("first", self.vector(claim.first))
+        self.define("second", self.vector(claim.second))
+        after = "put({}, concat(old, new), concat(new, third))"
+        identity = f"{after.format('P')} - P == dot(first, E) + dot(second, {after.format('E')})"
+        self.check(f"{label}: P(y, z) - P(x, y) = first . E(x, y) + second . E(y, z)", identity)
+
+    def _changed(self, claim: Any, label: str) -> None:
+        self._affine(claim)
+        for name, polynomial in zip(("P", "Q", "p", "q"), (*claim.given, *claim.moved), strict=True):
+            self.polynomial(name, polynomial)
+        self.check(f"{label}: P(T z) q(z) = p(z) Q(T z)", "put(P, old, T)*q == p*put(Q, old, T)")
+
+    def _affine(self, claim: Any) -> None:
+        part = f"1/{claim.divisor}" if self.to is GP else f"QQ(1, {claim.divisor})"
+        self.define("T", f"scale({part}, {self.vector(claim.image)})")
+
+    def _symmetry(self, claim: Any, label: str) -> None:
+        self._affine(claim)
+        self.define("Y", "put(T, old, new)")
+        self.define("K", self.matrix([[str(entry) for entry in row] for row in claim.matrix]))
+        target = "E" if claim.target is self.data else "Et"
+        if target == "Et":
+            self.equation(claim.target, "t")
+        pair, points = ("Y, T", "(T y, T x)") if claim.reversing else ("T, Y", "(T x, T y)")
+        identity = f"scale({claim.multiple}, put({target}, concat(old, new), concat({pair}))) == act(K, E)"
+        self.check(f"{label}: {target}{points} is a combination of E(x, y)", identity)
+
+    def _entropy(self, claim: Any, label: str) -> None:
+        """The forms of F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
+        if self.to is not GP:
+            raise InputError("positive entropy is certified for gp only: ask for --for gp")
+        comment, names = self.to.comment, self.data.names
+        n, x, y = len(claim.forms), *(self.letters[name] for name in self.data.variables)
+        eps, degree = self.letters[names[-1]], claim.degree
+        self.lines += [
+            f"{comment}Assumed, a theorem on birational maps f of the plane (docs/mathematics.md): with D_n = deg f^n",
+            f"{comment}and the dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2n - 1)/(D_n - 1).",
+            f"{comment}Here f over Q(eps) is birational, D_{n} <= {degree} and D_{2 * n} >= {claim.line_degree}.",
+        ]
+        self.define("point", f"[{x}, {y}, h]")
+        self.define("B", self.vector(claim.inverse))
+        for k, (forms, factor) in enumerate(zip(claim.forms, claim.factors, strict=True), 1):
+            self.define(f"F{k}", self.vector(forms))
+            self.define(f"c{k}", f"({self.text(factor)})")
+            degree_k = max(sum(e) - sum(e[2:-1]) for e in (list(map(int, m)) for m in forms[0].monoms()))
+            self.check(f"F{k} is homogeneous of degree {degree_k}", f"put(F{k}, point, tt*point) == tt^{degree_k}*F{k}")
+            if k == 1:
+                self.check("c1 F1 = (N : D) at h = 1, not 0", "c1 != 0 && put(c1*F1, [h], [1]) == concat(N, [D])")
+            else:
+                self.check(f"F1(F{k - 1}) = c{k} F{k}, not 0", f"c{k} != 0 && put(F1, point, F{k - 1}) == c{k}*F{k}")
+        self.define("G", "put(B, point, F1)")
+        self.check("f is birational: B(F1) = point", f"G[3] != 0 && G[1]*h == G[3]*{x} && G[2]*h == G[3]*{y}")
+        self.check("the modulus is prime", f"isprime({PRIME})")
+        self.define("curve", f"[{LINE[0][0]} + {LINE[0][1]}*t, {LINE[1][0]} + {LINE[1][1]}*t, 1]*Mod(1, {PRIME})")
+        self.define("image", f"put(F1, [{eps}], [Mod({EPS}, {PRIME})])")
+        self.lines += [
+            f"{{for(k = 1, {2 * n}, curve = put(image, point, curve); common = gcd(gcd(curve[1], curve[2]), curve[3]);",
+            "  curve = apply(P -> P \\ common, curve));}  \\\\ an error if all three are 0",
+        ]
+        says = f"the image of a line under {2 * n} steps modulo a prime has degree {claim.line_degree}"
+        self.check(says, f"vecmax(apply(P -> poldegree(P, t), curve)) == {claim.line_degree}")
+        lower = f"{claim.lower.numerator}/{claim.lower.denominator}"
+        self.check(
+            f"the dynamical degree is more than {lower} > 1",
+            f"{lower} > 1 && ({lower})^{n} + ({lower})^-{n} + 2 < ({claim.line_degree} - 1)/({degree} - 1)",
+        )
+
+    def fraction(self, claim: Any) -> None:
+        """The numerator P and the denominator Q."""
+        self.polynomial("P", claim.numerator)
+        self.polynomial("Q", claim.denominator)
+        self.check("Q is not 0", "Q != 0")
+
+
+def script_certificate(to: Language, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
+    """Write a script that multiplies out the identities of the claims.
 
     Args:
         to: GP, for `gp -q FILE`, or PYTHON, for SymPy.
-        data: the map.
         claims: the statements to be checked.
         header: lines of the comment on top.
     """
-    n = data.dim
-    letters = letters_of(data, "[hijknpr]")
-    old = [letters[name] for name in data.variables]
-
-    def text(polynomial: fmpq_mpoly) -> str:
-        return total(polynomial_text(polynomial, [letters[name] for name in names_of(polynomial)], "*", to.power))
-
-    def total(text: str) -> str:
-        """A sum; of many terms in parts, as Python reads no expression that is nested a thousand times."""
-        terms = re.split(r" (?=[+-] )", text)
-        parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
-        if to is GP or len(parts) == 1:
-            return text
-        return f"sum([{', '.join(parts)}])"
-
-    def homogeneous(polynomial: fmpq_mpoly, degree: int) -> str:
-        """The polynomial with powers of h that make it homogeneous of the degree in the variables."""
-        pieces = []
-        for exponents, coefficient in polynomial.terms():
-            names = [letters[name] for name in names_of(polynomial)]
-            spare = degree - sum(int(k) for k in exponents[:n])
-            powers = [f"{a}{to.power}{k}" for a, k in zip([*names, "h"], [*exponents, spare], strict=True) if k]
-            pieces.append("*".join([f"({coefficient})", *powers]))
-        return total(" + ".join(pieces) or "0")
-
-    def at_numerators(entry: fmpq_mpoly) -> str:
-        """Return D times an entry of L at x~ = N/D; the entry is of degree at most 1 in x~."""
-        names = [letters[name] for name in data.variables] + [f"N{k}" for k in range(n)]
-        names += [letters[name] for name in data.names[n:]]
-        pieces = []
-        for exponents, coefficient in entry.terms():
-            powers = [f"{a}{to.power}{k}" for a, k in zip(names, exponents, strict=True) if k]
-            powers += [] if any(exponents[n : 2 * n]) else ["D"]
-            pieces.append("*".join([f"({coefficient})", *powers]))
-        return " + ".join(pieces) or "0"
-
-    def matrix(rows: Sequence[Sequence[str]]) -> str:
-        if n == 1 and to is GP:  # [a] would be a vector
-            return f"Mat({rows[0][0]})"
-        return to.matrix.format(to.next_row.join(", ".join(row) for row in rows))
-
-    names = [letters[name] for name in (*data.names, *data.new)]
-    lines = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
-    lines.append(
-        to.start.format(
-            letters=", ".join(names),
-            names=",".join(names),
-            variables=", ".join(old),
-            dim=n,
-            matrix=matrix([[text(entry) for entry in row[:-1]] for row in data.rows]),
-            right=", ".join(text(row[-1]) for row in data.rows),
-            numerators=", ".join(map(text, data.numerators)),
-            determinant=text(data.determinant),
-        )
-    )
+    data = max((claim.data for claim in claims), key=lambda data: data.dim)
+    script = _Script(to, data)
+    has_three_points = any(isinstance(claim, OrbitIntegral) for claim in claims)
     for claim in claims:
-        label = re.sub(r"[^\w ~^*/+()-]", "_", claim.name)
-        is_conserved = isinstance(claim, ConservedFunction)
-        says = "P/Q is an integral" if is_conserved else "dx/phi is invariant, phi = P/Q"
-        lines.append(f"{to.comment}{label}: {says}; k = {claim.degree}")
-        for name, polynomial in (("P", claim.numerator), ("Q", claim.denominator)):
-            lines.append(to.definition.format(name, f"({text(polynomial)})"))
-            lines.append(to.definition.format(f"{name}h", f"({homogeneous(polynomial, claim.degree)})"))
-            lines.append(_check(to, f"{label}: {name}h = {name} at h = 1", f"{to.at_one.format(name + 'h')} == {name}"))
-        if isinstance(claim, ConservedFunction):
-            lines.append(to.definition.format("C", f"({text(claim.cofactor)})"))
-            lines.append(_check(to, f"{label}: C is not 0", "C != 0"))
-            for name in "PQ":
-                lines.append(_check(to, f"{label}: D^k {name}(N/D) = C {name}", f"image({name}h) == C*{name}"))
-        else:
-            lines.append(_check(to, "D = det M", "D == det(M)"))
-            if claim.is_free:
-                entries = [[text(entry) for entry in row] for row in claim.derivative]
-                for name, polynomial in (("Py", claim.numerator), ("Qy", claim.denominator)):
-                    at_new = [letters[name] for name in (*data.new, *data.names[n:])]
-                    lines.append(to.definition.format(name, f"({polynomial_text(polynomial, at_new, '*', to.power)})"))
-                says, identity = "for any x and x~", "Py*Q*D == P*Qy*det(L)"
-            else:
-                lines += [f"N{k} = N[{k if to is PYTHON else k + 1}]" + ";" * (to is GP) for k in range(n)]
-                entries = [[at_numerators(entry) for entry in row] for row in claim.derivative]
-                says, identity = "at x~ = N/D", f"image(Ph)*Q*D{to.power}(n + 1) == P*image(Qh)*det(L)"
-            lines.append(f"L = {matrix(entries)}" + ";" * (to is GP))
-            lines.append(_check(to, f"{label}: phi(x~) det M = phi(x) det L(x, x~) {says}", identity))
-        lines.append("")
-    lines.append(to.end)
-    return "\n".join(lines) + "\n"
-
-
-def _check(to: Language, label: str, identity: str) -> str:
-    return f'check("{label}", {identity})' + ";" * (to is GP)
+        script.begin(claim, 2 + has_three_points)
+        script.claim(claim)
+    used = set(re.findall(r"\w+", "\n".join(script.lines)))
+    used |= {other for name in used for other in _NEEDS.get(name, ())}
+    names = [
+        letter
+        for name, letter in script.letters.items()
+        if name != "h" and (has_three_points or name[:-1] not in data.new)
+    ]
+    top = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
+    top.append(to.start.format(letters=", ".join(names), names=",".join(names)) if to is PYTHON else to.start)
+    for name, text in to.tools.items():
+        if name in used:
+            top += ["", text, ""] if to is PYTHON else [text]
+    return "\n".join([*top, *script.lines, to.end]) + "\n"

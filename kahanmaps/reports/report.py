@@ -9,6 +9,7 @@ from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from kahanmaps.algebra.parsing import parse_polynomial, parse_rational_function
 from kahanmaps.algebra.printing import format_number, format_polynomial
@@ -53,6 +54,7 @@ def report_html(
     command: str = "",
     left_out: Sequence[str] = (),
     explore: bool = False,
+    certificate: str = "",
 ) -> str:
     """Return an HTML page with results, which needs no network, and no JavaScript unless `explore` is true.
 
@@ -63,6 +65,7 @@ def report_html(
         pictures: whether to draw pictures; without matplotlib a note says how to install it.
         command: the command line that creates the page, printed on the page.
         left_out: sentences on omitted results, printed as notes.
+        certificate: the path of a file that `certificate` wrote, relative to the page, which links it.
         explore: for an Analysis, add sliders for eps and the initial point of an orbit instead of the results.
 
     Returns:
@@ -108,6 +111,10 @@ def report_html(
         sections = _claims_sections(reports, file, left_out, drawn)
     if drawn.note:
         sections.append(Section("pictures", "Pictures", paragraphs=[drawn.note]))
+    if certificate:
+        link = f'<a href="{text(quote(certificate))}">{text(certificate)}</a>'
+        sentence = Html(f"Proofs that another program (Coq, PARI/GP or SymPy) checks: {link}")
+        sections.append(Section("certificate", "Certificate", paragraphs=[sentence]))
     title = (title or "").strip() or default_title
     return page(title, lead, sections, command=command, seed=seed, file=file, script=script)
 

@@ -6,24 +6,51 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
+from fractions import Fraction
 
 import pytest
+from flint import fmpq, fmpq_mat
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.certificates.certificate import certificate
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.certificates.certificate import (
+    _SEARCHES,
+    CHECKERS,
+    _claims_of,
+    _commuting,
+    _known_claims,
+    _prepared,
+    certificate,
+    certificate_of,
+)
+from kahanmaps.certificates.chains import Chain, periodic
+from kahanmaps.certificates.combinations import (
+    AffineSymmetry,
+    OrbitIntegral,
+    affine_symmetry,
+    bilinear_integral,
+    modified_hamiltonian,
+)
 from kahanmaps.certificates.identities import (
+    DarbouxPolynomial,
     FalseClaim,
+    InvariantTensor,
     conserved_function,
+    darboux_polynomial,
     homogeneous_value,
+    invariant_tensor,
     invariant_volume,
     map_data,
 )
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
+from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.languages.formulas import Formulas
 
 PROGRAMS = {
@@ -64,6 +91,156 @@ def test_a_certificate_with_one_coefficient_changed_is_refused(name, checker, tm
     assert run(checker, text, tmp_path).returncode != 0
 
 
+def claims_of(name: str, *wanted: str):
+    """The map of a system, and the claims with these names, or the first one of a search."""
+    file = load(name)
+    formulas = Formulas(file)
+    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    known = dict(_known_claims(formulas, data))
+    return [known[claim]()[-1] if claim in known else _claims_of(_SEARCHES[claim](file), data)[0] for claim in wanted]
+
+
+def changed(claim):
+    """The claim with one coefficient changed."""
+    if isinstance(claim, OrbitIntegral):
+        return replace(claim, numerator=claim.numerator + claim.numerator.context().gen(0))
+    if isinstance(claim, AffineSymmetry):
+        return replace(claim, image=(claim.image[0] + claim.image[0].context().gen(0), *claim.image[1:]))
+    if isinstance(claim, InvariantTensor):
+        return replace(claim, upper={pair: P + (pair == (0, 1)) for pair, P in claim.upper.items()})
+    if isinstance(claim, DarbouxPolynomial):
+        return replace(claim, polynomial=claim.polynomial + 1)
+    return replace(claim, numerator=claim.numerator + claim.numerator.context().gen(0))
+
+
+CASES = [("weierstrass", "modified_hamiltonian"), ("lotka_volterra", "poisson"), ("lotka_volterra", "darboux")]
+CASES += [("lotka_volterra", "symmetry"), ("harmonic", "volume"), ("volterra_periodic_3", "poisson")]
+SLOW_CASES = [("paper_m3", "H1"), ("euler_top", "poisson"), ("paper_m2", "poisson"), ("three_wave", "symmetry")]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "checker"),
+    [
+        pytest.param(
+            *case, checker, marks=() if (case in CASES and checker != "rocq") or case == CASES[0] else pytest.mark.slow
+        )
+        for case in [*CASES, *SLOW_CASES]
+        for checker in PROGRAMS
+    ],
+)
+def test_each_kind_of_claim_is_accepted_and_refused_with_one_coefficient_changed(name, kind, checker, tmp_path):
+    (claim,) = claims_of(name, kind)
+    assert run(checker, CHECKERS[checker]([claim]), tmp_path).returncode == 0
+    assert run(checker, CHECKERS[checker]([changed(claim)]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+@pytest.mark.parametrize(
+    ("system", "other"),
+    [
+        ("x' = y; y' = -x", "x' = 2*y; y' = -2*x"),
+        pytest.param("paper_m2", "associates", marks=pytest.mark.slow),
+        pytest.param("paper_m3", "associates", marks=pytest.mark.slow),
+    ],
+)
+def test_commuting_maps_are_accepted_and_refused_with_one_coefficient_changed(system, other, checker, tmp_path):
+    file = load(system) if other == "associates" else System(system)
+    claims = _commuting(file, _prepared(file, checker)[1], other if other == "associates" else System(other))
+    claims = [*[claim for claim in claims if not isinstance(claim, Chain)][:2], claims[-1]]
+    assert run(checker, CHECKERS[checker](claims), tmp_path).returncode == 0
+    chain = claims[-1]
+    point = chain.values[-1]
+    wrong = replace(point, numerators=(point.numerators[0] + 1, *point.numerators[1:]))
+    false = replace(chain, values=(*chain.values[:-1], wrong))
+    assert run(checker, CHECKERS[checker]([false]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
+    file = load("lyness", {"a": 1})
+    text = certificate(file, checker, period=5)
+    assert run(checker, text, tmp_path).returncode == 0
+    data = _prepared(file, checker)[1]
+    chain = periodic(data, 5)
+    wrong = replace(chain.values[2], numerators=(chain.values[2].numerators[0] + 1, *chain.values[2].numerators[1:]))
+    values = (*chain.values[:2], wrong, *chain.values[3:])
+    assert run(checker, CHECKERS[checker]([replace(chain, values=values)]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("name", ["lotka_volterra", "fibonacci", "hietarinta_viallet"])
+def test_positive_entropy_is_accepted_and_refused_with_one_number_changed(name, tmp_path):
+    (claim,) = claims_of(name, "entropy")
+    done = run("gp", CHECKERS["gp"]([claim]), tmp_path)
+    assert (done.returncode, "FALSE" in done.stdout) == (0, False)
+    (_, *others), first = claim.forms[-1], claim.forms[-1][0]
+    for wrong in (
+        replace(claim, line_degree=claim.line_degree + 1),
+        replace(claim, lower=claim.lower + Fraction(1, 100)),
+        replace(claim, forms=(*claim.forms[:-1], (first * 2, *others))),
+        replace(claim, factors=(*claim.factors[:-1], claim.factors[-1] * 2)),
+        replace(claim, inverse=(claim.inverse[0] + claim.inverse[2], *claim.inverse[1:])),
+    ):
+        assert run("gp", CHECKERS["gp"]([wrong]), tmp_path).returncode != 0
+    bounds = bound_dynamical_degree(load(name).map, None)
+    assert bounds is not None
+    assert 1 < claim.lower < Fraction(bounds.upper)
+
+
+def test_positive_entropy_is_certified_for_gp_only_and_not_for_integrable_maps():
+    for checker in ("rocq", "sympy"):
+        with pytest.raises(InputError, match="entropy is certified for gp only"):
+            certificate(load("lotka_volterra"), checker, ["entropy"])
+    for name in ("nahm_octahedral", "mcmillan", "zander_111"):
+        with pytest.raises(InputError, match="which proves nothing"):
+            certificate(load(name), "gp", ["entropy"])
+
+
+def test_maps_that_do_not_commute_and_false_periods_have_no_certificate():
+    with pytest.raises(FalseClaim, match="maps_1_and_2_commute: the maps do not commute"):
+        certificate(System("x' = y; y' = -x"), "gp", commute=System("x' = 2*x; y' = x"))
+    with pytest.raises(FalseClaim, match="iterate 4 is not the identity"):
+        certificate(load("lyness", {"a": 1}), "gp", period=4)
+    with pytest.raises(InputError, match="expected a member of the commuting family"):
+        certificate(load("euler_top"), "gp", commute="associates")
+    with pytest.raises(InputError, match="same dimension"):
+        certificate(load("euler_top"), "gp", commute=load("harmonic"))
+
+
+def test_jacobi_identities_are_checked_for_a_tensor_that_is_invariant_but_not_poisson(tmp_path):
+    # For x~ = x every tensor is invariant; dz - y dx is a contact form, so the tensor with this kernel is not Poisson.
+    names = ("x", "y", "z", "eps")
+    rows = [[parse_rational_function(f"{int(i == j)}", names).numerator for j in range(3)] for i in range(3)]
+    x = [parse_rational_function(name, names).numerator for name in "xyz"]
+    data = map_data([[*row, x[i]] for i, row in enumerate(rows)], names[:3], ("x_new", "y_new", "z_new"), names)
+    upper = {(0, 1): x[0] ** 0, (0, 2): x[0] * 0, (1, 2): -x[1]}
+    claim = InvariantTensor("P", data, upper, x[0] ** 0, 1, False)
+    for checker in ("gp", "sympy"):
+        assert run(checker, CHECKERS[checker]([claim]), tmp_path).returncode != 0
+        right = replace(claim, upper={**upper, (1, 2): x[0] * 0})
+        assert run(checker, CHECKERS[checker]([right]), tmp_path).returncode == 0
+    tensor = [[RationalFunction(claim.entry(i, j), x[0] ** 0) for j in range(3)] for i in range(3)]
+    with pytest.raises(FalseClaim, match="P is no Poisson tensor"):
+        invariant_tensor(data, "P", tensor)
+
+
+def test_false_claims_of_each_kind_have_no_certificate():
+    formulas = Formulas(load("euler_top"))
+    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    x = ring(data.names).gens()
+    with pytest.raises(FalseClaim, match="D is no Darboux polynomial"):
+        darboux_polynomial(data, "D", x[0] + x[1])
+    with pytest.raises(FalseClaim, match="T is no symmetry"):
+        affine_symmetry(data, "T", fmpq_mat([[1, 0, 0], [0, 1, 0], [0, 0, -1]]), [fmpq(0)] * 3, False)
+    with pytest.raises(FalseClaim, match="H is not conserved"):
+        modified_hamiltonian(data, "H", ring(data.names[:3]).gens()[0] ** 3)
+    with pytest.raises(FalseClaim, match="B is not conserved"):
+        bilinear_integral(data, "B", fmpq_mat([[0, 1, 0], [-1, 0, 0], [0, 0, 0]]))
+    one = RationalFunction(x[0] ** 0, x[0] ** 0)
+    zero = RationalFunction(x[0] * 0, x[0] ** 0)
+    with pytest.raises(FalseClaim, match="the map is not Poisson for P"):
+        invariant_tensor(data, "P", [[zero, one, zero], [one, zero, zero], [zero, zero, zero]])
+
+
 @pytest.mark.parametrize("checker", PROGRAMS)
 def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker, tmp_path):
     text = certificate(load("lotka_volterra"), checker, ["volume"])  # dx/(x*y)
@@ -75,7 +252,7 @@ def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker,
 def test_a_check_that_raises_an_error_ends_gp_with_a_status_that_is_not_0(tmp_path):
     # gp goes on with the next line after an error, unless recover is 0 (PARI/GP 2.17).
     text = certificate(load("lotka_volterra"), "gp", ["volume"])
-    wrong = text.replace("det(A) = matdet(A);", "det(A) = matdet([A]);")
+    wrong = text.replace("image(G, k, letters) = {", "image(G, k, letters) = {\n  matdet([G]);")
     assert wrong != text
     assert run("gp", wrong, tmp_path).returncode != 0
     assert run("gp", wrong.replace("default(recover, 0);", ""), tmp_path).returncode == 0
@@ -139,7 +316,7 @@ def test_a_density_that_is_not_invariant_has_no_certificate():
     names = (*formulas.names, "eps")
     data = map_data(formulas.equation, formulas.variables, formulas.new, names)
     with pytest.raises(FalseClaim, match="dx/phi is not invariant"):
-        invariant_volume(data, parse_rational_function("x", names))
+        invariant_volume(data, "volume", parse_rational_function("x", names))
 
 
 @pytest.mark.parametrize(
@@ -148,13 +325,43 @@ def test_a_density_that_is_not_invariant_has_no_certificate():
         ("lorenz", {"checker": "gp"}, "no integral or invariant volume form of lorenz is known: give --integral"),
         ("euler_top", {"checker": "coq"}, "expected the checker rocq, gp, sympy, got 'coq'"),
         ("euler_top", {"checker": "gp", "claims": ["F9"]}, "expected one of F1, F2, volume"),
-        ("paper_m3", {"checker": "gp"}, "no certificate of paper_m3 can be written: I1: the identities"),
+        (
+            "volterra_periodic_4",
+            {"checker": "gp", "claims": ["volume"]},
+            "the identities of the certificate are too long",
+        ),
         ("zander_120", {"checker": "gp", "claims": ["F"]}, "no claim 'F' of zander_120"),
     ],
 )
 def test_what_cannot_be_certified_is_said_in_one_sentence(system, arguments, message):
     with pytest.raises(InputError, match=re.escape(message)):
         certificate(load(system), **arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"integrals": {"I": "eps^2 + 3"}}, "I is a constant, which every map conserves"),
+        ({"integrals": {"I": "x1*x1~"}}, "found x1~ in a function, expected x1, x2, x3, eps"),
+        ({"density": "0"}, "found the density 0"),
+        ({"tensor": [["0", "0", "0"]] * 3}, "the tensor P is 0"),
+        ({"period": 0}, "found period = 0, expected a positive integer"),
+        ({"commute": "associates", "period": 2}, "cannot be combined with other claims"),
+        ({"claims": ["entropy"]}, "no claim 'entropy' of euler_top"),
+    ],
+)
+def test_what_holds_for_every_map_or_means_nothing_has_no_certificate(options, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        certificate(load("euler_top"), "gp", **options)
+
+
+def test_results_about_one_eps_or_the_flow_have_no_certificate():
+    with pytest.raises(InputError, match="for every eps: found a result for eps = 1/2"):
+        certificate_of(find_densities("lotka_volterra", eps="1/2"), "gp")
+    with pytest.raises(InputError, match="for every eps: found a result for the flow"):
+        certificate_of(find_densities("lotka_volterra", flow=True), "gp")
+    with pytest.raises(InputError, match="expected the result of a search, got str"):
+        certificate_of("lotka_volterra", "gp")
 
 
 def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note(monkeypatch):

@@ -8,7 +8,8 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli.commands.convert import write_text
-from kahanmaps_cli.options import integral_option, load_system, quiet_option, system_options
+from kahanmaps_cli.options import integral_option, load_pair, load_system, quiet_option, system_options
+from kahanmaps_cli.params import Whole
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import as_typed, print_stderr
 
@@ -25,9 +26,19 @@ _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certifica
     "claims",
     metavar="NAME",
     multiple=True,
-    help="Certify this claim: an integral of the file, modified_hamiltonian, H0, H1, ..., or volume (default: all).",
+    help="Certify this claim: an integral of the file, modified_hamiltonian, H0, H1, ..., volume, poisson (default: "
+    "all of these); or all that a search proves: integrals, density, poisson, darboux, symmetry; or entropy: "
+    "positive entropy of a planar map (gp only).",
 )
+@click.option("--all", "everything", is_flag=True, help="Certify all of these claims, with the searches.")
 @integral_option("Certify that this function of x and eps is an integral.", into="integrals")
+@click.option(
+    "--commute",
+    metavar="OTHER",
+    help="Certify that the maps of SYSTEM and OTHER commute; OTHER is a system, or `associates` for the pairs of "
+    "associated systems of a member.",
+)
+@click.option("--period", type=Whole(1), metavar="N", help="Certify that the N-th iterate of the map is the identity.")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @quiet_option
 def command(system: str | None, checker: str, output: str | None, quiet: bool, **options: Any) -> int:
@@ -37,24 +48,47 @@ def command(system: str | None, checker: str, output: str | None, quiet: bool, *
       kahanmaps certificate euler_top --for rocq -o euler_top.v        # then: coqc euler_top.v
       kahanmaps certificate euler_top --for gp -o euler_top.gp         # then: gp -q euler_top.gp
       kahanmaps certificate euler_top --for sympy -o certificate.py    # then: python certificate.py
+      kahanmaps certificate lotka_volterra --for gp --all | gp -q
+      kahanmaps certificate paper_m2 --for gp --commute associates | gp -q
       kahanmaps certificate --vars x,y --image 'y; (3 + y)/x' --for gp --integral '(x+1)*(y+1)*(x+y+3)/(x*y)'
 
-    The script defines the map by its equation M(x, eps) x~ = r(x, eps), states that a function is an integral or that a
-    volume form is invariant, for every eps, and proves it by identities of polynomials, without kahanmaps. gp and
-    python print true for each identity, and end with a status that is not 0 if one does not hold.
+    The script defines the map by its equation M(x, eps) x~ = r(x, eps), states for every eps that a function is an
+    integral or a Darboux polynomial, that a volume form or a Poisson tensor is invariant, or that the map has a
+    symmetry, and proves it by identities of polynomials, without kahanmaps. gp and python print true for each identity,
+    and end with a status that is not 0 if one does not hold.
 
     Exit status: 0 the certificate is written, 1 a claim is false, 2 usage error.
     """
-    file = load_system(system, {**options, "quiet": quiet})
+    if options["commute"] and (options["claims"] or options["everything"] or options["integrals"] or options["period"]):
+        raise click.UsageError("give --commute, or other claims, not both")
+    if options["claims"] and options["everything"]:
+        raise click.UsageError("give --claim or --all, not both")
+    other, loading = options["commute"], {**options, "quiet": quiet}
+    if other in (None, "associates"):
+        file = load_system(system, loading)
+    else:
+        file, other = load_pair(system, other, loading)
     integrals = {name or f"I{k}": text for k, (name, text) in enumerate(options["integrals"], 1)}
     words = ["kahanmaps", "certificate", *([system] if system is not None else [])]
     words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
     words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
     words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
     words += ["--for", checker, *(word for name in options["claims"] for word in ("--claim", name))]
+    words += [word for key in ("commute", "period") if options[key] for word in (f"--{key}", str(options[key]))]
+    words += ["--all"] if options["everything"] else []
     words += [word for name, text in integrals.items() for word in ("--integral", f"{name}={text}")]
     try:
-        text = lib.certificate(file, checker, options["claims"] or None, integrals or None, command=as_typed(words))
+        everything, command_line = options["everything"], as_typed(words)
+        text = lib.certificate(
+            file,
+            checker,
+            options["claims"] or None,
+            integrals or None,
+            everything=everything,
+            commute=other,
+            period=options["period"],
+            command=command_line,
+        )
     except lib.FalseClaim as error:
         print_stderr(f"refuted: {error}")
         return 1

@@ -15,10 +15,12 @@ from kahanmaps.checks.table import CHECKS
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.params import ExactNumber
+from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import print_report
 
 _ARGUMENT_IS_FIRST = "kahanmaps: the argument stands before the inline system"
+_CLAIM_OF_CERTIFICATE = {"check-integrals": "integrals", "check-measure": "density", "check-poisson": "tensor"}
 _STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
 
 
@@ -27,7 +29,8 @@ def command(name: str) -> click.Command:
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
-        is_swapped = False
+        is_swapped, proof = False, dict[str, Any]()
+        require_every_eps(options)
         if check.is_of_pair:
             system, other = opt.in_order(system, other, options)
             is_swapped = click.get_current_context().meta.get(_ARGUMENT_IS_FIRST, False)
@@ -39,6 +42,7 @@ def command(name: str) -> click.Command:
                 if is_swapped and second is not None:
                     file, second = second, file
                 report = check(file, second, settings, eps2)
+                proof["commute"] = "associates" if second is None else second
             else:
                 file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
                 settings = opt.settings_from(options, progress, start)
@@ -49,9 +53,17 @@ def command(name: str) -> click.Command:
                 elif option is not None:
                     claim = option.read(file, claim) if claim else None
                 report = check(file, settings, claim, **extra)
-        return print_report(report, options["as_json"], options["verbose"], options["quiet"])
+                if option is not None and claim is not None:
+                    proof[_CLAIM_OF_CERTIFICATE[name]] = claim
+        status = print_report(report, options["as_json"], options["verbose"], options["quiet"])
 
-    run = opt.check_options(run)
+        def write(checker: str) -> str:
+            known: dict[str, Any] = {} if proof else {"claims": lib.known_claims(file, name.removeprefix("check-"))}
+            return lib.certificate(file, checker, **proof, **known)
+
+        return write_certificate(options, file.name, write, status)
+
+    run = opt.check_options(certificate_option(run))
     if check.is_of_pair:
         run = click.option(
             "--eps2",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.runs.certificates import write_certificate
 from kahanmaps_cli.runs.search import print_search, require_one_form, search_arguments, search_options
 from kahanmaps_cli.screen.progress import SearchProgress
 
@@ -35,6 +37,8 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 if a density was found, 2 for a usage error, 3 if there is none up to the degree that was tried.
     """
     require_one_form(options)
+    if options["flow"] and options["certificate"] is not None:
+        raise click.UsageError("--flow cannot be combined with --certificate, which is for the map")
     with SearchProgress(options) as search:
         file = opt.load_system(system, options)
         settings = search_arguments(options, "flow", "max_degree")
@@ -43,4 +47,5 @@ def command(system: str | None, **options: Any) -> int:
         result = lib.find_densities(file, **settings, progress=search)
     further = f"note\t{result.further}" if result.further else ""
     print_search("find-density", result, search, options, [("phi", phi, "") for phi in result.shown], further)
-    return 0 if result.densities else 3
+    status = 0 if result.densities else 3
+    return write_certificate(options, file.name, partial(lib.certificate_of, result), status)

@@ -9,6 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.runs.certificates import write_certificate
 from kahanmaps_cli.runs.search import (
     heading,
     print_search,
@@ -77,6 +78,10 @@ def command(system: str | None, **options: Any) -> int:
             raise click.UsageError(
                 "a range of values cannot be combined with --monomials, --darboux, --flow, --toml and --latex"
             )
+        if options["certificate"] is not None:
+            raise click.UsageError(
+                "a range of values cannot be combined with --certificate: certify one value of each parameter"
+            )
         result = lib.find_integrals(file, **search_arguments(options, "max_degree"), progress=search)
         formulas = "; ".join(f"{integral.text} ({integral.verdict})" for integral in result.integrals)
         line = f"{_count(result).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
@@ -84,6 +89,10 @@ def command(system: str | None, **options: Any) -> int:
 
     if rows_of(options["parameters"], system) is not None:
         return table(system, options, cell)
+    if options["certificate"] is not None and (options["flow"] or options["sets"]):
+        raise click.UsageError(
+            "--certificate cannot be combined with --flow and --monomials: it is for integrals of the map"
+        )
     if options["flow"] and (options["sets"] or options["as_toml"]):
         raise click.UsageError("--flow cannot be combined with --monomials and --toml, which are for the map")
     if options["sets"] and options["darboux"] is not None:
@@ -116,7 +125,8 @@ def command(system: str | None, **options: Any) -> int:
             )
         for status, text in () if comparison is None else comparison.lines(others=False):
             print_stdout(f"{status}\t{formula(text)}")
-    return 3 if result.reason else 0
+    write = partial(lib.certificate_of, result)
+    return write_certificate(options, file.name, write, 3 if result.reason else 0)
 
 
 def _count(result: Any) -> str:
@@ -134,7 +144,8 @@ def _darboux(system: str | None, options: dict[str, Any]) -> int:
     else:
         print_stdout(f"Darboux polynomials: {result.file.name}{scope(result)}")
         print_stdout("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(result).split("\n")))
-    return 3 if result.reason else 0
+    status = 3 if result.reason else 0
+    return write_certificate(options, file.name, partial(lib.certificate_of, result), status)
 
 
 def _bases(system: str | None, options: dict[str, Any]) -> int:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.runs.certificates import write_certificate
 from kahanmaps_cli.runs.search import print_search, require_one_form, search_arguments, search_options
 from kahanmaps_cli.screen.progress import SearchProgress
 from kahanmaps_cli.screen.terminal import print_stdout
@@ -51,4 +53,5 @@ def command(system: str | None, **options: Any) -> int:
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for integral in result.integrals:
             print_stdout(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
-    return 0 if result.tensors else 3
+    status = 0 if result.tensors else 3
+    return write_certificate(options, file.name, partial(lib.certificate_of, result), status)

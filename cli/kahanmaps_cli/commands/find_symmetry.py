@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli.options import effort_options, load_system, output_options, system_options
+from kahanmaps_cli.runs.certificates import certificate_option, write_certificate
 from kahanmaps_cli.runs.search import print_list
 from kahanmaps_cli.screen.progress import SearchProgress
 
@@ -15,6 +17,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
 @click.command("find-symmetry")
 @system_options
 @effort_options
+@certificate_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Find affine symmetries T Phi T^-1 = Phi and reversing symmetries T Phi T^-1 = Phi^-1 of the map of SYSTEM.
@@ -40,6 +43,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     with SearchProgress({**options, "quiet": quiet}) as search:
         symmetries = lib.linear_symmetries(file.system, effort=options["effort"], progress=search)
     heading = f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); every symmetry is proved"
-    return print_list(
+    status = print_list(
         "find-symmetry", heading, symmetries, search, lib.Settings().context([file], **search.work), as_json
     )
+    write = partial(lib.certificate_of, symmetries)
+    return write_certificate({**options, "quiet": quiet}, file.name, write, status)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
+from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 
@@ -58,6 +60,7 @@ _ONLY_FOR = {
     metavar="FILE",
     help="Output file FILE.html; - is standard output.",
 )
+@certificate_option
 @click.option("--title", help="Title of the page (default: the name of the system).")
 @click.option("--no-pictures", is_flag=True, help="Omit pictures.")
 @opt.quiet_option
@@ -75,9 +78,12 @@ def command(system: str | None, **options: Any) -> int:
     with its pictures and the command that made it; it needs neither network nor JavaScript. With --explore it has
     sliders for eps and the initial point beside the exact verdict; with --eps given, only for the initial point.
 
+    --certificate FILE also writes the proofs of `kahanmaps certificate --all`, which the page links.
+
     Exit status: as that of the command named by --from.
     """
     is_named, is_drawn = _require_consistent(system, options)
+    require_every_eps(options)
     lib.page_template()  # raises the error for a missing package before the work
     how = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
     with SearchProgress(options) as search:
@@ -88,7 +94,9 @@ def command(system: str | None, **options: Any) -> int:
             arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
             results: list[lib.Analysis] = []
             try:
-                lib.analyze(opt.load_system(system, options), **arguments, progress=search, on_result=results.append)
+                file = opt.load_system(system, options)
+                lib.analyze(file, **arguments, progress=search, on_result=results.append)
+                how["certificate"] = _certificate(file, options)
                 search("the page")
                 html = lib.report_html(results[-1], explore=options["explore"], **how)
             except lib.TimeLimit:
@@ -116,6 +124,7 @@ def command(system: str | None, **options: Any) -> int:
                         left_out.append(f"{name} does not apply: {error}")
                 if not reports:
                     raise lib.InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
+            how["certificate"] = _certificate(file, options)
             search("the page")
             html = lib.report_html(reports, file=file, left_out=left_out, **how)
             verdict = lib.combined(report.verdict for report in reports)
@@ -124,6 +133,14 @@ def command(system: str | None, **options: Any) -> int:
     if deliver(options["output"], content) and not options["quiet"]:
         print_stderr(f"{options['output']}: {len(content)} bytes")
     return status
+
+
+def _certificate(file: lib.SystemFile, options: dict[str, Any]) -> str:
+    """Write the certificate of all claims, if one is requested; return its path relative to the page, or nothing."""
+    path, page = options["certificate"], options["output"]
+    if write_certificate(options, file.name, lambda checker: lib.certificate(file, checker, everything=True)):
+        return ""
+    return "" if path is None else os.path.relpath(path, os.path.dirname(page) or ".").replace(os.sep, "/")
 
 
 def _require_consistent(system: str | None, options: dict[str, Any]) -> tuple[bool, bool]:

@@ -9,6 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json
 from kahanmaps_cli.screen.terminal import formula, print_stdout
@@ -25,6 +26,7 @@ def search_options(section: str) -> Callable[[F], F]:
         opt.seed_option,
         click.option("--toml", "as_toml", is_flag=True, help=f"Print the section [{section}] of a system file."),
         click.option("--latex", "as_latex", is_flag=True, help="Print the formulas in LaTeX."),
+        certificate_option,
         opt.output_options,
     )
 
@@ -33,6 +35,7 @@ def require_one_form(options: dict[str, Any]) -> None:
     """Refuse more than one of --toml, --latex and --json."""
     if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
         raise click.UsageError("give one of --toml, --latex and --json")
+    require_every_eps(options)
 
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:

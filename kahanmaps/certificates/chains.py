@@ -1,0 +1,142 @@
+"""Claims about compositions of maps: two maps commute, or an iterate is the identity.
+
+Every point that a composition passes through is written as a common vector of rational functions of x, and the equation
+of the map is verified at each arrow. For Phi_f and Phi_g with y = Phi_f(x) and z = Phi_g(x) this is one vector w with
+M_g(y) w = r_g(y) and M_f(z) w = r_f(z): then w is both Phi_g(y) and Phi_f(z). No composition is expanded twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import common_denominator, ring
+from kahanmaps.certificates.identities import MAX_PRODUCTS, MAX_TERMS, Claim, FalseClaim, MapData
+from kahanmaps.errors import InputError
+
+
+@dataclass(frozen=True)
+class RationalPoint:
+    """A point that depends rationally on x: each coordinate has a numerator, and one of the denominators by index."""
+
+    numerators: tuple[fmpq_mpoly, ...]
+    denominators: tuple[fmpq_mpoly, ...]
+    which: tuple[int, ...]
+
+    @classmethod
+    def of(cls, fractions: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> RationalPoint:
+        """The point with these coordinates in lowest terms, over Z."""
+        numerators, denominators, which = [], list[fmpq_mpoly](), []
+        for numerator, denominator in fractions:
+            common = numerator.gcd(denominator)
+            P, Q = numerator / common, denominator / common
+            Q, P = Q / Q.leading_coefficient(), P / Q.leading_coefficient()
+            multiple = common_denominator(P) * common_denominator(Q)
+            P, Q = P * multiple, Q * multiple
+            if Q not in denominators:
+                denominators.append(Q)
+            numerators.append(P)
+            which.append(denominators.index(Q))
+        return cls(tuple(numerators), tuple(denominators), tuple(which))
+
+
+@dataclass(frozen=True)
+class Chain(Claim):
+    """Points x = point 0, point 1, ..., each the image of an earlier one; two of them are equal.
+
+    `maps` are the maps by a letter; `arrows` are, for each point but x, the letter of the map, the number of its
+    preimage, and its index in `values`, which begin with x. `says` are the numbers of the two equal points.
+    """
+
+    maps: Mapping[str, MapData]
+    arrows: tuple[tuple[str, int, int], ...]
+    values: tuple[RationalPoint, ...]
+    says: tuple[int, int]
+
+    @property
+    def is_at_image(self) -> bool:
+        return False
+
+    def value_of(self, point: int) -> int:
+        """The index of the value of a point."""
+        return self.arrows[point - 1][2] if point else 0
+
+
+def commuting(name: str, f: MapData, g: MapData) -> Chain:
+    """The identities that prove that two maps in the same variables commute.
+
+    Raises:
+        FalseClaim: if they do not.
+        InputError: if the identities have too many terms.
+    """
+    x = _identity(f)
+    y, z = apply(f, x), apply(g, x)
+    w = apply(g, y)
+    if w != apply(f, z):
+        raise FalseClaim(f"{name}: the maps do not commute: no certificate can be written")
+    return Chain(name, f, {"f": f, "g": g}, (("f", 0, 1), ("g", 1, 3), ("g", 0, 2), ("f", 3, 3)), (x, y, z, w), (2, 4))
+
+
+def periodic(f: MapData, period: int) -> Chain:
+    """The identities that prove that an iterate of the map is the identity.
+
+    Raises:
+        FalseClaim: if it is not.
+        InputError: if the identities have too many terms.
+    """
+    values = [_identity(f)]
+    for _ in range(period):
+        values.append(apply(f, values[-1]))
+    if values.pop() != values[0]:
+        raise FalseClaim(f"iterate {period} is not the identity: no certificate can be written")
+    arrows = tuple(("f", k, (k + 1) % period) for k in range(period))
+    return Chain(f"period {period}", f, {"f": f}, arrows, tuple(values), (0, period))
+
+
+def apply(data: MapData, point: RationalPoint) -> RationalPoint:
+    """The image of a point that depends on x. Raises InputError where it has too many terms."""
+    fractions = []
+    for numerator in data.numerators:
+        common = numerator.gcd(data.determinant)
+        moved = [value_at(part / common, point, data) for part in (numerator, data.determinant)]
+        (P, exponents), (Q, other) = moved
+        for denominator, a, b in zip(point.denominators, exponents, other, strict=True):
+            P, Q = P * denominator ** max(b - a, 0), Q * denominator ** max(a - b, 0)
+        fractions.append((P, Q))
+    return RationalPoint.of(fractions)
+
+
+def value_at(polynomial: fmpq_mpoly, point: RationalPoint, data: MapData) -> tuple[fmpq_mpoly, list[int]]:
+    """The polynomial at the point, times powers of its denominators, and their exponents.
+
+    Raises InputError where it has too many terms.
+    """
+    n, letters = data.dim, ring(data.names).gens()
+    rows = [[int(e) for e in exponents] for exponents in polynomial.monoms()]
+
+    def degree(row: Sequence[int], index: int) -> int:
+        return sum(e for e, k in zip(row[:n], point.which, strict=True) if k == index)
+
+    powers = [max((degree(row, k) for row in rows), default=0) for k in range(len(point.denominators))]
+    total, products = letters[0] * 0, 0
+    for row, coefficient in zip(rows, polynomial.coeffs(), strict=True):
+        term = letters[0] ** 0 * coefficient
+        factors = [*zip(letters[n:], row[n:], strict=True), *zip(point.numerators, row[:n], strict=True)]
+        factors += [
+            (q, power - degree(row, k)) for k, (q, power) in enumerate(zip(point.denominators, powers, strict=True))
+        ]
+        for factor, exponent in factors:
+            for _ in range(exponent):
+                products += len(term) * len(factor)
+                term *= factor
+                if len(term) > MAX_TERMS or products > MAX_PRODUCTS:
+                    raise InputError("the identities of the certificate are too long: a composition of the maps")
+        total += term
+    return total, powers
+
+
+def _identity(data: MapData) -> RationalPoint:
+    letters = ring(data.names).gens()
+    return RationalPoint.of([(x, x**0) for x in letters[: data.dim]])

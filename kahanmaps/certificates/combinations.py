@@ -1,0 +1,228 @@
+"""Claims that follow from the equation of a map by a linear combination: nothing is solved for x~.
+
+Let e(x, y) = M(x) y - r(x), which is 0 where y is the image of x. A claim G = 0 is proved by polynomials c with
+G = c . e, an identity for any points whatsoever. With three points x, y, z of an orbit and a symmetric trilinear form T
+with H(x) = T(x, x, x) in (x, 1), let g(a, b) = T(a, b, .). For f = J grad H, J constant and skew,
+
+    T(y, y, z) - T(x, x, y) = g(x, y) . (e(x, y) + e(y, z)) + g(y, z) . e(x, y),
+
+so that T(x, x, x~) = H + grad H . (x~ - x)/3 is an integral. For a skew matrix B for which B f' is symmetric,
+
+    y^T B z - x^T B y = x^T B e(y, z) - z^T B e(x, y),
+
+so that x^T B x~ is an integral, as for members of the commuting family. An affine T(x) = S x + b with f(T x) = S f(x)
+is a symmetry, since e(T x, T y) = S e(x, y), and with f(T x) = -S f(x) a reversing one: e(T y, T x) = -S e(x, y).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import lcm
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, ring
+from kahanmaps.certificates.identities import Claim, ConservedFunction, FalseClaim, MapData, coprime
+
+Row = tuple[fmpq_mpoly, ...]
+
+
+@dataclass(frozen=True)
+class OrbitIntegral(Claim):
+    """I(x, x~) = P/Q, Q without variables: P(y, z) - P(x, y) = first . e(x, y) + second . e(y, z).
+
+    All are polynomials over Z in the letters of `three_points`.
+    """
+
+    numerator: fmpq_mpoly
+    denominator: fmpq_mpoly
+    first: Row
+    second: Row
+
+    @property
+    def is_at_image(self) -> bool:
+        return False
+
+
+@dataclass(frozen=True)
+class AffineSymmetry(Claim):
+    """T(x) = `image`/`divisor`: `multiple` e(T x, T y) = `matrix` e(x, y), e(T y, T x) if `reversing`.
+
+    The left e is that of `target`, the right one that of `data`: the same map for a symmetry, else T takes one map to
+    the other.
+    """
+
+    target: MapData
+    image: Row
+    divisor: int
+    matrix: tuple[tuple[int, ...], ...]
+    multiple: int
+    reversing: bool
+
+    @property
+    def is_at_image(self) -> bool:
+        return False
+
+
+@dataclass(frozen=True)
+class ChangedFunction(Claim):
+    """P(T z)/Q(T z) = p(z)/q(z) with T z = `image`/`divisor`; pairs of numerator and denominator over Z."""
+
+    image: Row
+    divisor: int
+    given: tuple[fmpq_mpoly, fmpq_mpoly]
+    moved: tuple[fmpq_mpoly, fmpq_mpoly]
+
+    @property
+    def is_at_image(self) -> bool:
+        return False
+
+
+def three_points(data: MapData) -> tuple[str, ...]:
+    """The variables of x, its image y, the image z of y, and the constants."""
+    return (*data.variables, *data.new, *(f"{name}2" for name in data.new), *data.names[data.dim :])
+
+
+def residual(data: MapData, names: Sequence[str], first: int, second: int) -> list[fmpq_mpoly]:
+    """e(x, y) = M(x) y - r(x) in the ring of the names, x beginning at the letter `first` and y at `second`."""
+    n, context = data.dim, ring(names)
+    letters = context.gens()
+    constants = letters[len(names) - len(data.names) + n :]
+    result = []
+    for row in data.rows:
+        *entries, right = (entry.compose(*letters[first : first + n], *constants, ctx=context) for entry in row)
+        result.append(sum((e * y for e, y in zip(entries, letters[second : second + n], strict=True)), -right))
+    return result
+
+
+def row_multiples(data: MapData) -> list[fmpq]:
+    """The numbers by which the rows of I - eps f' of a Kahan map were multiplied: M at x = 0 and eps = 0."""
+    return [row[i][(0,) * len(data.names)] for i, row in enumerate(data.rows)]
+
+
+def modified_hamiltonian(data: MapData, name: str, H: fmpq_mpoly) -> OrbitIntegral:
+    """The identity for T(x, x, x~), H a polynomial of degree at most 3 in the variables and the symbols.
+
+    Raises:
+        FalseClaim: if the map is not the Kahan map of J grad H with a constant skew J.
+    """
+    n, names = data.dim, three_points(data)
+    context = ring(names)
+    gens = context.gens()
+    constants = gens[3 * n : -1]
+
+    def gradient(a: int, b: int) -> list[fmpq_mpoly]:
+        """The vector g of the points that begin at these letters, by polarization of grad H/3."""
+        points = (
+            [(gens[a + i] + gens[b + i]) / 2 for i in range(n)],
+            gens[a : a + n],
+            gens[b : b + n],
+        )
+        result = []
+        for k in range(n):
+            slope = H.derivative(k)
+            middle, *ends = (slope.compose(*point, *constants, ctx=context) for point in points)
+            result.append((2 * middle - (ends[0] + ends[1]) / 2) / 3)
+        return result
+
+    def value(a: int, b: int) -> fmpq_mpoly:
+        old = gens[a : a + n]
+        total = H.compose(*old, *constants, ctx=context)
+        for k in range(n):
+            total += H.derivative(k).compose(*old, *constants, ctx=context) * (gens[b + k] - gens[a + k]) / 3
+        return total
+
+    g, h = gradient(0, n), gradient(n, 2 * n)
+    first = [a + b for a, b in zip(g, h, strict=True)]
+    return _orbit_integral(data, name, value(0, n), value(n, 2 * n), context.constant(1), first, g)
+
+
+def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
+    """The identity for x^T B x~/eps. Raises FalseClaim if it does not hold."""
+    n, context = data.dim, ring(three_points(data))
+    gens = context.gens()
+
+    def times(a: int) -> list[fmpq_mpoly]:
+        """B^T x for the point x whose letters begin at a."""
+        return [sum((gens[a + i] * B[i, j] for i in range(n)), gens[0] * 0) for j in range(n)]
+
+    def form(a: int, b: int) -> fmpq_mpoly:
+        return sum((entry * gens[b + j] for j, entry in enumerate(times(a))), gens[0] * 0)
+
+    return _orbit_integral(data, name, form(0, n), form(n, 2 * n), gens[-1], [-c for c in times(2 * n)], times(0))
+
+
+def affine_symmetry(
+    data: MapData, name: str, S: fmpq_mat, shift: Sequence[fmpq], reversing: bool = False, target: MapData | None = None
+) -> AffineSymmetry:
+    """The identity for T(x) = S x + shift, which takes the map to the target, by default to itself, or its inverse.
+
+    Raises:
+        FalseClaim: if it does not.
+    """
+    target = target or data
+    n, names = data.dim, (*data.variables, *data.new, *data.names[data.dim :])
+    context = ring(names)
+    gens = context.gens()
+    divisor = lcm(*(int(entry.q) for entry in (*S.entries(), *shift)))
+    at = [[_affine(S, shift, gens[k : k + n], i) for i in range(n)] for k in (0, n)]
+    first, second = reversed(at) if reversing else at
+    moved = [P.compose(*first, *second, *gens[2 * n :], ctx=context) for P in residual(target, names, 0, n)]
+    scale, own_scale = row_multiples(target), row_multiples(data)
+    K = [[(-1 if reversing else 1) * S[i, j] * scale[i] / own_scale[j] for j in range(n)] for i in range(n)]
+    multiple = lcm(*(int(entry.q) for row in K for entry in row))
+    matrix = tuple(tuple(int(entry * multiple) for entry in row) for row in K)
+    own = residual(data, names, 0, n)
+    for row, value in zip(matrix, moved, strict=True):
+        if value * multiple != sum((c * P for c, P in zip(row, own, strict=True)), context.constant(0)):
+            raise FalseClaim(f"{name} is no {'reversing ' * reversing}symmetry: no certificate can be written")
+    image = tuple(
+        ring(data.names).constant(0) + divisor * _affine(S, shift, ring(data.names).gens(), i) for i in range(n)
+    )
+    return AffineSymmetry(name, data, target, image, divisor, matrix, multiple, reversing)
+
+
+def changed_function(
+    way: AffineSymmetry, name: str, function: RationalFunction, moved: ConservedFunction
+) -> ChangedFunction:
+    """The identity that the function of x is the other one of z, x = T z. Raises FalseClaim if it is not."""
+    data = way.data
+    context = ring(data.names)
+    letters = dict(zip(data.names, context.gens(), strict=True))
+    small = [letters[letter] for letter in moved.data.names]
+    p, q = (P.compose(*small, ctx=context) for P in (moved.numerator, moved.denominator))
+    P, Q = coprime(function, data.names)
+    images = [entry / way.divisor for entry in way.image] + [*context.gens()[data.dim :]]
+    if P.compose(*images, ctx=context) * q != p * Q.compose(*images, ctx=context):
+        raise FalseClaim(f"{name} is another function in these coordinates: no certificate can be written")
+    return ChangedFunction(name, data, way.image, way.divisor, (P, Q), (p, q))
+
+
+def _affine(S: fmpq_mat, shift: Sequence[fmpq], letters: Sequence[fmpq_mpoly], i: int) -> fmpq_mpoly:
+    """The component i of S x + shift."""
+    return sum((S[i, j] * letters[j] for j in range(len(shift))), letters[0] * 0 + shift[i])
+
+
+def _orbit_integral(
+    data: MapData,
+    name: str,
+    value: fmpq_mpoly,
+    next_value: fmpq_mpoly,
+    denominator: fmpq_mpoly,
+    first: Sequence[fmpq_mpoly],
+    second: Sequence[fmpq_mpoly],
+) -> OrbitIntegral:
+    """The claim with integral coefficients, after its identity was multiplied out."""
+    n, names = data.dim, three_points(data)
+    rows = [fmpq(1) / c for c in row_multiples(data)]
+    multipliers = [[c * s for c, s in zip(side, rows, strict=True)] for side in (first, second)]
+    total = ring(names).constant(0)
+    for side, k in zip(multipliers, (0, n), strict=True):
+        for c, e in zip(side, residual(data, names, k, k + n), strict=True):
+            total += c * e
+    if total != next_value - value:
+        raise FalseClaim(f"{name} is not conserved: no certificate can be written")
+    multiple = lcm(*(int(common_denominator(c)) for c in (value, *multipliers[0], *multipliers[1])))
+    scaled = [tuple(c * multiple for c in side) for side in multipliers]
+    return OrbitIntegral(name, data, value * multiple, denominator * multiple, scaled[0], scaled[1])

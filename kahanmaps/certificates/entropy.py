@@ -1,0 +1,142 @@
+"""Positive algebraic entropy of a map of the plane: degrees that another program computes again.
+
+The criterion is the theorem of docs/mathematics.md, section "Positive entropy, proved in the plane": for a birational f
+with D_n = deg f^n and the dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2n - 1)/(D_n - 1). Here f is the map
+over Q(eps), and D_n is needed from above, D_2n from below:
+
+* forms F_1, ..., F_n over Z[eps] with F_1(F_k) = c F_(k+1) show D_n <= deg F_n;
+* modulo a prime and at a residue eps, the image of a line under 2n steps, without its common factor, has a degree of
+  at most D_2n: the forms of f^(2n) take the line to a multiple of this image, as long as no step gives 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import reduce
+
+from flint import fmpq_mpoly, nmod_poly
+
+from kahanmaps.algebra.polynomials import common_denominator, degree_in, ring
+from kahanmaps.certificates.identities import Claim, MapData
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.growth.degree_bounds import lower_bound, round_up
+
+PRIME = 2**61 - 1
+EPS = 1234567
+LINE = ((3, 5), (7, 11), (1, 0))  # the points (3 + 5 t : 7 + 11 t : 1)
+_MAX_TERMS = 100  # of one form of the last iterate but one
+_MAX_DEGREE = 600  # of the image of the line
+_MAX_STEPS = 5
+
+
+@dataclass(frozen=True)
+class PositiveEntropy(Claim):
+    """The forms of `inverse` and of F_1, ..., F_n, the common factors c_1, ..., c_n, and the degrees of the line.
+
+    The forms are in the variables, the symbols, eps and a last letter that makes them homogeneous: c_1 F_1 is (N : D),
+    and c_(k+1) F_(k+1) = F_1(F_k). The dynamical degree is more than `lower`.
+    """
+
+    inverse: tuple[fmpq_mpoly, ...]
+    forms: tuple[tuple[fmpq_mpoly, ...], ...]
+    factors: tuple[fmpq_mpoly, ...]
+    degree: int
+    line_degree: int
+    lower: Fraction
+
+
+def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
+    """The degrees that prove that the dynamical degree is more than 1, for a map of the plane and its inverse.
+
+    Raises:
+        InputError: if they are not found within the limits, which proves nothing.
+    """
+    first, factor = _without_common_factor(_forms(data))
+    iterates, factors = [first], [factor]
+    line = [nmod_poly(list(point), PRIME) for point in LINE]
+    degrees, best = [1], None
+    while len(degrees) <= 2 * len(iterates):
+        line = _image(first, line)
+        degrees.append(max(X.degree() for X in line))
+        if degrees[-1] > _MAX_DEGREE:
+            break
+        n, is_even = len(degrees) // 2, len(degrees) % 2 == 1
+        if is_even:
+            bound = lower_bound(degrees[2 * n], _degree(iterates[n - 1]), n)
+            if bound is not None and (best is None or float(bound) > best[0]):
+                best = float(bound), n, degrees[2 * n], Fraction(round_up(bound.lower(), -1))
+            if n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
+                break
+            form, factor = _without_common_factor(_composed(first, iterates[-1]))
+            iterates.append(form)
+            factors.append(factor)
+    if best is None:
+        raise InputError("no lower bound of the dynamical degree above 1 was found, which proves nothing")
+    _, n, line_degree, lower = best
+    backward, _ = _without_common_factor(_forms(inverse))
+    forms = tuple(iterates[:n])
+    return PositiveEntropy("entropy", data, backward, forms, tuple(factors[:n]), _degree(forms[-1]), line_degree, lower)
+
+
+def _degree(forms: Sequence[fmpq_mpoly]) -> int:
+    """The degree in the two variables and the last letter."""
+    return max(int(e[0] + e[1] + e[-1]) for form in forms for e in form.monoms())
+
+
+def _forms(data: MapData) -> list[fmpq_mpoly]:
+    """N and D, made homogeneous in the variables by a further letter."""
+    context = ring((*data.names, "h"))
+    *letters, h = context.gens()
+    parts = (*data.numerators, data.determinant)
+    degree = max(degree_in(part, 2) for part in parts)
+    result = []
+    for part in parts:
+        total = context.constant(0)
+        for exponents, coefficient in part.terms():
+            term = h ** (degree - int(exponents[0]) - int(exponents[1])) * coefficient
+            for letter, exponent in zip(letters, exponents, strict=True):
+                term *= letter ** int(exponent)
+            total += term
+        result.append(total)
+    return result
+
+
+def _composed(forms: Sequence[fmpq_mpoly], inner: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
+    context = forms[0].context()
+    constants = context.gens()[2:-1]
+    return [form.compose(inner[0], inner[1], *constants, inner[2], ctx=context) for form in forms]
+
+
+def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:
+    """The forms over Z without their common factor, and that factor, which may have a rational coefficient."""
+    common = reduce(fmpq_mpoly.gcd, forms)
+    parts = [form / common for form in forms]
+    multiple = reduce(lambda a, b: a * b / a.gcd(b), map(common_denominator, parts))
+    return tuple(part * multiple for part in parts), common / multiple
+
+
+def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly]) -> list[nmod_poly]:
+    """The image of a curve modulo the prime, without its common factor. Raises InputError where it is 0."""
+    powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], PRIME)} for _ in curve]
+
+    def power(k: int, exponent: int) -> nmod_poly:
+        if exponent not in powers[k]:
+            powers[k][exponent] = power(k, exponent - 1) * curve[k]
+        return powers[k][exponent]
+
+    values = []
+    for form in forms:
+        total = nmod_poly([], PRIME)
+        for exponents, coefficient in form.terms():
+            x, y, *constants, eps, h = map(int, exponents)
+            if any(constants):
+                raise InputError("expected numbers for all parameters to certify positive entropy")
+            scalar = int(coefficient.p) * pow(EPS, eps, PRIME)
+            total += power(0, x) * power(1, y) * power(2, h) * scalar
+        values.append(total)
+    common = reduce(nmod_poly.gcd, values)
+    if not any(values):
+        raise InputError("the image of the line modulo a prime is undefined: no degrees are found")
+    return [value // common for value in values]

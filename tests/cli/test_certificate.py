@@ -1,0 +1,118 @@
+"""kahanmaps certificate: a script on standard output or in a file; a false claim is refuted with status 1."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+import pytest
+
+
+def test_the_command_in_the_comment_writes_the_same_certificate_again(kahanmaps):
+    first = kahanmaps("certificate --vars=x,y '--image=y; (3 + y)/x' --for gp --integral '(x+1)*(y+1)*(x+y+3)/(x*y)'")
+    assert (first.status, first.err) == (0, "")
+    (line,) = [line for line in first.out.splitlines() if "kahanmaps certificate" in line]
+    assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
+
+
+def test_a_false_claim_is_refuted_with_status_1_and_writes_nothing(kahanmaps, tmp_path):
+    outcome = kahanmaps("certificate euler_top --for rocq --integral x1^2+x2^2 -o", tmp_path / "top.v")
+    assert (outcome.status, outcome.out) == (1, "")
+    assert outcome.err == "refuted: I1 is not conserved: no certificate can be written\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_certificate_goes_to_a_file(kahanmaps, tmp_path):
+    path = tmp_path / "top.v"
+    outcome = kahanmaps("certificate euler_top --for rocq --claim F1 -o", path)
+    assert (outcome.status, outcome.out) == (0, "")
+    assert outcome.err == f"{path}: euler_top: a certificate for rocq, {len(path.read_text().splitlines())} lines\n"
+    assert kahanmaps("certificate euler_top --for rocq --claim F1 -q -o", path).err == ""
+
+
+def test_a_system_of_which_nothing_is_known_is_refused_with_what_to_type(kahanmaps):
+    outcome = kahanmaps("certificate lorenz --for gp")
+    assert outcome.status == 2
+    assert "kahanmaps find-integrals lorenz --toml" in outcome.err
+
+
+def test_all_certifies_what_searches_prove(kahanmaps):
+    outcome = kahanmaps("certificate lotka_volterra --for gp --all")
+    assert outcome.status == 0
+    for says in (
+        "volume: dx/phi is invariant",
+        "P: the map is Poisson",
+        "D1: P is a Darboux",
+        "T1: x -> T takes the map to itself",
+    ):
+        assert says in outcome.out
+    assert kahanmaps("certificate lotka_volterra --for gp --all --claim volume").status == 2
+
+
+def test_commuting_maps_and_periods(kahanmaps):
+    first = kahanmaps("""certificate "x' = y; y' = -x" --for gp --commute "x' = 2*y; y' = -2*x" """)
+    assert (first.status, first.err) == (0, "")
+    (line,) = [line for line in first.out.splitlines() if "kahanmaps certificate" in line]
+    assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
+    assert "is the image of point 4 under f" in kahanmaps("certificate lyness -p a=1 --for gp --period 5").out
+    outcome = kahanmaps("certificate lyness --for gp --period 5")
+    assert (outcome.status, outcome.err) == (
+        1,
+        "refuted: iterate 5 is not the identity: no certificate can be written\n",
+    )
+    assert kahanmaps("certificate paper_m2 --for gp --commute associates --claim volume").status == 2
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "says"),
+    [
+        ("check-integrals euler_top", 0, "F2: P/Q is an integral"),
+        ("check-integrals euler_top --integral J=F1", 0, "J: P/Q is an integral"),
+        ("check-measure lotka_volterra --density 3*x*y", 0, "volume: dx/phi is invariant"),
+        ("check-poisson weierstrass", 0, "poisson: the map is Poisson"),
+        ("check-commute paper_m2", 0, "is the image of point 3 under f"),
+        ("find-integrals euler_top --symbolic a1,a2,a3", 0, "I2: P/Q is an integral"),
+        ("find-integrals volterra_periodic_3 --darboux 1", 0, "D4: P is a Darboux polynomial"),
+        ("find-density lotka_volterra", 0, "volume_1: dx/phi is invariant"),
+        ("find-poisson lotka_volterra", 0, "P: the map is Poisson"),
+        ("find-symmetry lotka_volterra", 0, "T1: x -> T takes the map to itself"),
+    ],
+)
+def test_checks_and_searches_write_a_certificate_of_what_they_prove(command, status, says, kahanmaps, tmp_path):
+    path = tmp_path / "proof.gp"
+    outcome = kahanmaps(f"{command} --certificate", path)
+    assert outcome.status == status
+    text = path.read_text()
+    assert says in text
+    assert outcome.err.endswith(f"a certificate for gp, {len(text.splitlines())} lines\n")
+    if shutil.which("gp") is not None:
+        done = subprocess.run(["gp", "-q", path], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        assert (done.returncode, "FALSE" in done.stdout) == (0, False)
+
+
+@pytest.mark.parametrize(
+    ("command", "ending", "status", "says"),
+    [
+        ("check-integrals euler_top --integral x1", ".gp", 1, "is not written: I1 is not conserved"),
+        ("check-poisson henon_heiles", ".gp", 1, "is not written: Pi is no Poisson tensor"),
+        ("find-integrals lorenz", ".v", 3, "is not written: nothing is proved in this result about lorenz"),
+        ("check-integrals euler_top", ".txt", 2, "expected a file that ends with .v, .gp or .py"),
+        ("check-integrals euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),
+        ("find-integrals euler_top --flow", ".gp", 2, "--certificate cannot be combined with --flow"),
+        ("find-density euler_top --flow", ".gp", 2, "--flow cannot be combined with --certificate"),
+    ],
+)
+def test_what_is_not_proved_for_every_eps_has_no_certificate(command, ending, status, says, kahanmaps, tmp_path):
+    outcome = kahanmaps(f"{command} --certificate", tmp_path / f"proof{ending}")
+    assert (outcome.status, list(tmp_path.iterdir())) == (status, [])
+    assert says in outcome.err
+
+
+def test_a_report_links_the_certificate_that_it_writes(kahanmaps, tmp_path):
+    page, proof = tmp_path / "page.html", tmp_path / "proof 1.gp"
+    command = f"report lotka_volterra --from checks --no-pictures --certificate '{proof}' -o"
+    assert kahanmaps(command, page).status == 0
+    assert '<a href="proof%201.gp">proof 1.gp</a>' in page.read_text()
+    assert "dx/phi is invariant" in proof.read_text()
+    assert "Certificate" not in kahanmaps("report lotka_volterra --from checks --no-pictures").out
+    assert kahanmaps(f"report lotka_volterra --eps 1/2 --certificate '{proof}'").status == 2
