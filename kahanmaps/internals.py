@@ -3,6 +3,22 @@
 They are listed with their modules in internals.pyi, which type checkers read as well.
 """
 
+import sys
+from typing import Any
+
 from lazy_loader import attach_stub
 
-__getattr__, __dir__, __all__ = attach_stub("kahanmaps", __file__)
+_load, __dir__, __all__ = attach_stub("kahanmaps", __file__)
+
+
+def __getattr__(name: str) -> Any:
+    # Some versions of lazy-loader store what they load in the package as well. There it would replace public functions,
+    # which report wrong arguments in words, and make private names public.
+    public = vars(sys.modules["kahanmaps"])
+    is_stored, stored = name in public, public.get(name)
+    value = globals()[name] = _load(name)
+    if is_stored:
+        public[name] = stored
+    else:
+        public.pop(name, None)
+    return value

@@ -1,5 +1,7 @@
 """What may be passed to the functions of `import kahanmaps`, and what they refuse, in which words."""
 
+import subprocess
+import sys
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -423,3 +425,12 @@ def test_floats_are_refused_inside_of_formulas(given):
     ):
         with pytest.raises(InexactNumber, match=r"found the floating-point number 0\.5"):
             make()
+
+
+def test_names_that_the_command_line_loads_do_not_replace_public_ones():
+    code = (
+        "import kahanmaps as km; from kahanmaps import internals; raw = internals.analyze; internals.format_of\n"
+        "print(km.analyze is raw, km.analyze.__wrapped__ is raw, 'format_of' in vars(km), internals.analyze is raw)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False True False True\n"

@@ -164,6 +164,7 @@ class InvariantVolume(Claim):
     denominator: fmpq_mpoly
     degree: int
     is_free: bool
+    cofactors: tuple[fmpq_mpoly, fmpq_mpoly, int] | None = None  # C and B, j: of P and, times D^j, of Q, if there are
 
 
 @dataclass(frozen=True)
@@ -287,8 +288,17 @@ def invariant_volume(data: MapData, name: str, function: RationalFunction) -> In
         _times(at_old[0], at_new[1]), determinant(data.derivative)
     ):
         return InvariantVolume(name, data, P, Q, k, True)
-    left = _times(_times(homogeneous_value(P, k, data), Q), data.determinant ** (n + 1))
-    right = _times(_times(homogeneous_value(Q, k, data), P), determinant(_derivative_at_image(data)))
+    values = [homogeneous_value(F, k, data) for F in (P, Q)]
+    C, C_Q = (_quotient(value, F) for value, F in zip(values, (P, Q), strict=True))
+    volume = determinant(_derivative_at_image(data))
+    if C and C_Q:
+        power, D = 0, data.determinant
+        while power <= n and (smaller := _quotient(C_Q, D)) is not None:
+            C_Q, power = smaller, power + 1
+        if _times(C, D ** (n + 1 - power)) == _times(C_Q, volume):
+            return InvariantVolume(name, data, P, Q, k, False, (C, C_Q, power))
+    left = _times(_times(values[0], Q), data.determinant ** (n + 1))
+    right = _times(_times(values[1], P), volume)
     if left != right:
         raise FalseClaim("dx/phi is not invariant: no certificate can be written")
     return InvariantVolume(name, data, P, Q, k, False)

@@ -493,21 +493,45 @@ class _Script:
         if claim.is_free:
             further = f"num den volume {flat}"
             return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {self.expand(further)}", "Qed."]
-        for label, polynomial in (("num", claim.numerator), ("den", claim.denominator)):
-            image = homogeneous_value(polynomial, power, self.data)
-            lines += self.moved(label, polynomial, power, self.text(image))
+        for k, (label, polynomial) in enumerate((("num", claim.numerator), ("den", claim.denominator))):
+            if claim.cofactors is None:
+                image = homogeneous_value(polynomial, power, self.data)
+                lines += self.moved(label, polynomial, power, self.text(image))
+            else:
+                text = self.text(claim.cofactors[0] if k == 0 else claim.cofactors[1])
+                text = f"({text}) * det ^ {claim.cofactors[2]}" if label == "den" else text
+                lines.append(f"Definition cofactor_{label} : R := {text}.")
+                lines += self.moved(label, polynomial, power, f"cofactor_{label} * {label} {old}", f"cofactor_{label}")
         # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
         scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
+        last = [f"  rewrite num_image, den_image, volume_scaled, {self.cramer}.", f"  {self.expand('num', 'den')}"]
+        balance = list[str]()
+        if claim.cofactors is not None:
+            j, b = claim.cofactors[2], self.text(claim.cofactors[1])
+            balance = [
+                f"Lemma shorter : cofactor_num * det ^ {n + 1 - j} = ({b}) * (volume * det ^ {n}).",
+                f"Proof. rewrite volume_scaled, {self.cramer}. {self.expand('cofactor_num')} Qed.",
+                f"Lemma balance : cofactor_num * (det * det ^ {n}) = cofactor_den * (volume * det ^ {n}).",
+                "Proof.",
+                f"  transitivity (cofactor_num * det ^ {n + 1 - j} * det ^ {j}); [ring |].",
+                "  rewrite shorter. unfold cofactor_den. ring.",
+                "Qed.",
+            ]
+            last = [
+                "  rewrite num_image, den_image.",
+                f"  transitivity (num {old} * den {old} * (cofactor_num * (det * det ^ {n}))); [ring |].",
+                "  rewrite balance. ring.",
+            ]
         return [
             *lines,
             f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled)}.",
             f"Proof. cbv delta [volume {flat}] beta; ring. Qed.",
+            *balance,
             *statement,
             f"  apply (Rmult_eq_reg_r (det ^ {power + n})); [| apply pow_nonzero; exact regular].",
             f"  transitivity (num {new} * det ^ {power} * (den {old} * det * det ^ {n})); [ring |].",
             f"  transitivity (num {old} * (volume * det ^ {n}) * (den {new} * det ^ {power})); [| ring].",
-            f"  rewrite num_image, den_image, volume_scaled, {self.cramer}.",
-            f"  {self.expand('num', 'den')}",
+            *last,
             "Qed.",
         ]
 

@@ -220,6 +220,7 @@ class _Script:
     def check(self, label: str, identity: str) -> None:
         """A check; ^ stands for a power."""
         identity = identity.replace("^", self.to.power)
+        identity = identity.replace("&&", "and") if self.to is PYTHON else identity
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
 
     def begin(self, claim: Claim, count: int) -> None:
@@ -321,6 +322,14 @@ class _Script:
             return
         self.check("D = det M", "D == det(M)")
         k = claim.degree
+        if claim.cofactors is not None:  # P(x~)/P(x) = C/D^k and Q(x~)/Q(x) = B D^j/D^k
+            *cofactors, j = claim.cofactors
+            for letter, name, power, cofactor in zip("CB", "PQ", ("", f"*D^{j}"), cofactors, strict=True):
+                self.polynomial(letter, cofactor)
+                identity = f"{letter} != 0 && image({name}, {k}, old) == {letter}{power}*{name}"
+                self.check(f"{label}: D^k {name}(N/D) = {letter}{power} {name}", identity)
+            self.check(f"{says} at x~ = N/D", f"C*D^(n + 1 - {j}) == B*det(images(L, 1, new))")
+            return
         identity = f"image(P, {k}, old)*Q*D^(n + 1) == P*image(Q, {k}, old)*det(images(L, 1, new))"
         self.check(f"{says} at x~ = N/D", identity)
 
