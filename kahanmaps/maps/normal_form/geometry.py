@@ -156,7 +156,7 @@ def geometry(
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> plane = geometry(QuadraticSystem.from_text(["x", "y"], ["3*y^2", "-3*x^2"]), [1, 2], "1/10").planes[0]
     >>> plane.delta, plane.order, plane.rotations[0].number.str(8, radius=False)
-    (-19683/14048504, None, '0.10396157')
+    (-2187/46225, None, '0.17182562')
     """
     return geometry_of(*normal_form_and_start(system, resolve_eps(eps, time_step, h), either(start=start, x0=x0)))
 
