@@ -15,7 +15,7 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_tensor, run_orbit, settings_and_claim
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.phase_functions import (
+from kahanmaps.invariants.integrals_and_densities import (
     ClaimedDensity,
     DeterminantDensity,
     PhaseFunction,

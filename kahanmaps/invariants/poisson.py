@@ -26,7 +26,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
 from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.documents.toml_text import TomlKind
 from kahanmaps.errors import InputError, SystemFileError, quoted
-from kahanmaps.invariants.phase_functions import at_eps, where
+from kahanmaps.invariants.integrals_and_densities import at_eps, where
 from kahanmaps.maps.implicit import Map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 

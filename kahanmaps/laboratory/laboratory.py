@@ -46,7 +46,11 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
-from kahanmaps.invariants.phase_functions import density_condition, integral_condition, jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import (
+    density_condition,
+    integral_condition,
+    jacobian_determinant_sides,
+)
 from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, NoPoint, Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (

@@ -16,7 +16,7 @@ from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, monomials
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_sides
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanMap, as_map
 from kahanmaps.systems.polynomial import PolynomialField

@@ -31,7 +31,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.random_members import random_member_with_chi
-from kahanmaps.invariants.phase_functions import (
+from kahanmaps.invariants.integrals_and_densities import (
     CommutantIntegral,
     ModifiedHamiltonian,
     PaperIntegral,

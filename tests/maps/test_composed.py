@@ -10,7 +10,7 @@ from kahanmaps.algebra.matrices import det
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_sides
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.explicit import explicit_map

@@ -33,7 +33,7 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.display_protocols import latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.invariants.phase_functions import normalized, orbit_about
+from kahanmaps.invariants.integrals_and_densities import normalized, orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by

@@ -41,7 +41,7 @@ from kahanmaps.algebra.polynomials import (
 from kahanmaps.algebra.printing import format_product
 from kahanmaps.algebra.work import Budget, count, counted_cache
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor

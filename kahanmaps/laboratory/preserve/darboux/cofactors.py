@@ -31,7 +31,7 @@ from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_facto
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.algebra.work import count as count_work
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,
