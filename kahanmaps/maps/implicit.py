@@ -35,7 +35,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of,
 from kahanmaps.algebra.printing import format_polynomial, format_rational_function
 from kahanmaps.algebra.roots import Root
 from kahanmaps.display_protocols import LatexDisplay
-from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
+from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep, counted
 from kahanmaps.maps.equation import Equation, equation_of
 from kahanmaps.maps.inverse import Rows, inverse_rows, why_not_birational
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
@@ -107,7 +107,7 @@ class Map:
             raise InputError(f"found {values!r}, expected a sequence of {self.dim} exact numbers")
         if len(values) != self.dim:
             named = f": {', '.join(self.variables)}" if self.variables else ""
-            raise InputError(f"found a point with {len(values)} coordinates, expected {self.dim}{named}")
+            raise InputError(f"found a point with {counted(len(values), 'coordinate')}, expected {self.dim}{named}")
         return tuple(self.field.convert(value) for value in values)
 
     def __call__(self, *point: Any) -> Any:

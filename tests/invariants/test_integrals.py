@@ -35,7 +35,7 @@ from kahanmaps.invariants.integrals_and_densities import (
     CommutantIntegral,
     ModifiedHamiltonian,
     PaperIntegral,
-    jacobian_determinant_sides,
+    jacobian_determinant_fraction,
     where,
 )
 from kahanmaps.invariants.poisson import HamiltonianTensor, jacobi_defects, poisson_tensor, transformation_sides
@@ -103,7 +103,7 @@ def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, e
     system, x = drawn
     kahan = KahanMap(system, eps)
     try:
-        above, below = jacobian_determinant_sides(kahan, x, kahan.step(x))
+        above, below = jacobian_determinant_fraction(kahan, x, kahan.step(x))
     except SingularStep:
         assume(False)
     jacobian = kahan_jacobian(system, fraction(eps), exact(*x))

@@ -100,7 +100,7 @@ def draw_member(
     if eigenvalues is not None:
         values = lib.parse_point(eigenvalues)
         if m is not None and m != len(values):
-            raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
+            raise click.UsageError(f"found {counted(len(values), 'eigenvalue')}, expected m = {m}")
         return lib.random_member_with_eigenvalues(values, seed, size or 2)
     if chi is not None:
         polynomial = lib.parse_chi(chi)

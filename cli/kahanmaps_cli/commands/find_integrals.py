@@ -181,8 +181,8 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
             }
         )
         return 3 if reason else 0
-    step = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
-    print_stdout(f"Hirota-Kimura bases: {file.name}{step}, measured on two orbits modulo each of two primes")
+    eps_text = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
+    print_stdout(f"Hirota-Kimura bases: {file.name}{eps_text}, measured on two orbits modulo each of two primes")
     for row in rows:
         print_stdout(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:

@@ -41,7 +41,7 @@ from kahanmaps.algebra.polynomials import (
 from kahanmaps.algebra.printing import format_product
 from kahanmaps.algebra.work import Budget, count, counted_cache
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
@@ -137,7 +137,7 @@ def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str
         try:
             local = map_.at(step, field, x[n:])
             local = local.inverse if backward else local
-            sides += jacobian_determinant_sides(local, x[:n], local.generic_step(tuple(x[:n])))
+            sides += jacobian_determinant_fraction(local, x[:n], local.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
     return _irreducible((part for side in sides for part in (side.numerator, side.denominator)), n, eps)

@@ -31,7 +31,7 @@ from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_facto
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.algebra.work import count as count_work
-from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,
@@ -69,7 +69,7 @@ class Cofactor:
     def over(self, map_: Map, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
         """Return numerator and denominator of the value at a point, at these values of the symbols."""
         if self.polynomial is None:
-            return jacobian_determinant_sides(map_, x, image)
+            return jacobian_determinant_fraction(map_, x, image)
         field, eps = map_.field, map_.eps
         g = evaluate(self.polynomial, field, (*x, *values, eps))
         if self.kind == "reversed":
@@ -122,7 +122,7 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     try:
         over = map_.at(eps, field, x[n:])
         image = over.step(x[:n])
-        numerator, denominator = jacobian_determinant_sides(over, x[:n], image)
+        numerator, denominator = jacobian_determinant_fraction(over, x[:n], image)
         J = numerator / denominator
     except BudgetExceeded:
         D = None
