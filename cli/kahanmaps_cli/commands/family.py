@@ -26,7 +26,12 @@ draw_options: Callable[[F], F] = opt.stack(
     click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
     click.option("--generic", is_flag=True, help="Draw a random integer polynomial chi, typically irreducible over Q."),
     click.option("--chi", metavar="EXPR", help="The polynomial chi in t, e.g. '(t-1)*(t^2-2)'."),
-    click.option("--size", type=int, metavar="N", help="Bound for the random integer coefficients (default 2 or 1)."),
+    click.option(
+        "--size",
+        type=int,
+        metavar="N",
+        help="Bound for the random integer coefficients (default 1 with --generic or --chi, else 2).",
+    ),
 )
 DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 
