@@ -196,7 +196,8 @@ check_options: Callable[[F], F] = stack(
         "--start",
         type=PointText(True),
         metavar="X",
-        help="Initial point of the exact test orbit (default: random); may contain t with -p 't = root of ...'.",
+        help="Initial point of the exact test orbit (default: random); its coordinates may be polynomials in an "
+        "algebraic number t, given by -p 't = root of ...'.",
     ),
     click.option("--steps", type=int, metavar="N", help="Number of steps of the test orbit (default 10)."),
     evidence_options,

@@ -357,10 +357,10 @@ NUMBER = re.compile(r"[+-]?(?:[0-9]+/0*[1-9][0-9]*|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 
 
-def guarded(text: str) -> str:
+def spreadsheet_safe(text: str) -> str:
     """Add an apostrophe to text that a spreadsheet would run as a formula; numbers stay unchanged.
 
-    >>> [guarded(text) for text in ("-3", "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
+    >>> [spreadsheet_safe(text) for text in ("-3", "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
     ['-3', '-1/2', "'=HYPERLINK(1)", "'-x", "''-x"]
     """
     return "'" + text if _FORMULA.match(text) and not NUMBER.fullmatch(text) else text

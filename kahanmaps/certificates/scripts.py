@@ -116,10 +116,10 @@ def script_certificate(
     old = [letters[name] for name in data.variables]
 
     def text(polynomial: fmpq_mpoly) -> str:
-        return total(polynomial_text(polynomial, [letters[name] for name in names_of(polynomial)], "*", to.power))
+        return sum_text(polynomial_text(polynomial, [letters[name] for name in names_of(polynomial)], "*", to.power))
 
-    def total(text: str) -> str:
-        """A sum; of many terms in parts, as Python reads no expression that is nested a thousand times."""
+    def sum_text(text: str) -> str:
+        """Return a sum as text; for Python in parts, as it cannot parse a sum of thousands of terms."""
         terms = re.split(r" (?=[+-] )", text)
         parts = [" ".join(terms[k : k + 50]) for k in range(0, len(terms), 50)]
         if to is GP or len(parts) == 1:
@@ -134,7 +134,7 @@ def script_certificate(
             spare = degree - sum(int(k) for k in exponents[:n])
             powers = [f"{a}{to.power}{k}" for a, k in zip([*names, "h"], [*exponents, spare], strict=True) if k]
             pieces.append("*".join([f"({coefficient})", *powers]))
-        return total(" + ".join(pieces) or "0")
+        return sum_text(" + ".join(pieces) or "0")
 
     def at_numerators(entry: fmpq_mpoly) -> str:
         """Return D times an entry of L at x~ = N/D; the entry is of degree at most 1 in x~."""

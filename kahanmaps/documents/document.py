@@ -317,7 +317,7 @@ class DocumentReader(PartReader):
         polynomials = self._each("bilinear.equations", formulas, equation)
         if polynomials is None or self.has_bad_parameter:
             return None
-        return self._sound(bilinear_map, "bilinear", self.variables, polynomials)
+        return self._checked_map(bilinear_map, "bilinear", self.variables, polynomials)
 
     def _read_map(self, section: Mapping[str, Any]) -> MapFamily | None:
         self._required("map", section, "image")
@@ -332,9 +332,9 @@ class DocumentReader(PartReader):
             or ("inverse" in section and inverse is None)
         ):
             return None
-        return self._sound(explicit_map, "map", self.variables, image, inverse)
+        return self._checked_map(explicit_map, "map", self.variables, image, inverse)
 
-    def _sound(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
+    def _checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
         """Return the map if it is defined and dominant, and a given inverse is right; otherwise note a mistake."""
         map_ = self._try_make(path, make, *arguments)
         if map_ is None:

@@ -119,8 +119,8 @@ class PartReader:
         if text is None or self.variables is None:
             return None
         try:
-            tail = (*self.symbols, "eps") if of_map else ()
-            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *tail), self.parameters)
+            further_names = (*self.symbols, "eps") if of_map else ()
+            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *further_names), self.parameters)
         except UnknownName as error:
             where = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
             return self._refused(path, f"{error}\nif it is a parameter, give its value: {where}")
@@ -129,9 +129,9 @@ class PartReader:
         actual_degree = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
         if actual_degree > at_most and not self.has_bad_parameter:
             degree = "" if actual_degree == 3 else f" and degree = {actual_degree}"
-            polarised = f'discretization = "polarised"{degree} into [system] of a file'
-            polarised = f"\nfor a field of degree {actual_degree} write {polarised}"
-            hint = polarised if path.startswith("system.rhs") and actual_degree <= MAX_DEGREE else ""
+            keys = f'discretization = "polarised"{degree}'
+            advice = f"\nfor a field of degree {actual_degree} write {keys} into [system] of a file"
+            hint = advice if path.startswith("system.rhs") and actual_degree <= MAX_DEGREE else ""
             return self._refused(
                 path, f"found a polynomial of degree {actual_degree}, expected at most {at_most}{hint}"
             )

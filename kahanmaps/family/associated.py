@@ -79,12 +79,12 @@ class ConjugateAssociate:
                 terms[monomial] = terms.get(monomial, 0 * coefficient) + coefficient * number
         context = self.chain[0].context()
         ordered = context.from_dict({monomial: 1 for monomial, c in terms.items() if c != 0}).monoms()
-        written = (
+        term_texts = (
             f"({format_univariate(terms[monomial].polynomial, self.name)})*"
             f"{format_polynomial(context.from_dict({monomial: 1}))}"
             for monomial in ordered
         )
-        return " + ".join(written) or "0"
+        return " + ".join(term_texts) or "0"
 
 
 @dataclass(frozen=True, eq=False)

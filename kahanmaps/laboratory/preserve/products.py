@@ -162,7 +162,7 @@ class _Line:
     def _apply(self, factor: ElementaryMap) -> None:
         """Apply one factor of the map to the image; its determinant is numerator Z^n / (denominator Z~^n)."""
         p, n, curve = self.prime, factor.dim, self.image
-        top, size = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
+        map_degree, curve_degree = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
         def step(t: int) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
             """Return the point of the curve at t, its image and Z."""
@@ -175,11 +175,11 @@ class _Line:
 
         def homogeneous(t: int) -> list[int]:
             x, image, Z = step(t)
-            denominator = int(factor.determinant(x)) * pow(Z, n * top, p)
+            denominator = int(factor.determinant(x)) * pow(Z, n * map_degree, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
         # Without the common factor: its degree would multiply in each further map, and its zeros are not those of Z~.
-        raw = _interpolated(homogeneous, n * top * size, p)
+        raw = _interpolated(homogeneous, n * map_degree * curve_degree, p)
         common = reduce(nmod_poly.gcd, raw)
         self.image = [entry // common for entry in raw]
         self.denominator = self.denominator * raw[-1]
@@ -187,11 +187,13 @@ class _Line:
 
         def numerator(t: int) -> list[int]:
             x, image, Z = step(t)
-            scale = pow(Z, n * (top - 1), p) * pow(int(image_Z(t)), n, p)
+            scale = pow(Z, n * (map_degree - 1), p) * pow(int(image_Z(t)), n, p)
             return [int(det(factor.numerator_matrix(x, image))) * scale % p]
 
         image_degree = max(int(entry.degree()) for entry in self.image)
-        self.numerator = self.numerator * _interpolated(numerator, n * ((top - 1) * size + image_degree), p)[0]
+        self.numerator = (
+            self.numerator * _interpolated(numerator, n * ((map_degree - 1) * curve_degree + image_degree), p)[0]
+        )
 
     def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
         """Evaluate g on a curve (X : Z): the numerator Z^deg g(X/Z)."""
