@@ -130,17 +130,17 @@ def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) ->
 @counted_cache(4)  # may take half a second, and the searches for integrals and densities both need it
 def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
     """Return the factors of numerator and denominator of det dPhi^-1 and, with `both`, of det dPhi."""
-    n, sides = map_.dim, list[Function]()
+    n, fractions = map_.dim, list[Function]()
     for backward in (False, True) if both else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
-        *x, step = field.variables
+        *x, eps_variable = field.variables
         try:
-            local = map_.at(step, field, x[n:])
+            local = map_.at(eps_variable, field, x[n:])
             local = local.inverse if backward else local
-            sides += jacobian_determinant_fraction(local, x[:n], local.generic_step(tuple(x[:n])))
+            fractions += jacobian_determinant_fraction(local, x[:n], local.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
-    return _irreducible((part for side in sides for part in (side.numerator, side.denominator)), n, eps)
+    return _irreducible((part for function in fractions for part in (function.numerator, function.denominator)), n, eps)
 
 
 class _Line:
