@@ -108,7 +108,7 @@ def check_commute(
         if file.member is None:
             raise InputError(
                 f"found the single map of {file.name}, and every map commutes with itself: give a second system; "
-                "only a member of the commuting family ([family]) is compared with its associated maps"
+                "only a file of kind [family] is compared with its own associated maps"
             )
         return _check_member(file, file.member, settings)
     second = as_file(other)
