@@ -36,7 +36,7 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
-from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.integrals_and_densities import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 

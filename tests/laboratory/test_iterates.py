@@ -44,7 +44,7 @@ def values_along_orbit(file, ratio, count=3):
     points = [tuple(fmpq(k + 2, 3 * k + 5) for k in range(file.dim))]
     while len(points) < ratio.length + count:
         points.append(map_.step(points[-1]))
-    sides = [ratio.sides(QQ, points[k:], [eps]) for k in range(count)]
+    sides = [ratio.numerator_and_denominator(QQ, points[k:], [eps]) for k in range(count)]
     return [P / Q for P, Q in sides]
 
 

@@ -54,7 +54,9 @@ _LEGEND = {
     "--universal", is_flag=True, help="Verify the claims for the generic member, at random points over GF(p)."
 )
 @click.option(
-    "--beyond", is_flag=True, help="Print which statements remain true for other H, J, steps and A; counterexamples."
+    "--beyond",
+    is_flag=True,
+    help="Print which statements remain true for other H, J, steps and A, with counterexamples.",
 )
 @click.option("--controls", is_flag=True, help="Check that every claim fails if one hypothesis is violated.")
 @click.option(
@@ -71,7 +73,7 @@ _LEGEND = {
     metavar="N",
     default=3,
     show_default=True,
-    help="Order in eps^2 of the series of the integrals.",
+    help="Verify N terms of the series of the integrals in powers of eps^2.",
 )
 @click.option(
     "--balls", "ball_bits", type=int, metavar="BITS", help="Also compute over complex balls that enclose all roots."
