@@ -9,7 +9,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.errors import InexactNumber, InputError, counted
 
 
 def is_float_array(value: Any) -> bool:
