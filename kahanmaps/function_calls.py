@@ -63,7 +63,10 @@ def public_function(function: Callable[..., Any], name: str) -> Callable[..., An
             if kinds[argument].startswith("bool"):  # any other value would count as one
                 _require_kind(argument, value, kinds[argument])
         try:
-            return function(*args, **kwargs) if not _is_interactive() else call_interactively(given, args, kwargs)
+            # Somebody waits for the answer: a notebook, or a prompt of Python.
+            is_interactive = threading.current_thread() is threading.main_thread()
+            is_interactive = is_interactive and (hasattr(sys, "ps1") or _in_notebook())
+            return call_interactively(given, args, kwargs) if is_interactive else function(*args, **kwargs)
         except TypeError as error:
             if not isinstance(error, InputError):  # the function did not check it
                 for argument, value in given.items():
@@ -133,12 +136,6 @@ def _require_kind(name: str, value: Any, annotation: str) -> None:
     elif plain in ("bool", "str") and type(value).__name__ not in (plain, f"{plain}_"):  # with those of numpy
         expected = "True or False" if plain == "bool" else "a text"
         raise InputError(f"found {name} = {value!r}, expected {expected}")
-
-
-def _is_interactive() -> bool:
-    """Whether somebody waits for the answer: a notebook, or a prompt of Python."""
-    is_main = threading.current_thread() is threading.main_thread()
-    return is_main and (hasattr(sys, "ps1") or _in_notebook())
 
 
 def _in_notebook() -> bool:

@@ -181,8 +181,7 @@ def modified_value(hamiltonian: CubicHamiltonian, eps: Fraction, x: Sequence[Fra
     """H + (2 eps/3) grad H^T (I - eps f')^{-1} f, as the formula stands."""
     system = hamiltonian.system
     f = [polynomial_value(component, x) for component in system.rhs]
-    matrix = unit(system.dim) - eps * slope(system, x)
-    solution = solve_by_elimination(matrix, f)
+    solution = solve_by_elimination(unit(system.dim) - eps * slope(system, x), f)
     if solution is None:
         return None
     grad = [polynomial_value(component, x) for component in hamiltonian.gradient]

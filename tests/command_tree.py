@@ -58,5 +58,4 @@ def all_examples() -> list[str]:
 def words_of(example: str) -> list[str]:
     """What an example hands to kahanmaps: without comments, redirections and what comes behind a pipe."""
     words = shlex.split(example, comments=True)
-    end = next((k for k, word in enumerate(words) if word in ("|", ">")), len(words))
-    return words[1:end]
+    return words[1 : next((k for k, word in enumerate(words) if word in ("|", ">")), len(words))]

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import titles
-from kahanmaps.errors import SingularStep
+from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -177,6 +177,14 @@ def quick(cases: Iterable[Any], which: Collection[Any]) -> list[Any]:
     return [pytest.param(*values, marks=() if often else THOROUGH) for values, often in seldom]
 
 
+def refuses(
+    message: str, call: Callable[..., object], *args: Any, error: type[Exception] = InputError, **kwargs: Any
+) -> None:
+    """The call raises this error, and the regular expression `message` is found in its text."""
+    with pytest.raises(error, match=message):
+        call(*args, **kwargs)
+
+
 def together(names: str, cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """One test of a long table whose cases take no time: each is tried, and those that fail are told together.
 
@@ -222,8 +230,7 @@ def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_
     W = [[rng.randint(-bound, bound) for _ in range(m)] for _ in range(m)]
     X, Y = _random_skew(m, rng, bound), _random_skew(m, rng, bound)
     upper = [[*W[i], *X[i]] for i in range(m)]
-    lower = [[*Y[i], *(W[j][i] for j in range(m))] for i in range(m)]
-    return fmpq_mat(upper + lower)
+    return fmpq_mat(upper + [[*Y[i], *(W[j][i] for j in range(m))] for i in range(m)])
 
 
 def _random_skew(m: int, rng: random.Random, bound: int) -> list[list[int]]:

@@ -6,10 +6,10 @@ import threading
 from types import SimpleNamespace
 
 import pytest
+from helpers import refuses
 
 import kahanmaps as km
 from kahanmaps import function_calls
-from kahanmaps.errors import InputError
 from kahanmaps.function_calls import CallError, public_function
 from kahanmaps.hard_stop import TimeLimit
 
@@ -77,10 +77,7 @@ def test_progress_is_shown_in_a_notebook_after_a_while_and_removed(monkeypatch):
         if "step 2" in html:
             seen.set()
 
-    display = SimpleNamespace(
-        HTML=str,
-        display=lambda html, display_id: (show(html), SimpleNamespace(update=show))[1],
-    )
+    display = SimpleNamespace(HTML=str, display=lambda html, display_id: (show(html), SimpleNamespace(update=show))[1])
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     monkeypatch.setattr(function_calls, "_in_notebook", lambda: True)
     monkeypatch.setattr(function_calls, "_BETWEEN_UPDATES", 0.01)
@@ -112,11 +109,7 @@ def test_a_type_error_of_a_checked_function_is_explained_and_another_one_is_left
         ((3, "x"), "found scale = 'x', expected a number"),
         ((3, 1.0, 5), "found name = 5, expected a text"),
     ]:
-        with pytest.raises(InputError, match=words):
-            call(*arguments)
-    with pytest.raises(TypeError, match="NoneType"):
-        call(3, 1.0, "x")
-    with pytest.raises(CallError, match="missing a required argument: 'count'; its arguments are count, scale, name"):
-        call()
-    with pytest.raises(TypeError, match=r"has no argument scales=; did you mean scale\?"):
-        call(3, scales=2)
+        refuses(words, call, *arguments)
+    refuses("NoneType", call, 3, 1.0, "x", error=TypeError)
+    refuses("missing a required argument: 'count'; its arguments are count, scale, name", call, error=CallError)
+    refuses(r"has no argument scales=; did you mean scale\?", call, 3, scales=2, error=TypeError)

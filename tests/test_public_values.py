@@ -12,7 +12,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from flint import fmpq
-from helpers import together
+from helpers import refuses, together
 
 import kahanmaps as km
 from kahanmaps.errors import InputError
@@ -139,8 +139,7 @@ def test_orbits_have_arrays_times_columns_and_slices():
 def test_a_float_stands_for_the_decimal_that_is_printed_in_float_orbits_only():
     for option in ({"eps": 0.1}, {"h": 0.2}, {"eps": np.float64(0.1)}):
         assert km.orbit(FISH, [1, 2], n=3, exact=False, **option).header()["eps"] == "1/10"
-        with pytest.raises(InputError, match="or exact=False"):
-            km.orbit(FISH, [1, 2], n=3, **option)
+        refuses("or exact=False", km.orbit, FISH, [1, 2], n=3, **option)
 
 
 @pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:101", "ball:64"])
@@ -157,8 +156,7 @@ def test_orbits_are_written_to_parquet(arithmetic, tmp_path):
 def test_an_orbit_is_a_dataset_of_xarray(monkeypatch):
     walk = km.orbit(FISH, [1, 2], "1/10", 3)
     if find_spec("xarray") is None:
-        with pytest.raises(InputError, match="pip install xarray"):
-            walk.to_xarray()
+        refuses("pip install xarray", walk.to_xarray)
         return
     data = walk.to_xarray()
     assert data["q"].values.tolist() == [float(point.x[0]) for point in walk]
@@ -219,10 +217,8 @@ def test_arrays_of_residues_are_exact_or_refused(prime):
         if max(map(max, rows)) <= np.iinfo(kind).max:
             assert np.asarray(walk, dtype=kind).tolist() == rows
         else:
-            with pytest.raises(InputError, match=r"found the coordinate \d+.*, expected integers.*use dtype=object"):
-                np.asarray(walk, dtype=kind)
+            refuses(r"found the coordinate \d+.*, expected integers.*use dtype=object", np.asarray, walk, dtype=kind)
     if prime < 2**53:
         assert np.asarray(walk, dtype=float).tolist() == rows
     else:
-        with pytest.raises(InputError, match=f"rounds residues modulo {prime}, expected dtype=int or dtype=object"):
-            np.asarray(walk, dtype=float)
+        refuses(f"rounds residues modulo {prime}, expected dtype=int or dtype=object", np.asarray, walk, dtype=float)

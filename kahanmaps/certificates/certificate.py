@@ -38,7 +38,6 @@ from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invarian
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.laboratory import separated
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
@@ -117,13 +116,17 @@ def certificate(
             raise InputError("a certificate that two maps commute cannot be combined with other claims")
         proved = _commuting(file, data, commute)
     if period is not None:
-        proved.append(periodic(data, _positive(period)))
+        if integer(period, "period") < 1:
+            raise InputError(f"found period = {period}, expected a positive integer")
+        proved.append(periodic(data, integer(period, "period")))
     if integrals is not None:
         proved += [conserved_function(data, name, f) for name, f in claimed_functions(file, integrals).items()]
     if density is not None:
         proved.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
     if tensor is not None:
-        proved.append(invariant_tensor(data, "P", _rows(claimed_tensor(file, tensor))))
+        matrix = claimed_tensor(file, tensor)
+        assert matrix is not None
+        proved.append(invariant_tensor(data, "P", matrix.rows))
     known = dict(_known_claims(formulas, data))
     searches = {name: search for name, search in _SEARCHES.items() if name not in known}
     is_required = claims is not None
@@ -191,10 +194,10 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
     >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])
     quit(!ok)
     """
+    if not isinstance(result, Search | Symmetries):
+        raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
     if isinstance(result, Symmetries):
         file, symbols = SystemFile.from_system(result.system, "system"), result.system.symbols
-    elif not isinstance(result, Search):
-        raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
     else:
         file, symbols = result.file, result.symbols
         if result.flow or result.eps is not None:
@@ -221,12 +224,6 @@ def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tu
     return formulas, map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
 
 
-def _positive(period: Any) -> int:
-    if integer(period, "period") < 1:
-        raise InputError(f"found period = {period}, expected a positive integer")
-    return integer(period, "period")
-
-
 def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim]:
     """The claims that maps commute, in separate coordinates if there are any."""
     if isinstance(other, str) and other == ASSOCIATES:
@@ -241,17 +238,13 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim
             raise InputError(f"expected two single maps in the same variables, got {file.name} and {second.name}")
         maps = [file.map, g]
 
-    def of(map_: MapFamily) -> MapData:
-        rows = [[*row[:-1], -row[-1]] for row in map_.rows]
-        return map_data(rows, data.variables, data.new, data.names)
-
     claims: list[Claim] = []
-    given = [of(map_) for map_ in maps]
+    given = [data.with_rows(map_.rows) for map_ in maps]
     separate = separated(file.system) if file.is_quadratic else None
     if separate is not None and all(isinstance(map_, KahanFamily) for map_ in maps):
         T, zero = separate.T, [fmpq(0)] * file.dim
         moved = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
-        in_planes = [of(as_map(system)) for system in moved]
+        in_planes = [data.with_rows(as_map(system).rows) for system in moved]
         pairs = enumerate(zip(in_planes, given, strict=True), 1)
         claims += [affine_symmetry(z, f"coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
         given = in_planes
@@ -278,7 +271,7 @@ def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Call
     elif H is not None:
         yield VOLUME, lambda: [invariant_volume(data, VOLUME, _polynomial(data.determinant))]
     if data.dim == 2:
-        yield ENTROPY, lambda: [positive_entropy(data, _inverse(formulas, data))]
+        yield ENTROPY, lambda: [positive_entropy(data, data.with_rows(formulas.map.inverse_rows))]
     if file.hamiltonian is not None:
         is_theorem = poisson_tensor_invariant(file.hamiltonian, file.member) is not None
         name = TENSOR if is_theorem else UNPROVED
@@ -290,8 +283,7 @@ def _integral(file: SystemFile, data: MapData, name: str, function: RationalFunc
     separate = separated(file.system) if file.member is not None else None
     if separate is None:
         return [conserved_function(data, name, function)]
-    rows = as_map(separate.system).rows
-    in_planes = map_data([[*row[:-1], -row[-1]] for row in rows], data.variables, data.new, data.names)
+    in_planes = data.with_rows(as_map(separate.system).rows)
     moved = separate.function(function)
     plane = restricted(in_planes, moved)
     if plane is in_planes:
@@ -319,10 +311,9 @@ def _claims_of(result: Any, data: MapData) -> list[Claim]:
         # The cofactor of a factor of det M has that factor in its denominator: it is no polynomial over D^k.
         polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
         return [darboux_polynomial(data, f"D{k}", P) for k, P in enumerate(polynomials, 1)]
-    if isinstance(result, Symmetries):
-        symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
-        return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]
-    raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
+    assert isinstance(result, Symmetries)
+    symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
+    return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]
 
 
 _SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
@@ -332,17 +323,6 @@ _SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
     "darboux": partial(darboux_polynomials, max_degree=2),
     "symmetry": linear_symmetries,
 }
-
-
-def _rows(tensor: MatrixPoissonTensor | None) -> Sequence[Sequence[RationalFunction]]:
-    assert tensor is not None
-    return tensor.rows
-
-
-def _inverse(formulas: Formulas, data: MapData) -> MapData:
-    """The inverse of the map. Raises InputError where it is not known."""
-    rows = formulas.map.inverse_rows
-    return map_data([[*row[:-1], -row[-1]] for row in rows], data.variables, data.new, data.names)
 
 
 def _hamiltonian_tensor(formulas: Formulas) -> list[list[RationalFunction]]:

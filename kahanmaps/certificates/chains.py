@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import common_denominator, ring
-from kahanmaps.certificates.identities import MAX_PRODUCTS, MAX_TERMS, Claim, FalseClaim, MapData
+from kahanmaps.certificates.identities import MAX_PRODUCTS, MAX_TERMS, EquationClaim, FalseClaim, MapData
 from kahanmaps.errors import InputError
 
 
@@ -43,7 +43,7 @@ class RationalPoint:
 
 
 @dataclass(frozen=True)
-class Chain(Claim):
+class Chain(EquationClaim):
     """Points x = point 0, point 1, ..., each the image of an earlier one; two of them are equal.
 
     `maps` are the maps by a letter; `arrows` are, for each point but x, the letter of the map, the number of its
@@ -54,10 +54,6 @@ class Chain(Claim):
     arrows: tuple[tuple[str, int, int], ...]
     values: tuple[RationalPoint, ...]
     says: tuple[int, int]
-
-    @property
-    def is_at_image(self) -> bool:
-        return False
 
     def value_of(self, point: int) -> int:
         """The index of the value of a point."""

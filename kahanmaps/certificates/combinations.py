@@ -23,13 +23,13 @@ from math import lcm
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, ring
-from kahanmaps.certificates.identities import Claim, ConservedFunction, FalseClaim, MapData, coprime
+from kahanmaps.certificates.identities import ConservedFunction, EquationClaim, FalseClaim, MapData, coprime
 
 Row = tuple[fmpq_mpoly, ...]
 
 
 @dataclass(frozen=True)
-class OrbitIntegral(Claim):
+class OrbitIntegral(EquationClaim):
     """I(x, x~) = P/Q, Q without variables: P(y, z) - P(x, y) = first . e(x, y) + second . e(y, z).
 
     All are polynomials over Z in the letters of `three_points`.
@@ -40,13 +40,9 @@ class OrbitIntegral(Claim):
     first: Row
     second: Row
 
-    @property
-    def is_at_image(self) -> bool:
-        return False
-
 
 @dataclass(frozen=True)
-class AffineSymmetry(Claim):
+class AffineSymmetry(EquationClaim):
     """T(x) = `image`/`divisor`: `multiple` e(T x, T y) = `matrix` e(x, y), e(T y, T x) if `reversing`.
 
     The left e is that of `target`, the right one that of `data`: the same map for a symmetry, else T takes one map to
@@ -60,23 +56,15 @@ class AffineSymmetry(Claim):
     multiple: int
     reversing: bool
 
-    @property
-    def is_at_image(self) -> bool:
-        return False
-
 
 @dataclass(frozen=True)
-class ChangedFunction(Claim):
+class ChangedFunction(EquationClaim):
     """P(T z)/Q(T z) = p(z)/q(z) with T z = `image`/`divisor`; pairs of numerator and denominator over Z."""
 
     image: Row
     divisor: int
     given: tuple[fmpq_mpoly, fmpq_mpoly]
     moved: tuple[fmpq_mpoly, fmpq_mpoly]
-
-    @property
-    def is_at_image(self) -> bool:
-        return False
 
 
 def three_points(data: MapData) -> tuple[str, ...]:

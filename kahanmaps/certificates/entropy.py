@@ -69,7 +69,9 @@ def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
                 best = float(bound), n, degrees[2 * n], Fraction(round_up(bound.lower(), -1))
             if n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
                 break
-            form, factor = _without_common_factor(_composed(first, iterates[-1]))
+            inner, context = iterates[-1], first[0].context()
+            images = [inner[0], inner[1], *context.gens()[2:-1], inner[2]]
+            form, factor = _without_common_factor([F.compose(*images, ctx=context) for F in first])
             iterates.append(form)
             factors.append(factor)
     if best is None:
@@ -87,26 +89,9 @@ def _degree(forms: Sequence[fmpq_mpoly]) -> int:
 
 def _forms(data: MapData) -> list[fmpq_mpoly]:
     """N and D, made homogeneous in the variables by a further letter."""
-    context = ring((*data.names, "h"))
-    *letters, h = context.gens()
-    parts = (*data.numerators, data.determinant)
+    context, parts = ring((*data.names, "h")), (*data.numerators, data.determinant)
     degree = max(degree_in(part, 2) for part in parts)
-    result = []
-    for part in parts:
-        total = context.constant(0)
-        for exponents, coefficient in part.terms():
-            term = h ** (degree - int(exponents[0]) - int(exponents[1])) * coefficient
-            for letter, exponent in zip(letters, exponents, strict=True):
-                term *= letter ** int(exponent)
-            total += term
-        result.append(total)
-    return result
-
-
-def _composed(forms: Sequence[fmpq_mpoly], inner: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-    context = forms[0].context()
-    constants = context.gens()[2:-1]
-    return [form.compose(inner[0], inner[1], *constants, inner[2], ctx=context) for form in forms]
+    return [context.from_dict({(*e, degree - e[0] - e[1]): c for e, c in part.terms()}) for part in parts]
 
 
 def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:

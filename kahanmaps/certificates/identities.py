@@ -102,6 +102,10 @@ class MapData:
         at_old, at_new = ([F.compose(*x, *letters[2 * n :], ctx=context) for F in functions] for x in points)
         return at_old, at_new
 
+    def with_rows(self, rows: Sequence[Row]) -> MapData:
+        """The map in the same letters whose equation has the rows of (M | -r)."""
+        return map_data([[*row[:-1], -row[-1]] for row in rows], self.variables, self.new, self.names)
+
     def _solved(self, right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
         """Det M and det M times the solution of M y = right: (M | right) annihilates (y, -1)."""
         n = self.dim
@@ -120,8 +124,14 @@ class Claim:
 
     @property
     def is_at_image(self) -> bool:
-        """Whether the proof inserts x~ = N/D."""
-        return True
+        """Whether the proof inserts x~ = N/D: not where the identity is free, as it holds for any two points."""
+        return not getattr(self, "is_free", False)
+
+
+class EquationClaim(Claim):
+    """A claim that follows from the equation of the map as a relation, which is not solved for x~."""
+
+    is_free = True
 
 
 @dataclass(frozen=True)
@@ -156,10 +166,6 @@ class InvariantVolume(Claim):
     is_free: bool
     cofactors: tuple[fmpq_mpoly, fmpq_mpoly, int] | None = None  # C and B, j: of P and, times D^j, of Q, if there are
 
-    @property
-    def is_at_image(self) -> bool:
-        return not self.is_free
-
 
 @dataclass(frozen=True)
 class InvariantTensor(Claim):
@@ -172,10 +178,6 @@ class InvariantTensor(Claim):
     denominator: fmpq_mpoly
     degree: int
     is_free: bool
-
-    @property
-    def is_at_image(self) -> bool:
-        return not self.is_free
 
     @property
     def dim(self) -> int:
@@ -209,7 +211,9 @@ def map_data(
     n = len(variables)
     if n > MAX_DIMENSION:
         raise InputError(f"expected a map in at most {MAX_DIMENSION} variables for a certificate, got {n}")
-    return MapData(tuple(variables), tuple(new), tuple(names), tuple(tuple(_integral_row(row)) for row in equation))
+    multiples = (lcm(*(int(common_denominator(entry)) for entry in row)) for row in equation)
+    rows = tuple(tuple(entry * multiple for entry in row) for row, multiple in zip(equation, multiples, strict=True))
+    return MapData(tuple(variables), tuple(new), tuple(names), rows)
 
 
 def restricted(data: MapData, function: RationalFunction) -> MapData:
@@ -349,8 +353,16 @@ def _sandwich(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fm
 
 def _derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
     """D L(x, N/D), polynomials as L is of degree at most 1 in x~."""
-    point = [*data.numerators, *ring(data.names).gens()[data.dim :]]
-    return [[_at_numerators(entry, data, point) for entry in row] for row in data.derivative]
+    n, context = data.dim, ring(data.names)
+
+    def at_image(entry: fmpq_mpoly) -> fmpq_mpoly:
+        total = context.constant(0)
+        for exponents, coefficient in entry.terms():
+            which = next((k for k in range(n) if exponents[n + k]), -1)  # x~_which = N_which/D, or 1 = D/D
+            total += context.from_dict({exponents[:n] + exponents[2 * n :]: coefficient}) * data.solution[1 + which]
+        return total
+
+    return [[at_image(entry) for entry in row] for row in data.derivative]
 
 
 def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
@@ -377,35 +389,19 @@ def letters_of(data: MapData, taken: str) -> dict[str, str]:
 
 def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmpq_mpoly:
     """D^degree P(N/D), a polynomial. Raises InputError where it has too many terms."""
-    n = data.dim
-    powers = [[value**0] for value in (*data.numerators, data.determinant)]
-    letters = ring(data.names).gens()
-    total, products = letters[0] * 0, 0
+    n, context, values = data.dim, ring(data.names), (*data.numerators, data.determinant)
+    powers = [[value**0] for value in values]
+    total, products = context.constant(0), 0
     for exponents, coefficient in polynomial.terms():
-        term = letters[0] ** 0 * coefficient
-        for letter, exponent in zip(letters[n:], exponents[n:], strict=True):
-            term *= letter ** int(exponent)
+        term = context.from_dict({(0,) * n + exponents[n:]: coefficient})
         for k, exponent in enumerate((*map(int, exponents[:n]), degree - sum(map(int, exponents[:n])))):
             while len(powers[k]) <= exponent:
-                powers[k].append(_times(powers[k][-1], (*data.numerators, data.determinant)[k]))
+                powers[k].append(_times(powers[k][-1], values[k]))
             products += len(term) * len(powers[k][exponent])
             if products > MAX_PRODUCTS:
                 raise InputError(f"the identities take more than {MAX_PRODUCTS} products of terms to multiply out")
             term = _times(term, powers[k][exponent])
         total += term
-    return total
-
-
-def _at_numerators(entry: fmpq_mpoly, data: MapData, point: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-    """Return D times an entry of L at x~ = N/D; entries are of degree at most 1 in x~."""
-    n, letters = data.dim, ring(data.names).gens()
-    total = letters[0] * 0
-    for exponents, coefficient in entry.terms():
-        term = letters[0] ** 0 * coefficient
-        for letter, exponent in zip(letters, (*exponents[:n], *exponents[2 * n :]), strict=True):
-            term *= letter ** int(exponent)
-        (which,) = [k for k in range(n) if exponents[n + k]] or (None,)
-        total += term * (data.determinant if which is None else point[which])
     return total
 
 
@@ -429,15 +425,6 @@ def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mp
     scale = common_denominator(P), common_denominator(Q)
     multiple = scale[0] * scale[1] / scale[0].gcd(scale[1])
     return P * multiple, Q * multiple
-
-
-def _integral_row(row: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
-    """A row of (M | r) times the least number that makes its coefficients integers: the equation is the same."""
-    multiple = common_denominator(row[0])
-    for entry in row[1:]:
-        other = common_denominator(entry)
-        multiple = multiple * other / multiple.gcd(other)
-    return [entry * multiple for entry in row]
 
 
 def _quotient(product: fmpq_mpoly, factor: fmpq_mpoly) -> fmpq_mpoly | None:

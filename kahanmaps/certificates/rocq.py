@@ -7,7 +7,7 @@ and eps. Cramer's rule gives (det M) x~ = N, and `ring` proves identities of pol
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -20,6 +20,7 @@ from kahanmaps.certificates.identities import (
     Claim,
     ConservedFunction,
     DarbouxPolynomial,
+    EquationClaim,
     InvariantTensor,
     InvariantVolume,
     MapData,
@@ -49,6 +50,7 @@ class _Script:
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
         self.third = [self.letters[f"{name}2"] for name in data.new]
+        self.x, self.y, self.z = (" ".join(letters) for letters in (self.old, self.new, self.third))
 
     @property
     def cramer(self) -> str:
@@ -60,11 +62,19 @@ class _Script:
         letters = [self.letters[name] for name in names_of(polynomial)]
         return polynomial_text(polynomial, letters)
 
+    def image_letters(self, at_n: bool) -> list[str]:
+        """What stands for det x~: N, or this product, which Cramer's rule rewrites to N."""
+        return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.new)]
+
     @property
     def constants(self) -> list[str]:
         """The symbols and eps, as variables of the section."""
         letters = [self.letters[name] for name in self.data.names[self.data.dim :]]
         return [f"Variables {' '.join(letters)} : R."] if letters else []
+
+    def functions(self, arguments: str, /, **polynomials: fmpq_mpoly) -> list[str]:
+        """Definitions of functions of these arguments."""
+        return [f"Definition {name} ({arguments} : R) : R := {self.text(P)}." for name, P in polynomials.items()]
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
         """The equation of the map as a relation between any two points, with the residuals e1, e2, ..."""
@@ -79,17 +89,14 @@ class _Script:
 
     def unique(self, letter: str, data: MapData) -> list[str]:
         """The lemma that a point has one image where det M is not 0, by the adjugates of the blocks of M."""
-        x, y, z = (" ".join(letters) for letters in (self.old, self.new, self.third))
+        x, y, z = self.x, self.y, self.z
         goal = " /\\ ".join(f"{a} = {b}" for a, b in zip(self.new, self.third, strict=True))
         one = ring(data.names).constant(1)
         of_each = [restricted(data, RationalFunction(a, one)) for a in ring(data.names).gens()[: data.dim]]
         blocks = list({block.variables: block for block in of_each}.values())
         dets = [f"{letter}_det_{b + 1}" for b in range(len(blocks))]
         lines = [
-            f"Definition {name} ({x} : R) : R := {self.text(block.determinant)}."
-            for name, block in zip(dets, blocks, strict=True)
-        ]
-        lines += [
+            *self.functions(x, **{name: block.determinant for name, block in zip(dets, blocks, strict=True)}),
             f"Definition {letter}_det ({x} : R) : R := {' * '.join(f'{name} {x}' for name in dets)}.",
             f"Lemma {letter}_unique : forall {x} {y} {z}, {letter}_det {x} <> 0 ->",
             f"  {letter}_maps {x} {y} -> {letter}_maps {x} {z} -> {goal}.",
@@ -118,7 +125,7 @@ class _Script:
         n, lines = self.data.dim, list[str]()
         for letter, data in claim.maps.items():
             lines += [*self.predicate(letter, f"{letter}_maps", data), *self.unique(letter, data)]
-        lines += [f"Variables {' '.join(self.old)} : R.  (* a point x *)"]
+        lines += [f"Variables {self.x} : R.  (* a point x *)"]
         points, denominators = [self.old], [[""] * n]
         for v, value in enumerate(claim.values[1:], 1):
             for i, P in enumerate(value.numerators):
@@ -190,9 +197,8 @@ class _Script:
         powers = {q: max((degree(row, q) for row, _ in rows), default=0) for q in distinct}
         pieces = []
         for row, coefficient in rows:
-            factors = [*zip([*numerators, *constants], row, strict=True)]
-            factors += [(q, power - degree(row, q)) for q, power in powers.items()]
-            pieces.append(" * ".join([f"({coefficient})", *(a if e == 1 else f"{a} ^ {e}" for a, e in factors if e)]))
+            exponents = [*row, *(power - degree(row, q) for q, power in powers.items())]
+            pieces.append(" * ".join([f"({coefficient})", *powers_text([*numerators, *constants, *powers], exponents)]))
         return " + ".join(pieces), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
 
     def hypothesis(self, letter: str) -> str:
@@ -203,7 +209,7 @@ class _Script:
     def along_orbit(self, claim: OrbitIntegral, theorem: str) -> list[str]:
         """The theorem that a function of x and x~ has the same value one step later."""
         n = self.data.dim
-        x, y, z = (" ".join(letters) for letters in (self.old, self.new, self.third))
+        x, y, z = self.x, self.y, self.z
         residuals = [f"e{i + 1}" for i in range(n)]
         terms = [f"({self.text(c)}) * {e} {x} {y}" for c, e in zip(claim.first, residuals, strict=True) if c]
         terms += [f"({self.text(c)}) * {e} {y} {z}" for c, e in zip(claim.second, residuals, strict=True) if c]
@@ -211,7 +217,7 @@ class _Script:
         return [
             *self.predicate(),
             "(* value x x~ = num x x~ / den is an integral. *)",
-            f"Definition num ({x} {y} : R) : R := {self.text(claim.numerator)}.",
+            *self.functions(f"{x} {y}", num=claim.numerator),
             f"Definition den : R := {self.text(claim.denominator)}.",
             f"Definition value ({x} {y} : R) : R := num {x} {y} / den.",
             f"Theorem {theorem} : forall {x} {y} {z},",
@@ -228,7 +234,7 @@ class _Script:
     def symmetric(self, claim: AffineSymmetry, theorem: str) -> list[str]:
         """The theorem that x -> T x takes the map to itself, to its inverse, or to another map."""
         n, is_own = self.data.dim, claim.target is claim.data
-        x, y = " ".join(self.old), " ".join(self.new)
+        x, y = self.x, self.y
         polynomials = self.data.at_points(*claim.image)
         points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
         first, second = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
@@ -252,11 +258,10 @@ class _Script:
 
     def changed(self, claim: ChangedFunction, theorem: str) -> list[str]:
         """The theorem that a function of x is another function of z, x = T z."""
-        z, names = " ".join(self.old), ("num", "den", "num_z", "den_z")
+        z, names = self.x, ("num", "den", "num_z", "den_z")
         at = " ".join(f"(({self.text(P)}) / {claim.divisor})" for P in claim.image)
-        functions = zip(names, (*claim.given, *claim.moved), strict=True)
         return [
-            *(f"Definition {name} ({z} : R) : R := {self.text(P)}." for name, P in functions),
+            *self.functions(z, **dict(zip(names, (*claim.given, *claim.moved), strict=True))),
             f"Theorem {theorem} : forall {z},",
             f"  num {at} * den_z {z} = num_z {z} * den {at}.",
             f"Proof. intros {z}. cbv delta [{' '.join(names)}] beta; field. Qed.",
@@ -265,10 +270,7 @@ class _Script:
     def expand(self, *further: str) -> str:
         """Return the tactic that unfolds all definitions and proves an identity of polynomials."""
         n = self.data.dim
-        defined = [
-            "det",
-            *(f"{k}{i + 1}{j + 1}" for k in "ma"[: 1 + self.is_solved] for i in range(n) for j in range(n)),
-        ]
+        defined = ["det", *(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
         defined += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
         return f"cbv delta [{' '.join((*further, *defined))}] beta; ring."
 
@@ -278,8 +280,8 @@ class _Script:
         self.is_solved = is_solved
         lines = [
             *self.constants,
-            f"Variables {' '.join(self.old)} : R.  (* a point x *)",
-            f"Variables {' '.join(self.new)} : R.  (* its image x~ *)",
+            f"Variables {self.x} : R.  (* a point x *)",
+            f"Variables {self.y} : R.  (* its image x~ *)",
             "",
             "(* The equation of the map: M x~ = r. *)",
         ]
@@ -288,11 +290,7 @@ class _Script:
             lines.append(f"Definition r{i + 1} : R := {self.text(row[-1])}.")
         left = [" + ".join(f"m{i + 1}{j + 1} * {name}" for j, name in enumerate(self.new)) for i in range(n)]
         lines += [f"Hypothesis equation{i + 1} : {left[i]} = r{i + 1}." for i in range(n)]
-        entries = [[f"m{i + 1}{j + 1}" for j in range(n)] for i in range(n)]
-        lines += [
-            f"Definition det : R := {determinant_text(entries)}.",
-            "Hypothesis regular : det <> 0.",
-        ]
+        lines += [f"Definition det : R := {determinant_text(entries('m', n))}.", "Hypothesis regular : det <> 0."]
         if not is_solved:
             return lines
         lines += ["", "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)"]
@@ -318,13 +316,15 @@ class _Script:
         """
         n = self.data.dim
         constants = [self.letters[name] for name in self.data.names[n:]]
-        scaled = [f"(det * {name})" for name in self.new]
-        at_n = _homogeneous_text(polynomial, [*(f"n{i + 1}" for i in range(n)), *constants], degree, n)
+        scaled, at_n = (
+            _homogeneous_text(polynomial, [*self.image_letters(at_n), *constants], degree, slice(n))
+            for at_n in (False, True)
+        )
         last = f"{self.expand(label, *also)}" if value else "ring."
         return [
-            f"Lemma {label}_image : {label} {' '.join(self.new)} * det ^ {degree} = {value or at_n}.",
+            f"Lemma {label}_image : {label} {self.y} * det ^ {degree} = {value or at_n}.",
             "Proof.",
-            f"  transitivity ({_homogeneous_text(polynomial, [*scaled, *constants], degree, n)}).",
+            f"  transitivity ({scaled}).",
             f"  - cbv delta [{label}] beta; ring.",
             f"  - rewrite {self.cramer}. {last}",
             "Qed.",
@@ -332,11 +332,10 @@ class _Script:
 
     def conserved(self, claim: ConservedFunction, theorem: str) -> list[str]:
         """The theorem that the function has the same value at x and x~."""
-        old, new = " ".join(self.old), " ".join(self.new)
+        old, new = self.x, self.y
         lines = [
             "(* num / den is an integral; cofactor is that of num and den as Darboux polynomials. *)",
-            f"Definition num ({old} : R) : R := {self.text(claim.numerator)}.",
-            f"Definition den ({old} : R) : R := {self.text(claim.denominator)}.",
+            *self.functions(old, num=claim.numerator, den=claim.denominator),
             f"Definition cofactor : R := {self.text(claim.cofactor)}.",
             *self.moved("num", claim.numerator, claim.degree, f"cofactor * num {old}", "cofactor"),
             *self.moved("den", claim.denominator, claim.degree, f"cofactor * den {old}", "cofactor"),
@@ -354,10 +353,10 @@ class _Script:
 
     def darboux(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
         """The theorem that P(x~) is P(x) times the cofactor."""
-        old, new = " ".join(self.old), " ".join(self.new)
+        old, new = self.x, self.y
         return [
             "(* A Darboux polynomial, with its cofactor over a power of det. *)",
-            f"Definition num ({old} : R) : R := {self.text(claim.polynomial)}.",
+            *self.functions(old, num=claim.polynomial),
             f"Definition cofactor : R := {self.text(claim.cofactor)}.",
             *self.moved("num", claim.polynomial, claim.degree, f"cofactor * num {old}", "cofactor"),
             f"Theorem {theorem} : num {new} = cofactor / det ^ {claim.degree} * num {old}.",
@@ -370,22 +369,20 @@ class _Script:
     def derivative(self) -> tuple[list[str], str]:
         """The definitions of l11, l12, ..., the entries of L, and all these names."""
         lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
-        names = []
-        for i, row in enumerate(self.data.derivative):
-            lines += [f"Definition l{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row)]
-            names += [f"l{i + 1}{j + 1}" for j in range(len(row))]
-        return lines, " ".join(names)
+        names = [name for row in entries("l", self.data.dim) for name in row]
+        flat = [entry for row in self.data.derivative for entry in row]
+        definitions = [f"Definition {name} : R := {self.text(L)}." for name, L in zip(names, flat, strict=True)]
+        return [*lines, *definitions], " ".join(names)
 
     def poisson(self, claim: InvariantTensor, theorem: str) -> list[str]:
         """The theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
-        n, k, old, new = claim.dim, claim.degree, " ".join(self.old), " ".join(self.new)
+        n, k, old, new = claim.dim, claim.degree, self.x, self.y
         lines, flat = self.derivative()
         lines.append("(* The Poisson tensor T: T_ij = pij / den for i < j, T_ji = -T_ij. *)")
         pairs = {pair: f"p{pair[0] + 1}{pair[1] + 1}" for pair in claim.upper}
-        for pair, name in pairs.items():
-            lines.append(f"Definition {name} ({old} : R) : R := {self.text(claim.upper[pair])}.")
-        lines.append(f"Definition den ({old} : R) : R := {self.text(claim.denominator)}.")
-        names = " ".join([*pairs.values(), "den"])
+        functions = {name: claim.upper[pair] for pair, name in pairs.items()} | {"den": claim.denominator}
+        lines += self.functions(old, **functions)
+        names = " ".join(functions)
 
         def sandwich(letter: str, i: int, j: int, point: str, times: str = "{}", form: str = "{}") -> str:
             """The entry i, j of A T A^T den, where A has these letters, each in the form `times`, T in another."""
@@ -403,7 +400,7 @@ class _Script:
                         f"Lemma {label}_image : {label} * det = {forms[1]}.",
                         f"Proof. transitivity ({forms[0]}); [unfold {label}; ring | rewrite {self.cramer}; ring]. Qed.",
                     ]
-            for name, P in (*((pairs[pair], P) for pair, P in claim.upper.items()), ("den", claim.denominator)):
+            for name, P in functions.items():
                 lines += self.moved(name, P, k)
         for i, j in combinations(range(n), 2):
             left, right = sandwich("l", i, j, old), sandwich("m", i, j, new)
@@ -428,17 +425,16 @@ class _Script:
                 f"  rewrite {', '.join(images)}. {self.expand(names)}",
                 "Qed.",
             ]
-        if claim.triples:
-            lines += self._jacobi(claim, pairs, theorem)
-        return lines
+        return [*lines, *self.jacobi(claim, pairs, functions, theorem)] if claim.triples else lines
 
-    def _jacobi(self, claim: InvariantTensor, names: dict[tuple[int, int], str], theorem: str) -> list[str]:
+    def jacobi(
+        self, claim: InvariantTensor, names: Mapping[Any, str], functions: Mapping[str, fmpq_mpoly], theorem: str
+    ) -> list[str]:
         """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3.
 
         Lemmas define the derivatives: the value at x + t e_s is that at x, plus t d, plus t^2 times a polynomial.
         """
-        old, lines = " ".join(self.old), list[str]()
-        functions = {names[pair]: P for pair, P in claim.upper.items()} | {"den": claim.denominator}
+        old, lines = self.x, list[str]()
         context, spare = ring((*names_of(claim.denominator), "t")), "t_"
         *letters, t = context.gens()
         for name, P in functions.items():
@@ -475,15 +471,13 @@ class _Script:
 
     def invariant(self, claim: InvariantVolume, theorem: str) -> list[str]:
         """The theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
-        n, old, new = self.data.dim, " ".join(self.old), " ".join(self.new)
-        entries = [[f"l{i + 1}{j + 1}" for j in range(n)] for i in range(n)]
+        n, old, new = self.data.dim, self.x, self.y
         power = claim.degree
         lines, flat = self.derivative()
         lines += [
-            f"Definition volume : R := {determinant_text(entries)}.  (* det L *)",
+            f"Definition volume : R := {determinant_text(entries('l', n))}.  (* det L *)",
             "(* dx/phi with phi = num / den is invariant: phi(x~) = phi(x) det(M^-1 L). *)",
-            f"Definition num ({old} : R) : R := {self.text(claim.numerator)}.",
-            f"Definition den ({old} : R) : R := {self.text(claim.denominator)}.",
+            *self.functions(old, num=claim.numerator, den=claim.denominator),
         ]
         statement = [
             f"Theorem {theorem} :",
@@ -572,10 +566,7 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
         theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
         script = _Script(claim.data)
         lines += [f"Module Claim{k}.", "Section Map."]
-        if isinstance(claim, Chain | OrbitIntegral | AffineSymmetry | ChangedFunction):
-            lines += script.constants
-        else:
-            lines += [*script.map(claim.is_at_image), ""]
+        lines += script.constants if isinstance(claim, EquationClaim) else [*script.map(claim.is_at_image), ""]
         proof = prove(script, claim, theorem)
         theorems += [f"Claim{k}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
         lines += [*proof, "End Map.", f"End Claim{k}.", ""]
@@ -583,11 +574,21 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     return "\n".join(lines) + "\n"
 
 
+def entries(letter: str, n: int) -> list[list[str]]:
+    """The names of the entries of a square matrix."""
+    return [[f"{letter}{i + 1}{j + 1}" for j in range(n)] for i in range(n)]
+
+
+def powers_text(letters: Iterable[str], exponents: Iterable[Any], power: str = " ^ ") -> list[str]:
+    """The powers of the letters that are not 1."""
+    return [name if k == 1 else f"{name}{power}{k}" for name, k in zip(letters, exponents, strict=True) if k]
+
+
 def polynomial_text(polynomial: fmpq_mpoly, letters: Sequence[str], times: str = " * ", power: str = " ^ ") -> str:
     """A polynomial with integral coefficients in the letters, as sums of products."""
     pieces: list[str] = []
     for exponents, coefficient in polynomial.terms():
-        factors = [name if k == 1 else f"{name}{power}{k}" for name, k in zip(letters, exponents, strict=True) if k]
+        factors = powers_text(letters, exponents, power)
         size = abs(coefficient)
         product = times.join(([str(size)] if size != 1 or not factors else []) + factors)
         sign = ("- " if coefficient < 0 else "") if not pieces else (" - " if coefficient < 0 else " + ")
@@ -595,37 +596,33 @@ def polynomial_text(polynomial: fmpq_mpoly, letters: Sequence[str], times: str =
     return "".join(pieces) or "0"
 
 
-def determinant_text(entries: Sequence[Sequence[str]], times: str = " * ") -> str:
+def determinant_text(entries: Sequence[Sequence[str]]) -> str:
     """The determinant of a matrix of texts, expanded along its first row."""
     if len(entries) == 1:
         return entries[0][0]
     pieces: list[str] = []
     for j, entry in enumerate(entries[0]):
         minor = [[*row[:j], *row[j + 1 :]] for row in entries[1:]]
-        inner = determinant_text(minor, times)
-        product = f"{entry}{times}{inner if len(minor) == 1 else f'({inner})'}"
+        inner = determinant_text(minor)
+        product = f"{entry} * {inner if len(minor) == 1 else f'({inner})'}"
         pieces.append(product if j == 0 else f"{' - ' if j % 2 else ' + '}{product}")
     return "".join(pieces)
 
 
-def _homogeneous_text(polynomial: fmpq_mpoly, letters: Sequence[str], degree: int, dim: int) -> str:
-    """det^degree P with (det x~)/det for the variables: `letters` holds det x~ for these."""
+def _homogeneous_text(
+    polynomial: fmpq_mpoly, letters: Sequence[str], degree: int, image: slice, det: str = "det ^ {}"
+) -> str:
+    """det^degree P with (det x~)/det for x~: in the slice `image`, `letters` holds det x~, or N."""
     pieces = []
     for exponents, coefficient in polynomial.terms():
-        factors = [name if k == 1 else f"{name} ^ {k}" for name, k in zip(letters, exponents, strict=True) if k]
-        spare = degree - sum(int(k) for k in exponents[:dim])
-        factors += [f"det ^ {spare}"] if spare else []
+        spare = degree - sum(map(int, exponents[image]))
+        factors = [*powers_text(letters, exponents), *([det.format(spare)] if spare else [])]
         pieces.append(" * ".join([f"({coefficient})", *factors]))
     return " + ".join(pieces) or "0"
 
 
 def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
     """det times an entry of L, with det x~, or N, for x~: of degree at most 1 in x~."""
-    letters = [script.letters[name] for name in names_of(entry)]
-    letters[dim : 2 * dim] = [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(script.new)]
-    pieces = []
-    for exponents, coefficient in entry.terms():
-        factors = [name if k == 1 else f"{name} ^ {k}" for name, k in zip(letters, exponents, strict=True) if k]
-        factors += [] if any(exponents[dim : 2 * dim]) else ["det"]
-        pieces.append(" * ".join([f"({coefficient})", *factors]))
-    return " + ".join(pieces) or "0"
+    letters, image = [script.letters[name] for name in names_of(entry)], slice(dim, 2 * dim)
+    letters[image] = script.image_letters(at_n)
+    return _homogeneous_text(entry, letters, 1, image, "det")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import singledispatchmethod
 
 from flint import fmpq_mpoly
 
@@ -138,6 +138,17 @@ def image(G, k, letters):  # D^k G, with N/D for the letters, in which G has a d
 def images(A, k, letters):
     return [[image(a, k, letters) for a in row] for row in A]""",
 }
+_SAYS: dict[type[Claim], str] = {
+    ConservedFunction: "P/Q is an integral",
+    DarbouxPolynomial: "P is a Darboux polynomial, P(x~) = P C/D^k",
+    InvariantVolume: "dx/phi is invariant, phi = P/Q",
+    InvariantTensor: "the map is Poisson for the tensor P/Q",
+    PositiveEntropy: "positive entropy, hence no rational integral, for all but finitely many eps",
+    Chain: "points are images of others",
+    ChangedFunction: "P/Q at x = T z is p/q",
+    OrbitIntegral: "P(x, x~)/Q is an integral",
+    AffineSymmetry: "x -> T takes the map to itself, its inverse or another map",
+}
 _NEEDS = {"act": ("dot",), "images": ("image",)}
 
 
@@ -246,7 +257,20 @@ class _Script:
         self.check("D is not 0", "D != 0")
         self.check("M N = D r", "act(M, N) == scale(D, r)")
 
-    def _chain(self, claim: Any, label: str) -> None:
+    def claim(self, claim: Claim) -> None:
+        """What a claim says, and its proof."""
+        label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
+        self.lines.append(f"{self.to.comment}{label}: {_SAYS[type(claim)]}")
+        self.prove(claim, label)
+        self.lines.append("")
+
+    @singledispatchmethod
+    def prove(self, claim: Claim, label: str) -> None:
+        """The definitions and checks of a claim."""
+        raise NotImplementedError(type(claim))
+
+    @prove.register
+    def chain(self, claim: Chain, label: str) -> None:
         names = list[tuple[str, str]]()
         for letter, data in claim.maps.items():
             self.equation(data, letter)
@@ -273,40 +297,22 @@ class _Script:
             f"{self.to.comment}So points {i} and {j} are equal: both are P{claim.value_of(i)}/Q{claim.value_of(j)}."
         )
 
-    def claim(self, claim: Claim) -> None:
-        """The definitions and checks of a claim."""
-        label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
-        says, prove = {
-            ConservedFunction: ("P/Q is an integral", self._conserved),
-            DarbouxPolynomial: ("P is a Darboux polynomial, P(x~) = P C/D^k", self._darboux),
-            InvariantVolume: ("dx/phi is invariant, phi = P/Q", self._volume),
-            InvariantTensor: ("the map is Poisson for the tensor P/Q", self._tensor),
-            PositiveEntropy: (
-                "positive entropy, hence no rational integral, for all but finitely many eps",
-                self._entropy,
-            ),
-            Chain: ("points are images of others", self._chain),
-            ChangedFunction: ("P/Q at x = T z is p/q", self._changed),
-            OrbitIntegral: ("P(x, x~)/Q is an integral", self._along_orbit),
-            AffineSymmetry: ("x -> T takes the map to itself, its inverse or another map", self._symmetry),
-        }[type(claim)]
-        self.lines.append(f"{self.to.comment}{label}: {says}")
-        prove(claim, label)
-        self.lines.append("")
-
-    def _conserved(self, claim: Any, label: str) -> None:
+    @prove.register
+    def conserved(self, claim: ConservedFunction, label: str) -> None:
         self.fraction(claim)
         self.polynomial("C", claim.cofactor)
         self.check(f"{label}: C is not 0", "C != 0")
         for name in "PQ":
             self.check(f"{label}: D^k {name}(N/D) = C {name}", f"image({name}, {claim.degree}, old) == C*{name}")
 
-    def _darboux(self, claim: Any, label: str) -> None:
+    @prove.register
+    def darboux(self, claim: DarbouxPolynomial, label: str) -> None:
         self.polynomial("P", claim.polynomial)
         self.polynomial("C", claim.cofactor)
         self.check(f"{label}: D^k P(N/D) = C P", f"image(P, {claim.degree}, old) == C*P")
 
-    def _volume(self, claim: Any, label: str) -> None:
+    @prove.register
+    def volume(self, claim: InvariantVolume, label: str) -> None:
         self.fraction(claim)
         self.define("L", self.polynomials(self.data.derivative))
         says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
@@ -327,7 +333,8 @@ class _Script:
         identity = f"image(P, {k}, old)*Q*D^(n + 1) == P*image(Q, {k}, old)*det(images(L, 1, new))"
         self.check(f"{says} at x~ = N/D", identity)
 
-    def _tensor(self, claim: Any, label: str) -> None:
+    @prove.register
+    def tensor(self, claim: InvariantTensor, label: str) -> None:
         n, k = claim.dim, claim.degree
         self.define("P", self.polynomials([[claim.entry(i, j) for j in range(n)] for i in range(n)]))
         self.polynomial("Q", claim.denominator)
@@ -346,7 +353,8 @@ class _Script:
             terms = (f"bracket(P, Q, {i}, {j}, {l})", f"bracket(P, Q, {j}, {l}, {i})", f"bracket(P, Q, {l}, {i}, {j})")
             self.check(f"{label}: Jacobi identity {i + 1}, {j + 1}, {l + 1}", " + ".join(terms) + " == 0")
 
-    def _along_orbit(self, claim: Any, label: str) -> None:
+    @prove.register
+    def along_orbit(self, claim: OrbitIntegral, label: str) -> None:
         self.fraction(claim)
         self.define("first", self.vector(claim.first))
         self.define("second", self.vector(claim.second))
@@ -354,17 +362,19 @@ class _Script:
         identity = f"{after.format('P')} - P == dot(first, E) + dot(second, {after.format('E')})"
         self.check(f"{label}: P(y, z) - P(x, y) = first . E(x, y) + second . E(y, z)", identity)
 
-    def _changed(self, claim: Any, label: str) -> None:
+    @prove.register
+    def changed(self, claim: ChangedFunction, label: str) -> None:
         self._affine(claim)
         for name, polynomial in zip(("P", "Q", "p", "q"), (*claim.given, *claim.moved), strict=True):
             self.polynomial(name, polynomial)
         self.check(f"{label}: P(T z) q(z) = p(z) Q(T z)", "put(P, old, T)*q == p*put(Q, old, T)")
 
-    def _affine(self, claim: Any) -> None:
+    def _affine(self, claim: AffineSymmetry | ChangedFunction) -> None:
         part = f"1/{claim.divisor}" if self.to is GP else f"QQ(1, {claim.divisor})"
         self.define("T", f"scale({part}, {self.vector(claim.image)})")
 
-    def _symmetry(self, claim: Any, label: str) -> None:
+    @prove.register
+    def symmetry(self, claim: AffineSymmetry, label: str) -> None:
         self._affine(claim)
         self.define("Y", "put(T, old, new)")
         self.define("K", self.matrix([[str(entry) for entry in row] for row in claim.matrix]))
@@ -375,7 +385,8 @@ class _Script:
         identity = f"scale({claim.multiple}, put({target}, concat(old, new), concat({pair}))) == act(K, E)"
         self.check(f"{label}: {target}{points} is a combination of E(x, y)", identity)
 
-    def _entropy(self, claim: Any, label: str) -> None:
+    @prove.register
+    def entropy(self, claim: PositiveEntropy, label: str) -> None:
         """The forms of F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
         if self.to is not GP:
             raise InputError("positive entropy is certified for gp only: ask for --for gp")
@@ -415,7 +426,7 @@ class _Script:
             f"{lower} > 1 && ({lower})^{n} + ({lower})^-{n} + 2 < ({claim.line_degree} - 1)/({degree} - 1)",
         )
 
-    def fraction(self, claim: Any) -> None:
+    def fraction(self, claim: ConservedFunction | InvariantVolume | OrbitIntegral) -> None:
         """The numerator P and the denominator Q."""
         self.polynomial("P", claim.numerator)
         self.polynomial("Q", claim.denominator)

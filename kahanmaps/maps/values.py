@@ -12,9 +12,14 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.errors import InexactNumber, InputError, counted
 
 
+def is_float_value(value: Any) -> bool:
+    """Whether the value is a float, or a number or an array of floats of numpy."""
+    return isinstance(value, float) or getattr(getattr(value, "dtype", None), "kind", "") == "f"
+
+
 def is_float_array(value: Any) -> bool:
     """Whether the value is an array of numpy with floats."""
-    return getattr(getattr(value, "dtype", None), "kind", "") == "f" and getattr(value, "ndim", 0) > 0
+    return is_float_value(value) and getattr(value, "ndim", 0) > 0
 
 
 def point_of(arguments: Sequence[Any], variables: Sequence[str]) -> Any:
@@ -63,7 +68,7 @@ def function_value(function: RationalFunction, arguments: Sequence[Any]) -> Any:
         values.append(0)  # it does not matter
     if len(values) != len(names):
         raise InputError(f"found {len(values)} values, expected {len(names)}: {', '.join(names)}")
-    if any(isinstance(x, float) or getattr(getattr(x, "dtype", None), "kind", "") == "f" for x in values):
+    if any(map(is_float_value, values)):
         from kahanmaps.maps.floats.float_conversion import FLOATS, double
 
         return function.value(FLOATS, [double(x) for x in values])

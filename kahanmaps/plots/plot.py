@@ -54,24 +54,21 @@ class Plot(AttributeHints):
         from kahanmaps.plots.growth import plot_degrees
 
         _require(growth, DegreeGrowth, "a result: km.plot.degrees(km.degrees(...))")
-        axes: Axes = plot_degrees({label: growth}, scale=scale).axes[0]
-        return axes
+        return _axes(plot_degrees({label: growth}, scale=scale))
 
     def heights(self, survey: HeightSurvey, *, scale: str | None = None) -> Axes:
         """Plot the result of `km.heights`."""
         from kahanmaps.plots.growth import plot_heights
 
         _require(survey, HeightSurvey, "a result: km.plot.heights(km.heights(...))")
-        axes: Axes = plot_heights(survey, scale=scale).axes[0]
-        return axes
+        return _axes(plot_heights(survey, scale=scale))
 
     def scan(self, result: Scan) -> Axes:
         """Plot the result of `km.scan` in the plane of two parameters."""
         from kahanmaps.plots.scan import plot_scan
 
         _require(result, Scan, "a result: km.plot.scan(km.scan(...))")
-        axes: Axes = plot_scan(result, Style()).axes[0]
-        return axes
+        return _axes(plot_scan(result, Style()))
 
     def drift(
         self,
@@ -110,8 +107,7 @@ class Plot(AttributeHints):
         if not functions:
             raise InputError(f"found no known integral of {file.name}: km.find_integrals(system) searches for some")
         survey = survey_drift(file.system, value, point, 10_000 if count is None else count, functions, methods)
-        axes: Axes = plot_drift(survey).axes[0]
-        return axes
+        return _axes(plot_drift(survey))
 
     def commute(self, system: SystemLike, other: SystemLike | None = None, *, x0: Any, eps: Any, n: int = 1) -> Axes:
         """Draw the square x, Phi_f x, Phi_g x with its fourth corners, of two systems or of a member of the family."""
@@ -119,8 +115,7 @@ class Plot(AttributeHints):
 
         file = as_file(system)
         pairs = [pair_of_systems(file, as_file(other), eps)] if other is not None else list(pairs_of_member(file))
-        axes: Axes = plot_squares([squares(pair, x0, eps, n) for pair in pairs], Style()).axes[0]
-        return axes
+        return _axes(plot_squares([squares(pair, x0, eps, n) for pair in pairs], Style()))
 
     def invariant_curves(self, system: SystemLike, *, x0: Any, eps: Any, n: int = 1000) -> Axes:
         """Draw the invariant curves of a member of the family, plane by plane, through one initial point or several."""
@@ -128,8 +123,7 @@ class Plot(AttributeHints):
         from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 
         starts = x0 if hasattr(x0[0], "__len__") and not isinstance(x0[0], str) else [x0]
-        axes: Axes = plot_invariant_curves(find_invariant_curves(as_file(system), starts, eps, n), Style()).axes[0]
-        return axes
+        return _axes(plot_invariant_curves(find_invariant_curves(as_file(system), starts, eps, n), Style()))
 
     def rotation(self, system: SystemLike, first: Any, last: Any, *, eps: Any, points: int = 200) -> Axes:
         """Plot the rotation numbers of a system with a normal form along the segment between two initial points."""
@@ -138,8 +132,7 @@ class Plot(AttributeHints):
         normal_form = as_file(system).normal_form
         if isinstance(normal_form, NoNormalForm):
             raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
-        axes: Axes = plot_rotation(normal_form, rational(eps), first, last, Style(), points=points).axes[0]
-        return axes
+        return _axes(plot_rotation(normal_form, rational(eps), first, last, Style(), points=points))
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""
@@ -152,6 +145,11 @@ class Plot(AttributeHints):
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
         """Draw a portrait, as `km.portrait` does."""
         return plot_orbits(given, *others, **options)
+
+
+def _axes(figure: Any) -> Axes:
+    axes: Axes = figure.axes[0]
+    return axes
 
 
 def _require(value: Any, kind: type, expected: str) -> None:
@@ -195,8 +193,7 @@ def _drawn(trajectories: Trajectories, axes: Sequence[int]) -> Axes:
     if not all(0 <= k < len(trajectories.variables) for k in axes):
         raise InputError(f"found the axes {tuple(axes)}, expected numbers below {len(trajectories.variables)}")
     shown = [point_function(trajectories.variables[k], trajectories.variables) for k in axes]
-    drawn: Axes = plot_portrait(portrait_of(trajectories, shown), Style()).axes[0]
-    return drawn
+    return _axes(plot_portrait(portrait_of(trajectories, shown), Style()))
 
 
 plot = Plot()

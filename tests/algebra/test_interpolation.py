@@ -123,8 +123,7 @@ def test_primes_at_which_the_box_is_wrong_are_left_out():
                 return values
             return ((values[0] + 1) * pow(point[0] ** 3 + 5, -1, prime) % prime,)
 
-        result = reconstruct(wrong, names)
-        assert result.functions == tuple(box.functions)
+        assert reconstruct(wrong, names).functions == tuple(box.functions)
 
 
 def test_a_prime_that_divides_coefficients():

@@ -12,7 +12,7 @@ from math import comb
 import pytest
 from check_helpers import QUICK, commute_at, exact, file_of, only, system_of, verify_commute_witness
 from flint import fmpq, fmpq_poly
-from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
+from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, refuses, systems
 from hypothesis import assume, given
 
 from kahanmaps.checks import certify, theorems
@@ -196,8 +196,7 @@ AT_A_TENTH = System("x' = (10*eps - 1)*(x + y); y' = (10*eps - 1)*x^2")  # 0 at 
 )
 def test_the_identity_is_no_map_that_commutes_with_another(f, g, eps, message):
     files = [load(entry) if isinstance(entry, str) else entry for entry in (f, g)]
-    with pytest.raises(InputError, match=message):
-        check_commute(*files, Settings(eps=eps, steps=2))
+    refuses(message, check_commute, *files, Settings(eps=eps, steps=2))
 
 
 def test_a_map_that_is_the_identity_at_another_eps_is_compared():
@@ -241,5 +240,4 @@ def test_an_indeterminate_initial_point_is_reported():
     ],
 )
 def test_maps_that_cannot_be_compared_are_refused(f, g, eps, eps2, message):
-    with pytest.raises(InputError, match=message):
-        check_commute(f, g, Settings(eps=eps), eps2=eps2)
+    refuses(message, check_commute, f, g, Settings(eps=eps), eps2=eps2)

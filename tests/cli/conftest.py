@@ -22,8 +22,7 @@ def kahanmaps(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
         for piece in pieces:
             arguments += [str(piece)] if isinstance(piece, Path) else shlex.split(piece)
         capsys.readouterr()
-        status = main(arguments)
-        return Outcome(status, *capsys.readouterr())
+        return Outcome(main(arguments), *capsys.readouterr())
 
     return run
 

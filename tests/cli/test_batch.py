@@ -101,8 +101,7 @@ def test_failed_tasks_give_status_3_and_say_how_to_try_again(batch):
     assert "2 tasks failed, why: kahanmaps batch summary --db study.db --by outcome,message; " in done.err
     assert "kahanmaps batch run study.toml --db study.db --retry-failed" in done.err
     assert batch("run", FAULT, "-q").status == 3  # they have not been mended
-    again = batch("run --db study.db --retry-failed --json -q")
-    assert again.json["done"] == {"failed": 2}
+    assert batch("run --db study.db --retry-failed --json -q").json["done"] == {"failed": 2}
 
 
 def test_refuted_claims_are_results_like_others(batch):
@@ -238,8 +237,7 @@ def test_nothing_is_printed_in_the_handler_of_ctrl_c_which_may_find_a_line_half_
         yield
 
     monkeypatch.setattr("kahanmaps_cli.commands.batch.interruptible", pressed)
-    done = batch("run", PAUSE, "-j", "2")
-    assert (done.status, messages) == (130, [])
+    assert (batch("run", PAUSE, "-j", "2").status, messages) == (130, [])
 
 
 def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batch, monkeypatch):

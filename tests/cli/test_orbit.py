@@ -63,8 +63,7 @@ def test_an_orbit_can_be_made_again_from_its_header(kahanmaps, arithmetic):
     words = ["orbit", "--vars", ",".join(header["variables"]), *(f"--rhs={text}" for text in header["rhs"])]
     words += ["--start", ",".join(header["start"]), "--eps", header["eps"], "--steps", str(header["steps"])]
     words += ["--arithmetic", header["arithmetic"], f"--{header['direction']}", "--format", "jsonl"]
-    again = kahanmaps(shlex.join(words))
-    assert again.records[1:] == first.records[1:]
+    assert kahanmaps(shlex.join(words)).records[1:] == first.records[1:]
 
 
 def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_command_line(kahanmaps, tmp_path):

@@ -1,6 +1,7 @@
 """Parameters that are algebraic numbers: exact over Q[t]/g, modulo primes where g has a root, rounded for floats."""
 
 import pytest
+from helpers import refuses
 
 import kahanmaps as km
 from kahanmaps.algebra.fields import GF
@@ -41,8 +42,7 @@ def test_a_density_that_is_zero_at_the_root_is_refused():
 
     assert measure("a^2 + 2") is Certainty.PROVED
     for phi in ("a^2 - 2", "(a^4 - 4)*x"):
-        with pytest.raises(InputError, match="identically 0 at a root of t"):
-            measure(phi)
+        refuses("identically 0 at a root of t", measure, phi)
 
 
 def test_whether_a_map_is_one_and_its_inverse_right_is_asked_at_the_root():
@@ -56,8 +56,7 @@ def test_whether_a_map_is_one_and_its_inverse_right_is_asked_at_the_root():
         ("a*x", "a*y/3", "is not the inverse of the map"),
         ("(a^2 - 2)*x + y^2", "", "the map is not dominant"),
     ):
-        with pytest.raises(InputError, match=mistake):
-            km.parse_system(explicit(image, inverse))
+        refuses(mistake, km.parse_system, explicit(image, inverse))
 
 
 def test_a_refutation_has_a_witness_over_the_number_field():
@@ -78,8 +77,7 @@ def test_maps_with_the_root_commute_with_their_own_multiples_only_where_they_sho
     )
     assert km.check_commute(km.System(linear, a=ROOT), km.System("x' = 3*y; y' = -3*x")).verdict is Certainty.REFUTED
     for other in ("root of t^2 - 3", "root of t^2 - 2 near -1.4", "root of t^2 - 2"):
-        with pytest.raises(InputError, match="the same algebraic number"):
-            km.check_commute(km.System(linear, a=ROOT), km.System(linear, a=other))
+        refuses("the same algebraic number", km.check_commute, km.System(linear, a=ROOT), km.System(linear, a=other))
     assert km.check_commute(km.System(linear, a=ROOT), km.System(linear, a="root of t^2 - 2 near 1.5")).holds
 
 
@@ -103,16 +101,12 @@ def test_the_points_of_an_orbit_agree_in_all_arithmetics():
 def test_what_needs_rational_numbers_refuses_in_a_sentence():
     file = km.System(TOP, a=ROOT)
     for function in (km.find_poisson, km.find_symmetry, km.commuting_systems):
-        with pytest.raises(InputError, match="found a parameter that is a root of"):
-            function(file)
-    with pytest.raises(InputError, match="found a parameter that is a root of"):
-        km.check_poisson(km.load("henon_heiles", {"c": ROOT}))
+        refuses("found a parameter that is a root of", function, file)
+    refuses("found a parameter that is a root of", km.check_poisson, km.load("henon_heiles", {"c": ROOT}))
     with pytest.raises(InputError, match=r"found an algebraic number in a \[family\]"):
         km.parse_system('parameters.a = "root of t^2 - 2"\n[family]\nA = [["a","0"],["0","a"]]\nH = "x1^3"')
-    with pytest.raises(InputError, match="a second algebraic parameter"):
-        km.load("euler_top", {"a1": ROOT, "a2": "root of t^2 - 3"})
-    with pytest.raises(InputError, match="say which"):
-        km.orbit(km.System(TOP, a="root of t^2 - 2"), [1, 2, 3], "1/10", steps=1, arithmetic="float")
+    refuses("a second algebraic parameter", km.load, "euler_top", {"a1": ROOT, "a2": "root of t^2 - 3"})
+    refuses("say which", km.orbit, km.System(TOP, a="root of t^2 - 2"), [1, 2, 3], "1/10", steps=1, arithmetic="float")
     with pytest.raises(InputError, match="is not real"):
         km.orbit(km.System(TOP, a="root of t^2 + 1"), [1, 2, 3], "1/10", steps=1, arithmetic="float")
     with pytest.raises(BadPrime, match="no root modulo 13"):

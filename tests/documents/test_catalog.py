@@ -132,8 +132,7 @@ def follow(degrees, minimal):
     d, recurrence = [1, *degrees], minimal * fmpq_poly([-1, 1])  # and a constant
     order = recurrence.degree()
     misses = [sum(recurrence[j] * d[k + j] for j in range(order + 1)) for k in range(len(d) - order)]
-    late = next((misses[n:] for n in range(LATEST_BEGINNING + 1) if not any(misses[n:])), [])
-    return len(late) >= 2
+    return len(next((misses[n:] for n in range(LATEST_BEGINNING + 1) if not any(misses[n:])), [])) >= 2
 
 
 @pytest.mark.parametrize("name", [name for name in names() if "dynamical_degree" in load(name).catalog])

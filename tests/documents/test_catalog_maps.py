@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from flint import fmpq
-from helpers import quick
+from helpers import quick, refuses
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
@@ -17,7 +17,6 @@ from kahanmaps.documents.catalog import load, map_names
 from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.documents.structured_facts import relations
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory, verdict_on
@@ -154,7 +153,5 @@ def test_degrees_and_singularities_of_a_qrt_map_are_those_of_an_elliptic_fibrati
 def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
     file = EXAMPLES[name]
     for ask in (lambda: file.system, lambda: with_symbols(file), lambda: with_symbols(file, list(file.parameters))):
-        with pytest.raises(InputError, match="expected a quadratic vector field"):
-            ask()
-    with pytest.raises(InputError, match=f"{file.name} is of kind .{file.kind}.: Pi"):
-        check_poisson(file)
+        refuses("expected a quadratic vector field", ask)
+    refuses(f"{file.name} is of kind .{file.kind}.: Pi", check_poisson, file)

@@ -106,8 +106,7 @@ def test_what_is_no_equation_is_refused_with_what_to_write(text, words):
 
 @pytest.mark.parametrize("word", ["polarised", "polarized"])
 def test_a_cubic_field_is_read_with_the_discretization_that_the_message_names(word):
-    text = f'[system]\nrhs = "x\' = x^3"\ndiscretization = "{word}"'
-    result = km.parse_system(text).map
+    result = km.parse_system(f'[system]\nrhs = "x\' = x^3"\ndiscretization = "{word}"').map
     assert result.title == "polarised map"
     assert result.at("1/4").step(["1/2", "1/3"]) == (fmpq(1, 3), fmpq(3, 5))  # as in maps/polarised.py
 

@@ -17,6 +17,7 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import pytest
+from helpers import refuses
 from small_databases import exported, recorded, until
 
 from kahanmaps.errors import InputError
@@ -267,8 +268,7 @@ def test_a_killed_scheduler_is_reported_at_once_without_waiting(own):
         workers.submit(jobs_of(1, sleep=600)[0])
         assert workers.wait(0.5) == []
         own.kill(own.scheduler)
-        with pytest.raises(ClusterLost, match=r"what was recorded is safe; run the same command again"):
-            workers.wait(100)
+        refuses(r"what was recorded is safe; run the same command again", workers.wait, 100, error=ClusterLost)
 
 
 # Batches
@@ -351,11 +351,9 @@ def test_an_address_where_no_scheduler_answers_is_refused_in_a_sentence():
     ],
 )
 def test_a_malformed_address_is_refused_in_a_sentence(address, sentence):
-    with pytest.raises(InputError, match=sentence):
-        ClusterWorkers(address, str, connect_seconds=0.3)
+    refuses(sentence, ClusterWorkers, address, str, connect_seconds=0.3)
 
 
 def test_a_missing_installation_is_reported_with_the_command_that_repairs_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install 'kahanmaps\[cluster\]'"):
-        ClusterWorkers("tcp://127.0.0.1:8786", str)
+    refuses(r"pip install 'kahanmaps\[cluster\]'", ClusterWorkers, "tcp://127.0.0.1:8786", str)

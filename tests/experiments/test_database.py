@@ -12,6 +12,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from helpers import refuses
 from small_databases import LIMITS, ok, planned, seed, seeds, small_chunks, start, tasks
 
 from kahanmaps.experiments.results import store as store_module
@@ -20,10 +21,8 @@ from kahanmaps.experiments.results.store import Store, StoreError, Unavailable
 
 def test_a_missing_file_is_not_made_unless_asked_for(path):
     for readonly in (True, False):
-        with pytest.raises(StoreError, match=r"there is no database .*results\.db"):
-            Store.open(path, readonly=readonly)
-    with pytest.raises(ValueError, match="cannot be created"):
-        Store.open(path, create=True, readonly=True)
+        refuses(r"there is no database .*results\.db", Store.open, path, readonly=readonly, error=StoreError)
+    refuses("cannot be created", Store.open, path, create=True, readonly=True, error=ValueError)
     assert os.listdir(path.parent) == []
 
 
@@ -70,12 +69,10 @@ def test_a_store_that_is_closed_or_opened_to_be_read_refuses_to_write(path):
     planned(path, 1)
     with Store.open(path, readonly=True) as store:
         for write in (lambda: store.add([ok(1)]), lambda: store.plan("b", "1", LIMITS, [], {})):
-            with pytest.raises(StoreError, match="opened for reading only"):
-                write()
+            refuses("opened for reading only", write, error=StoreError)
         with pytest.raises(sqlite3.OperationalError, match="readonly"):  # not even by a mistake of ours
             store._execute("DELETE FROM plan")
-    with pytest.raises(StoreError, match="has been closed"):
-        store.status()
+    refuses("has been closed", store.status, error=StoreError)
 
 
 def test_a_full_disk_is_reported_in_a_sentence_and_loses_nothing(store):
@@ -146,13 +143,11 @@ def test_one_process_writes_at_a_time_and_its_lock_is_gone_at_rest(path):
     with start(script, path) as process:
         assert process.stdout.readline() == "open\n"
         for name in (path, link):
-            with pytest.raises(StoreError, match="another batch is writing to"):
-                Store.open(name)
+            refuses("another batch is writing to", Store.open, name, error=StoreError)
         process.kill()
     with Store.open(link) as store:
         store.add([ok(1)])
-        with pytest.raises(StoreError, match="another batch"):
-            Store.open(path)
+        refuses("another batch", Store.open, path, error=StoreError)
     assert sorted(os.listdir(path.parent)) == [link.name, path.name]
 
 
@@ -172,5 +167,4 @@ def test_a_database_is_read_where_nothing_may_be_written(path, monkeypatch):
     monkeypatch.setattr("os.access", lambda _, mode: mode != os.W_OK)  # who runs the tests may be root
     with Store.open(path, readonly=True) as store:
         assert seeds(store.pending()) == [1, 2]
-    with pytest.raises(StoreError, match="may not be written to"):
-        Store.open(path)
+    refuses("may not be written to", Store.open, path, error=StoreError)

@@ -5,7 +5,7 @@ from itertools import product
 from typing import Any
 
 import pytest
-from helpers import fraction, rationals
+from helpers import fraction, rationals, refuses
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -74,8 +74,7 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
     assume(step != 0)
     expected = naive(fraction(first), fraction(last), fraction(step))
     if not expected:
-        with pytest.raises(InputError, match="without values"):
-            RationalRange(first, last, step)
+        refuses("without values", RationalRange, first, last, step)
         return
     result = RationalRange(first, last, step)
     assert len(result) == len(expected)

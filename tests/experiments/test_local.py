@@ -19,7 +19,7 @@ from signal import Signals
 from typing import Any
 
 import pytest
-from helpers import quick
+from helpers import quick, refuses
 from small_databases import exported, recorded, until
 
 from kahanmaps.errors import InputError
@@ -295,8 +295,7 @@ def test_at_most_so_many_workers_are_there_and_closing_which_may_be_done_twice_k
 
 def test_workers_that_cannot_start_are_reported_once(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("KAHANMAPS_TASKS", "no_such_module_anywhere")
-    with pytest.raises(WorkersError, match="no_such_module_anywhere"):
-        done([pause(1, seed) for seed in range(5)])
+    refuses("no_such_module_anywhere", done, [pause(1, seed) for seed in range(5)], error=WorkersError)
 
 
 PARENT = """

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers import table, together
+from helpers import refuses, table, together
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from specs import LORENZ, mistakes
@@ -37,8 +37,7 @@ task = "verify-universal"
 def test_a_spec_error_counts_its_mistakes_and_shows_them():
     with pytest.raises(SpecError) as caught:
         parse_spec(TEN, "study.toml")
-    lines = str(caught.value).splitlines()
-    assert lines[0] == "study.toml: 10 mistakes"
+    assert str(caught.value).splitlines()[0] == "study.toml: 10 mistakes"
     assert "  experiments.second.task: there is no task 'orbot', expected one of" in str(caught.value)
 
 
@@ -182,8 +181,7 @@ def test_a_file_that_says_the_same_as_another_is_named_with_it_or_left_out(spec,
     (tmp_path / "members" / "copy" / "a.toml").write_text(GOOD)
     text = spec(ORBITS.replace('"members/*.toml"', '["members/a.toml", "members/copy/*.toml"]'))
     messages = "found a twice, expected every system once: members/copy/a.toml says the same as members/a.toml"
-    with pytest.raises(SpecError, match=f"system.2.: {messages}"):
-        read_spec(text)
+    refuses(f"system.2.: {messages}", read_spec, text, error=SpecError)
     [experiment] = read_spec(text, skip_bad=True).experiments
     assert [task.system["name"] for task in experiment.tasks()] == ["a"]
     assert experiment.skipped == (("members/copy/a.toml", messages),)

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
+from helpers import refuses
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, seeds, small_chunks, task, tasks
@@ -40,15 +41,13 @@ def test_a_stored_record_is_read_back_unchanged(store):
 @pytest.mark.parametrize("bad", [{"result": {"x": float("inf")}}, {"seconds": float("nan")}])
 def test_numbers_that_are_not_finite_stay_outside_with_all_that_came_along(store, bad):
     store.plan("a", "1", LIMITS, tasks(1, 2), {})
-    with pytest.raises(ValueError, match=r"JSON compliant|nan seconds"):
-        store.add([ok(1), replace(ok(2), **bad)])
+    refuses(r"JSON compliant|nan seconds", store.add, [ok(1), replace(ok(2), **bad)], error=ValueError)
     assert list(store.rows()) == []
 
 
 def test_a_result_without_a_task_is_refused_with_all_that_came_along(store):
     store.plan("a", "1", LIMITS, tasks(1), {})
-    with pytest.raises(StoreError, match=f"has no task {task(9).key}: plan it"):
-        store.add([ok(1), ok(9)])
+    refuses(f"has no task {task(9).key}: plan it", store.add, [ok(1), ok(9)], error=StoreError)
     assert list(store.rows()) == []
 
 
@@ -114,8 +113,7 @@ def test_a_plan_that_cannot_be_finished_leaves_the_old_one(store):
         raise RuntimeError("the 5000th")
 
     store.plan("a", "1", LIMITS, tasks(1, 2), {})
-    with pytest.raises(RuntimeError, match="the 5000th"):
-        store.plan("a", "2", LIMITS, broken(), {})
+    refuses("the 5000th", store.plan, "a", "2", LIMITS, broken(), {}, error=RuntimeError)
     assert seeds(store.pending()) == [1, 2]
     assert store.plan("a", "1", LIMITS, [], {}).is_resumed
     assert store.plan("a", "2", LIMITS, tasks(3), {}) == Planned(1, 0, 1, 2)  # and the store can go on
@@ -130,10 +128,8 @@ def test_documents_are_kept_and_may_come_up_while_tasks_are_made(store):
 
     store.plan("a", "1", LIMITS, made(), documents)
     assert store.document(digest("x' = x^2")) == "x' = x^2"
-    with pytest.raises(StoreError, match="no document 0123"):
-        store.document("0123")
-    with pytest.raises(StoreError, match="not the one with this digest"):
-        store.plan("b", "1", LIMITS, [], {"0123": "text"})
+    refuses("no document 0123", store.document, "0123", error=StoreError)
+    refuses("not the one with this digest", store.plan, "b", "1", LIMITS, [], {"0123": "text"}, error=StoreError)
     assert [entry.name for entry in store.experiments()] == ["a"]
 
 
@@ -217,8 +213,7 @@ def test_a_task_is_found_by_the_beginning_of_its_key(store):
 
 @pytest.mark.parametrize("prefix", ["abc", "xyzw", "a" * 33])
 def test_what_is_no_beginning_of_a_key_is_refused(store, prefix):
-    with pytest.raises(StoreError, match="at least 4 of its 32 hexadecimal digits"):
-        store.find(prefix)
+    refuses("at least 4 of its 32 hexadecimal digits", store.find, prefix, error=StoreError)
 
 
 def contents(path: Path) -> list[object]:
@@ -245,8 +240,7 @@ def test_of_two_results_of_a_task_the_right_one_is_kept(path, mine, theirs, kept
     with Store.open(path) as store:
         assert store.merge(source) == merged
         assert [row.record for row in store.rows(missing=True)] == [kept]
-        again = store.merge(source)
-        assert again == replace(merged, results=0, replaced=0)
+        assert store.merge(source) == replace(merged, results=0, replaced=0)
         assert [row.record for row in store.rows(missing=True)] == [kept]
 
 

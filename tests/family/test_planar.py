@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 from family.members import GENERIC, t
 from flint import fmpq, fmpq_mat
-from helpers import random_point
+from helpers import random_point, refuses
 
 from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import ring
@@ -103,8 +103,7 @@ WRONG = [
 def test_wrong_data_fail_the_verification(name, wrong, sentence):
     form = FORMS[name]
     replace(form).verify()
-    with pytest.raises(AssertionError, match=sentence):
-        replace(form, **wrong(form))
+    refuses(sentence, replace, form, **wrong(form), error=AssertionError)
 
 
 @pytest.mark.parametrize(
@@ -116,5 +115,4 @@ def test_wrong_data_fail_the_verification(name, wrong, sentence):
     ids=["a quadratic factor twice", "two roots twice"],
 )
 def test_repeated_roots_are_refused_by_their_factors(member, factors):
-    with pytest.raises(HypothesisError, match=f"chi has the repeated factor.* {factors}"):
-        normal_form(member)
+    refuses(f"chi has the repeated factor.* {factors}", normal_form, member, error=HypothesisError)

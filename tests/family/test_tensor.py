@@ -57,8 +57,7 @@ def test_integrals_and_densities_are_inherited(chi):
     file = tensor_file(load("nahm_tetrahedral"), chi)
     point = [fmpq(k + 1, 2 * k + 5) for k in range(file.dim)]
     eps = fmpq(1, 9)
-    map_ = KahanMap(file.system, eps, QQ)
-    image = map_.step(point)
+    image = KahanMap(file.system, eps, QQ).step(point)
     assert len(file.integrals) == chi.degree()
     for integral in file.integrals.values():
         assert integral.value(QQ, [*image, eps]) == integral.value(QQ, [*point, eps])
@@ -96,8 +95,7 @@ def test_what_is_over_no_algebra_is_not(name):
 
 def test_a_perturbed_system_is_no_longer_over_the_algebra():
     system = over_algebra(PLANAR, t**2 - 2)
-    x = ring(system.variables).gens()
-    moved = QuadraticSystem((system.rhs[0] + x[3] ** 2, *system.rhs[1:]))
+    moved = QuadraticSystem((system.rhs[0] + ring(system.variables).gens()[3] ** 2, *system.rhs[1:]))
     C = tensor_structure(system).C
     assert commutes(C, system)
     assert not commutes(C, moved)

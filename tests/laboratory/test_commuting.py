@@ -197,8 +197,7 @@ def test_curved_families_are_reported_as_equations():
 )
 def test_the_identity_of_a_family_is_bounded(f, g, below):
     first, second = (QuadraticSystem.from_text(["x", "y"], rhs) for rhs in (f, g))
-    b = ring(["b"]).gens()[0]
-    family = SolutionComponent((b / below,))
+    family = SolutionComponent((ring(["b"]).gens()[0] / below,))
     equation, _ = check(_family_identity(first, SimpleNamespace(fields=[second]), family), differs=True)
     assert equation.bits >= log2(below)
 

@@ -98,8 +98,7 @@ def test_no_members_of_a_pencil_are_sparser(rng):
     }
     by_size = sorted(supports, key=lambda places: (sum(exponents[places[-1]]), len(places), places))
     basis = DarbouxSpace.spanned_by(2, 2, [P, Q], p).basis
-    results = [tuple(k for k, entry in enumerate(member) if entry) for member in basis]
-    assert results == by_size[:2]
+    assert [tuple(k for k, entry in enumerate(member) if entry) for member in basis] == by_size[:2]
     assert rank([*basis, P, Q], p) == rank(basis, p) == 2
 
 
@@ -125,8 +124,7 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
 
 
 def test_polynomials_with_a_given_cofactor():
-    map_ = Laboratory(load("lotka_volterra")).maps[0]
-    sample = Sample.of(map_, [DETERMINANT], points_needed(2, 3))
+    sample = Sample.of(Laboratory(load("lotka_volterra")).maps[0], [DETERMINANT], points_needed(2, 3))
     # x y has the cofactor det dPhi, constants have 1
     assert cofactor_space(sample, CofactorProduct((1,), 1), 2).basis == [[0, 0, 0, 0, 1, 0]]
     assert cofactor_space(sample, CofactorProduct((0,), 0), 2).basis == [[1, 0, 0, 0, 0, 0]]

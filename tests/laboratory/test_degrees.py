@@ -108,8 +108,7 @@ def test_a_single_eps_may_be_special():
     ],
 )
 def test_degenerate_maps_are_values(rhs, eps, degrees, ended):
-    system = QuadraticSystem.from_text(["x", "y"][: len(rhs)], rhs)
-    growth = degree_growth(system, eps)
+    growth = degree_growth(QuadraticSystem.from_text(["x", "y"][: len(rhs)], rhs), eps)
     assert (growth.degrees, growth.ended) == (degrees, ended)
     assert growth.text
     assert growth.growth is {"constant": Growth.ZERO, "singular": Growth.UNKNOWN}.get(ended, Growth.BOUNDED)
@@ -157,7 +156,6 @@ def test_lines_in_special_position_are_replaced(monkeypatch):
     """Modulo 101 every line has a good chance to be special; larger degrees win, and it is told."""
     primes = iter([101, 101, 103, 107, 2**61 - 1, 2**61 - 1, 2**61 - 1, 2**61 - 1, 2**61 - 1])
     monkeypatch.setattr(curves, "random_prime", lambda _: next(primes))
-    system = load("euler_top").system
-    growth = degree_growth(system, max_terms=7, seed=1)
+    growth = degree_growth(load("euler_top").system, max_terms=7, seed=1)
     assert growth.degrees == (1, 3, 9, 19, 33, 51, 73, 99)
     assert any("was replaced by another" in note for note in growth.notes)

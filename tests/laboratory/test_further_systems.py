@@ -144,8 +144,7 @@ def test_the_answers_count_their_independent_integrals(name):
 
 @pytest.mark.parametrize("name", slow_unless([name for name in FURTHER if name not in BOUNDED], FAST))
 def test_the_analysis_gives_the_answer(name):
-    analysis = analysed(name)
-    assert differences(analysis, answer_for(name)) == set()
+    assert differences(analysed(name), answer_for(name)) == set()
 
 
 @pytest.mark.parametrize("name", DEGENERATE)

@@ -66,8 +66,7 @@ def test_multiples_of_relations_of_lower_degrees_may_be_left_out(name, degree):
 
 
 def test_what_leads_no_relation_of_this_orbit_is_not_left_out():
-    map_ = maps(load("lorenz"))[0]
-    assert relations_on_orbit(map_, 3, leading=frozenset({(1, 0, 0)})).dimension == 0
+    assert relations_on_orbit(maps(load("lorenz"))[0], 3, leading=frozenset({(1, 0, 0)})).dimension == 0
 
 
 def test_a_perturbed_system_loses_its_relations():

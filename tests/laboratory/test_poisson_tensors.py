@@ -127,8 +127,7 @@ def test_functions_of_integrals_are_tried_as_casimirs(integrals, casimirs):
 
 
 def test_a_function_that_is_said_to_be_a_casimir_is_put_to_the_proof(monkeypatch):
-    names = ["x", "y", "z", "eps"]
-    wrong = [("I1*I2", parse_rational_function(f"{ALONG}*{SQUARE}", names))]
+    wrong = [("I1*I2", parse_rational_function(f"{ALONG}*{SQUARE}", ["x", "y", "z", "eps"]))]
     monkeypatch.setattr(poisson_tensors, "casimir_candidates", lambda *given: iter(wrong))
     assert casimirs_of_lie_poisson(ALONG, f"{SQUARE} + {ALONG}") == ()
 

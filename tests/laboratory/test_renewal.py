@@ -33,8 +33,7 @@ def settled(*rows, continues_as=None):
 
 @cache
 def derived(name):
-    map_ = load(name).map
-    return patterns(map_, None)
+    return patterns(load(name).map, None)
 
 
 WRITTEN = [name for name in (*names(), *map_names()) if DIMENSION[name] <= 4]

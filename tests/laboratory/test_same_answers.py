@@ -115,8 +115,7 @@ def test_what_was_asked_before_does_not_change_the_work_that_is_counted(name):
 def test_work_that_is_not_the_search_is_not_charged_to_it():
     """Negative control: what is counted elsewhere before is not spent, but what is counted meanwhile is."""
     map_ = load("henon_heiles").map
-    budget = Budget(100_000)
-    complete = degree_growth(map_, effort=budget)
+    complete = degree_growth(map_, effort=Budget(100_000))
     count(1_000_000)
     assert degree_growth(map_, effort=Budget(100_000)).degrees == complete.degrees
     less = degree_growth(map_, effort=Budget(100_000), progress=lambda _: count(20_000))

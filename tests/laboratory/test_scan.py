@@ -289,8 +289,7 @@ def test_what_is_not_there_modulo_the_third_prime_is_not_lifted():
 def test_a_point_of_low_height_may_be_missing_modulo_one_of_four_primes():
     low = {p: [((1, p - 2),)] for p in PRIMES}
     assert lift_linear({**low, 43: [((1, 5),)]}) == {((fmpq(1), fmpq(-2)),): PRIMES}
-    high = {p: [((1, p - 15),)] for p in PRIMES}
-    assert lift_linear({**high, 43: [((1, 5),)]}) == {}
+    assert lift_linear({**{p: [((1, p - 15),)] for p in PRIMES}, 43: [((1, 5),)]}) == {}
 
 
 def zeros(condition, *others):

@@ -161,8 +161,7 @@ def test_shuffled_spaces_are_put_in_order_on_every_map(order):
         lambda p, a, eps: -a * eps * pow(2, -1, p),
         lambda p, a, eps: 7 * pow(3, -1, p),
     ]
-    laboratory = Laboratory(system("x y", "a*y", "x", a="2"), ["a"])
-    first, second = laboratory.maps
+    first, second = Laboratory(system("x y", "a*y", "x", a="2"), ["a"]).maps
     model = spaces(first.prime, (*first.values, first.eps), numbers, order)
     branches = find_branches(model, lambda p, values: spaces(p, values, numbers, order), ("a", "eps"), 0, Budget())
     assert branches is not None
@@ -191,5 +190,4 @@ def test_spaces_that_are_conjugate_have_no_order(names):
         return None if root is None else spaces(prime, values, [lambda p, a=1: root * a, lambda p, a=1: -root * a], 0)
 
     prime = next(map_.prime for map_ in Laboratory(FAMILY).other_maps(20) if root_of(2, map_.prime) is not None)
-    model = alike(prime, (3,) * len(names))
-    assert find_branches(model, alike, names, 0, Budget()) is None
+    assert find_branches(alike(prime, (3,) * len(names)), alike, names, 0, Budget()) is None

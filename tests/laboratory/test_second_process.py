@@ -92,8 +92,7 @@ def is_running(process):
 def test_the_second_process_ends_with_the_first(how):
     line = [sys.executable, "-c", ENDED]
     with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
-        both = {int(process.stdout.readline()) for _ in range(2)}
-        (other,) = both - {process.pid}
+        (other,) = {int(process.stdout.readline()) for _ in range(2)} - {process.pid}
         process.send_signal(how)
         process.wait(timeout=30)
     end = time.monotonic() + 30

@@ -60,8 +60,7 @@ def test_the_degrees_of_the_critical_locus_add_up():
     """The Jacobian determinant of n + 1 forms of degree d has degree (n + 1)(d - 1)."""
     for name in ("weierstrass", "lotka_volterra", "lorenz", "henon_heiles", "euler_top"):
         for run in runs(name, steps=1):
-            n = load(name).system.dim
-            assert run.critical_degree == (n + 1) * (run.map_degree - 1)
+            assert run.critical_degree == (load(name).system.dim + 1) * (run.map_degree - 1)
             assert sum(h.degree * (h.multiplicity or 0) for h in run.hypersurfaces) == run.critical_degree
 
 
@@ -150,8 +149,7 @@ def test_a_series_divides_as_rational_numbers_at_a_large_prime_do(name, eps, poi
 
 def test_a_point_has_the_image_of_the_map_and_none_where_all_minors_vanish():
     system = load("lorenz").system
-    forms = KahanMap(system, "1/7", GF(PRIME)).equation
-    image = image_of([forms], [3, 5, 7, 1])
+    image = image_of([KahanMap(system, "1/7", GF(PRIME)).equation], [3, 5, 7, 1])
     inverse = pow(image[-1], -1, PRIME)
     expected = KahanMap(system, "1/7", GF(PRIME)).step([GF(PRIME).convert(c) for c in (3, 5, 7)])
     assert [c * inverse % PRIME for c in image[:-1]] == [int(c) for c in expected]
@@ -199,8 +197,7 @@ def components_on(form, p, curve, direction=DIRECTION, at_image=False):
 
 @pytest.mark.parametrize(("p", "degrees"), [(1000033, [1, 1, 2]), (1000003, [2, 2])])
 def test_a_form_splits_modulo_primes_with_a_root_of_minus_one(p, degrees):
-    curve = [(1, 2), (3, 4), (5, 6), (7, 8)]
-    some = components_on((X1**2 + X2**2) * (X1 * X3 + Z**2) ** 3, p, curve)
+    some = components_on((X1**2 + X2**2) * (X1 * X3 + Z**2) ** 3, p, [(1, 2), (3, 4), (5, 6), (7, 8)])
     assert sorted(entry.degree for entry in some) == degrees
     assert sorted(entry.exponents for entry in some if entry.degree == 1) == [(1,)] * degrees.count(1)
     assert (3,) in [entry.exponents for entry in some]

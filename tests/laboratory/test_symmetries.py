@@ -147,8 +147,7 @@ def test_infinitesimal_symmetries_are_those_of_the_three_wave_system():
 def test_scalings_change_eps():
     """x' = y, y' = x^2 has the weights 2 and 3: (x, y) -> (c^2 x, c^3 y) takes the map at eps to that at eps/c."""
     f = system("x y", "y", "x^2")
-    scaling = linear_symmetries(f).scaling
-    assert scaling.rhs == ["2*x", "3*y"]
+    assert linear_symmetries(f).scaling.rhs == ["2*x", "3*y"]
     assert holds_for_the_map(f, fmpq_mat([[4, 0], [0, 8]]), [fmpq(0)] * 2, lambda eps: eps / 2)
     assert linear_symmetries(load("lorenz", {}).system).scaling is None
     assert linear_symmetries(load("euler_top", {}).system).scaling.rhs == ["x1", "x2", "x3"]

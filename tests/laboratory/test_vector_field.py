@@ -117,8 +117,7 @@ def test_a_system_is_known_again_after_any_affine_change(name):
 
 def test_lines_of_fixed_points_are_a_frame():
     """An Euler top with its axes turned: three lines of fixed points lead back to them."""
-    P = fmpq_mat([[1, 1, 0], [0, 1, 1], [1, 0, 3]])
-    file = elsewhere("euler_top", P, [fmpq(0)] * 3, 1)
+    file = elsewhere("euler_top", fmpq_mat([[1, 1, 0], [0, 1, 1], [1, 0, 3]]), [fmpq(0)] * 3, 1)
     equivalence = equivalent_system(file, effort=3)
     assert equivalence is not None
     assert (equivalence.name, holds(file, equivalence)) == ("euler_top", True)
@@ -134,8 +133,7 @@ def test_lines_of_fixed_points_are_a_frame():
     ],
 )
 def test_other_systems_are_not_taken_for_one(equations):
-    file = System(equations)
-    assert equivalent_system(file, effort=3) is None
+    assert equivalent_system(System(equations), effort=3) is None
 
 
 def test_a_near_miss_is_no_equivalence():

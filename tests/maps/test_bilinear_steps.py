@@ -59,8 +59,7 @@ def test_points_are_those_of_single_steps_in_lowest_terms(name, steps, lag, no_c
 @pytest.mark.parametrize("name", ["lorenz", "henon_heiles", "kirchhoff_generic", "hietarinta_viallet"])
 def test_there_are_no_forms_where_there_is_no_abelian_variety(name):
     map_over = over(name)
-    start = begin(map_over)
-    assert bilinear.bilinear_forms(map_over, start) is None
+    assert bilinear.bilinear_forms(map_over, begin(map_over)) is None
 
 
 def test_wrong_forms_give_no_point_and_the_orbit_goes_on(monkeypatch, no_curves):

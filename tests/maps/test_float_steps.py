@@ -13,11 +13,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import EULER_TOP, FORCED_PLANE, NAMED_SYSTEMS, quick
+from helpers import EULER_TOP, FORCED_PLANE, NAMED_SYSTEMS, quick, refuses
 
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.parsing import parse_polynomial
-from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
@@ -223,8 +222,7 @@ def test_an_overflow_ends_one_orbit_and_leaves_the_others(kernel):
 def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):
     monkeypatch.setattr("kahanmaps.maps.kernels.has_numba", lambda: False)
     assert FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3))).kernel == "numpy generic"
-    with pytest.raises(InputError, match=r"kahanmaps\[fast\]"):
-        FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), kernel="numba")
+    refuses(r"kahanmaps\[fast\]", FloatEnsemble, EULER_TOP, "1/10", np.ones((1, 3)), kernel="numba")
 
 
 @pytest.mark.parametrize(
@@ -242,8 +240,7 @@ def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):
     ],
 )
 def test_wrong_use_is_refused(starts, options, sentence):
-    with pytest.raises(InputError, match=sentence):
-        FloatEnsemble(EULER_TOP, "1/10", starts, **options)
+    refuses(sentence, FloatEnsemble, EULER_TOP, "1/10", starts, **options)
 
 
 def test_an_interrupted_ensemble_stops_between_portions_and_can_go_on():

@@ -56,8 +56,7 @@ def mean_turn(angles, turn):
 )
 def test_the_rotation_number_is_that_of_a_float_orbit(cubic, start, eps):
     """Every line through the origin meets the level curve in one point near the cubic of the flow."""
-    system = hamiltonian_flow(*cubic)
-    (rotation,) = geometry(system, start, eps).planes[0].rotations
+    (rotation,) = geometry(hamiltonian_flow(*cubic), start, eps).planes[0].rotations
     points = planar_orbit(cubic, start, eps, 40_000)
     measured = mean_turn(np.arctan2(points[:, 1], points[:, 0]), math.pi)
     assert rotation.steps == 1
@@ -73,8 +72,7 @@ def test_two_real_components_are_exchanged_and_the_second_iterate_turns():
     (rotation,) = plane.rotations
     assert rotation.steps == 2
     oval = planar_orbit(cubic, start, eps, 40_000)[1::2]  # the component that is bounded here
-    center = np.median(oval, axis=0)
-    measured = mean_turn(np.arctan2(*(oval - center).T[::-1]), 2 * math.pi)
+    measured = mean_turn(np.arctan2(*(oval - np.median(oval, axis=0)).T[::-1]), 2 * math.pi)
     assert abs(measured - float(rotation.number)) < 1e-8
 
 

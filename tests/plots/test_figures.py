@@ -7,9 +7,8 @@ from functools import cache
 import matplotlib as mpl
 import numpy as np
 import pytest
-from helpers import together
+from helpers import refuses, together
 
-from kahanmaps.errors import InputError
 from kahanmaps.plots.figures import (
     FORMATS,
     draw_points,
@@ -73,8 +72,7 @@ def test_settings_of_a_user_do_not_get_into_a_picture_and_are_left_as_they_were(
 )
 def test_the_format_is_that_of_the_ending_or_the_one_requested(path, requested, expected):
     if expected is None:
-        with pytest.raises(InputError, match=r"expected \.pdf, \.svg or \.png"):
-            format_of(path, requested)
+        refuses(r"expected \.pdf, \.svg or \.png", format_of, path, requested)
     else:
         assert format_of(path, requested) == expected
 
@@ -89,8 +87,6 @@ def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():
 
 
 def test_pictures_of_more_dots_than_fit_into_memory_are_refused():
-    with pytest.raises(InputError, match="use fewer dots per inch than 2400"):
-        Style(width=200, dpi=2400)
+    refuses("use fewer dots per inch than 2400", Style, width=200, dpi=2400)
     tall = Style(width=20, dpi=2000)  # 12 000 x 16 000 dots are few enough, as high as three times that are not
-    with pytest.raises(InputError, match="2000"):
-        picture_bytes(new_figure(tall, aspect=3), "png", tall)
+    refuses("2000", picture_bytes, new_figure(tall, aspect=3), "png", tall)

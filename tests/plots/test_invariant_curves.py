@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flint import fmpq_poly
-from helpers import together
+from helpers import refuses, together
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.errors import HypothesisError
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots.curves.invariant_curves import MAX_POINTS, find_invariant_curves
@@ -135,8 +135,7 @@ def test_a_sign_turns_one_plane_around(curves):
 
 
 def test_one_pole_ends_the_orbit_in_all_planes_and_a_plane_at_rest_is_said_to_be_one():
-    rhs = ["-6*x*z", "0", "3*z^2 - 3*x^2", "-y^2"]
-    system = QuadraticSystem.from_text(["x", "y", "z", "w"], rhs)
+    system = QuadraticSystem.from_text(["x", "y", "z", "w"], ["-6*x*z", "0", "3*z^2 - 3*x^2", "-y^2"])
     curves = find_invariant_curves(SystemFile.from_system(system), [["3/5", 1, "4/5", 1]], "1/6", 5)
     assert {len(plane.orbits[0].u) for plane in curves.planes} == {1}
     system = QuadraticSystem.from_text(["x", "y", "z", "w"], ["0", "0", "-x^2", "0"])
@@ -156,8 +155,7 @@ def test_one_pole_ends_the_orbit_in_all_planes_and_a_plane_at_rest_is_said_to_be
     ],
 )
 def test_wrong_sizes_are_refused(starts, steps, message):
-    with pytest.raises(InputError, match=message):
-        find_invariant_curves(load("paper_m2"), starts, "1/20", steps)
+    refuses(message, find_invariant_curves, load("paper_m2"), starts, "1/20", steps)
 
 
 def test_a_system_without_normal_form_is_refused_with_the_reason():
@@ -167,8 +165,7 @@ def test_a_system_without_normal_form_is_refused_with_the_reason():
         (load("planar_cubic_hamiltonian"), "not a homogeneous cubic"),
         (repeated, "chi has a repeated root"),
     ):
-        with pytest.raises(HypothesisError, match=reason):
-            find_invariant_curves(file, [[1] * file.dim], "1/20", 5)
+        refuses(reason, find_invariant_curves, file, [[1] * file.dim], "1/20", 5, error=HypothesisError)
 
 
 def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_color_in_all_panels(curves):

@@ -104,8 +104,7 @@ def test_a_start_that_goes_to_infinity_has_the_conic_as_its_curve_and_where_all_
 
 
 def test_the_flow_moves_on_the_level_of_h():
-    cubic = PlaneCubic(FORMS["one line"], 0.5, 0.2, 1.0)
-    u, v = vertices(cubic.flow_through(1.0, 0.5))
+    u, v = vertices(PlaneCubic(FORMS["one line"], 0.5, 0.2, 1.0).flow_through(1.0, 0.5))
     assert u**3 + 3 * u * v * v == pytest.approx(1.75)
 
 

@@ -204,8 +204,7 @@ def test_eigenvalues_tell_the_kind(rhs, kind):
 
 def test_arrows_have_the_direction_of_the_field_along_the_axes_as_they_are_drawn():
     flow = plane_flow(planar("x", "-y"), (1, 0), BOX)  # y to the right
-    to_the_right = flow.places[:, 0] > 0
-    assert (flow.arrows[to_the_right, 0] < 0).all()
+    assert (flow.arrows[flow.places[:, 0] > 0, 0] < 0).all()
     lengths = np.linalg.norm(flow.arrows, axis=1)
     assert np.allclose(lengths[lengths > 0], 1)
     assert (lengths == 0).sum() == 1, "the saddle"

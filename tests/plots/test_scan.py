@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from helpers import refuses
 
 from kahanmaps.documents.files import parse_system
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.scan.scan import scan
 from kahanmaps.plots.figures import label_of
 from kahanmaps.plots.scan import plot_scan
@@ -67,8 +67,7 @@ def test_a_scan_without_conditions_is_an_empty_plane_and_one_of_another_dimensio
         scan(parse_system(PLANE), over, terms=1, primes=[5, 7, 11], effort=-20) for over in (["a", "b"], ["a"])
     )
     assert plot_scan(none).legends == []
-    with pytest.raises(InputError, match="expected two parameters"):
-        plot_scan(line)
+    refuses("expected two parameters", plot_scan, line)
 
 
 def test_the_plane_modulo_a_prime_has_every_slow_member(scanned):
@@ -78,5 +77,4 @@ def test_the_plane_modulo_a_prime_has_every_slow_member(scanned):
     assert sorted(drawn) == sorted(sweep.special)
     a, b = {text.get_text(): text.xy for text in axes.texts}[label_of("2*a*b - a - b = 0")]
     assert (2 * a * b - a - b) % 13 == 0
-    with pytest.raises(InputError, match="expected one modulo which all members were tried: 11, 13, 17"):
-        plot_scan(scanned, modulo=19)
+    refuses("expected one modulo which all members were tried: 11, 13, 17", plot_scan, scanned, modulo=19)

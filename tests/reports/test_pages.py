@@ -9,6 +9,7 @@ from importlib import resources
 import pytest
 from fontTools.pens.boundsPen import BoundsPen
 from fontTools.ttLib import TTFont
+from helpers import refuses
 from page_helpers import Page, letters_of_formulas, letters_of_the_font, require_sound
 from search_helpers import analysis_of
 
@@ -111,8 +112,7 @@ def test_without_the_extra_it_is_said_what_to_install(volterra, monkeypatch, lib
     monkeypatch.setitem(sys.modules, library, None)
     monkeypatch.setitem(sys.modules, f"{library}.converter", None)
     page_template.cache_clear()
-    with pytest.raises(InputError, match=r"pip install 'kahanmaps\[report\]'"):
-        report_html(volterra)
+    refuses(r"pip install 'kahanmaps\[report\]'", report_html, volterra)
 
 
 def test_without_matplotlib_the_page_says_what_to_install(volterra, monkeypatch):
@@ -215,8 +215,7 @@ def test_a_page_names_the_second_system_its_eps_and_an_orbit_that_ended_early():
 
 @pytest.mark.parametrize("wrong", [[], "text", [1], 7.0])
 def test_other_things_are_refused(wrong):
-    with pytest.raises((InputError, TypeError), match=r"expected an Analysis|not iterable"):
-        report_html(wrong)
+    refuses(r"expected an Analysis|not iterable", report_html, wrong, error=(InputError, TypeError))
 
 
 def test_a_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch, volterra):

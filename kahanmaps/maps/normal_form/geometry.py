@@ -9,7 +9,7 @@ the level sets", has the proofs.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -168,24 +168,18 @@ def geometry(
 
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:
     """Return the geometry for a system whose normal form is known; otherwise like `geometry`."""
-    form: Any = getattr(normal_form, "form", normal_form)
-    T = getattr(normal_form, "T", None)
-    point = [QQ.convert(x) for x in start]
-    exact = Splitting(form, QQ, eps, T)
     planes = []
-    for plane, triple in zip(exact.planes, exact.triples(point), strict=True):
-        kind, gamma = classify(plane.block, triple)
+    for name, kind, gamma, rotations in _levels(normal_form, eps, start):
         if kind is not PeriodKind.SMOOTH:
-            planes.append(PlaneGeometry(plane.name, kind))
+            planes.append(PlaneGeometry(name, kind))
             continue
         delta = 1 - gamma
         order, reason = torsion_order(gamma)
         height = None
         if isinstance(gamma, fmpq) and max(gamma.height_bits(), 1) <= _LONGEST_HEIGHT:
             height = 0.0 if order is not None else canonical_height(gamma)
-        rotations = rotations_of(gamma, plane.block.discriminant, plane.block.h(*triple[:2]), plane.name)
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
-        planes.append(PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, height, rotations))
+        planes.append(PlaneGeometry(name, kind, delta, gamma, j, order, reason, height, rotations))
     heights = [plane.height for plane in planes if plane.kind is not PeriodKind.FIXED]
     # A plane cubic is embedded by a divisor of degree 3, and heights of the planes add up: docs/mathematics.md.
     constant = None
@@ -199,15 +193,21 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 
     Raises PrecisionLost if a level is almost singular.
     """
+    return {rotation.root: rotation for *_, of_plane in _levels(normal_form, eps, start) for rotation in of_plane}
+
+
+def _levels(
+    normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
+) -> Iterator[tuple[str, PeriodKind, Any, tuple[Rotation, ...]]]:
+    """Return for each plane its name, the kind of the level curve, gamma, and the rotations on a smooth one."""
     form: Any = getattr(normal_form, "form", normal_form)
     exact = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
-    rotations: dict[str, Rotation] = {}
     for plane, triple in zip(exact.planes, exact.triples([QQ.convert(x) for x in start]), strict=True):
         kind, gamma = classify(plane.block, triple)
+        rotations: tuple[Rotation, ...] = ()
         if kind is PeriodKind.SMOOTH:
-            of_plane = rotations_of(gamma, plane.block.discriminant, plane.block.h(*triple[:2]), plane.name)
-            rotations |= {rotation.root: rotation for rotation in of_plane}
-    return rotations
+            rotations = rotations_of(gamma, plane.block.discriminant, plane.block.h(*triple[:2]), plane.name)
+        yield plane.name, kind, gamma, rotations
 
 
 def _text(x: Any) -> str:

@@ -37,7 +37,7 @@ from kahanmaps.maps.orbits.iteration import (
 )
 from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
-from kahanmaps.maps.values import point_by_names
+from kahanmaps.maps.values import is_float_value, point_by_names
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.version import __version__
 
@@ -125,7 +125,12 @@ def orbit(
     if start is None:
         raise InputError("found the initial point None, expected x0=[...], a sequence of exact numbers")
     if not is_float:
-        _require_exact(start, eps, time_step, h)
+        named = start.values() if isinstance(start, Mapping) else start if hasattr(start, "__len__") else ()
+        for x in filter(is_float_value, (*named, eps, time_step, h)):
+            try:
+                rational(x)
+            except InexactNumber as error:
+                raise InexactNumber(f"{error}; or exact=False, for an orbit in floating point") from None
     eps = resolve_eps(eps, time_step, h, floats=is_float)
     if (steps is None) == (at is None):
         raise InputError("expected either steps=, the number of steps, or at=, the requested iterates")
@@ -186,19 +191,6 @@ def orbit(
             bits, remark = _FALLBACK_BITS, str(error)
         arithmetic = Arithmetic("ball", bits)
     return Trajectory(request.by(chosen.name, used, arithmetic), request, arithmetic, chosen, remark)
-
-
-def _require_exact(start: Any, *numbers: Any) -> None:
-    """Raise InexactNumber for floats, with both ways out: exact numbers, or an orbit in floating point."""
-    for x in (
-        *(start.values() if isinstance(start, Mapping) else start if hasattr(start, "__len__") else ()),
-        *numbers,
-    ):
-        if isinstance(x, float) or getattr(getattr(x, "dtype", None), "kind", "") == "f":
-            try:
-                rational(x)
-            except InexactNumber as error:
-                raise InexactNumber(f"{error}; or exact=False, for an orbit in floating point") from None
 
 
 class OrbitRequest(NamedTuple):
