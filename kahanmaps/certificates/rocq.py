@@ -374,7 +374,33 @@ class _Script:
         for i, row in enumerate(self.data.derivative):
             lines += [f"Definition l{i + 1}{j + 1} : R := {self.text(entry)}." for j, entry in enumerate(row)]
             names += [f"l{i + 1}{j + 1}" for j in range(len(row))]
+        old, new, n = " ".join(self.old), self.new, self.data.dim
+        for i, difference in enumerate(self.data.residuals, 1):
+            terms = " + ".join(f"m{i}{k + 1} * {y}" for k, y in enumerate(new))
+            used = " ".join(f"m{i}{k + 1}" for k in range(n))
+            lines += [
+                f"Definition e{i} ({old} : R) : R := {self.text(difference)}.",
+                f"Lemma residual{i} : e{i} {old} = r{i} - ({terms}).",
+                f"Proof. cbv delta [e{i} r{i} {used}] beta; ring. Qed.",
+            ]
+            for s in range(n):
+                lines += self.slope(f"e{i}", difference, s, f"l{i}{s + 1}")
         return lines, " ".join(names)
+
+    def slope(self, function: str, P: fmpq_mpoly, s: int, name: str) -> list[str]:
+        """The lemma that d, with this name, is a derivative: P(x + t e_s) = P(x) + t d + t^2 times a polynomial."""
+        names, spare, old = names_of(P), "t_", " ".join(self.old)
+        context = ring((*names, "".join(names) + "_"))  # t may be a variable: a name longer than all others
+        *letters, t = context.gens()
+        moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
+        at = [polynomial.compose(*letters, ctx=context) for polynomial in (P, P.derivative(s))]
+        rest = polynomial_text((moved - at[0] - t * at[1]) / t**2, [*(self.letters[x] for x in names), spare])
+        point = " ".join(f"({x} + {spare})" if k == s else x for k, x in enumerate(self.old))
+        return [
+            f"Lemma derivative_{function}_{s + 1} : forall {spare}, exists rest,",
+            f"  {function} {point} = {function} {old} + {spare} * {name} + {spare} ^ 2 * rest.",
+            f"Proof. intro {spare}. exists ({rest}). cbv delta [{function} {name}] beta; ring. Qed.",
+        ]
 
     def poisson(self, claim: InvariantTensor, theorem: str) -> list[str]:
         """The theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
@@ -433,29 +459,13 @@ class _Script:
         return lines
 
     def _jacobi(self, claim: InvariantTensor, names: dict[tuple[int, int], str], theorem: str) -> list[str]:
-        """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3.
-
-        Lemmas define the derivatives: the value at x + t e_s is that at x, plus t d, plus t^2 times a polynomial.
-        """
+        """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3."""
         old, lines = " ".join(self.old), list[str]()
         functions = {names[pair]: P for pair, P in claim.upper.items()} | {"den": claim.denominator}
-        context, spare = ring((*names_of(claim.denominator), "t")), "t_"
-        *letters, t = context.gens()
         for name, P in functions.items():
             for s in range(claim.dim):
-                moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
-                slope = P.derivative(s)
-                at = [P.compose(*letters, ctx=context), slope.compose(*letters, ctx=context)]
-                rest = polynomial_text(
-                    (moved - at[0] - t * at[1]) / t**2, [*(self.letters[x] for x in names_of(P)), spare]
-                )
-                point = " ".join(f"({x} + {spare})" if k == s else x for k, x in enumerate(self.old))
-                lines += [
-                    f"Definition {name}_{s + 1} : R := {self.text(slope)}.",
-                    f"Lemma derivative_{name}_{s + 1} : forall {spare}, exists rest,",
-                    f"  {name} {point} = {name} {old} + {spare} * {name}_{s + 1} + {spare} ^ 2 * rest.",
-                    f"Proof. intro {spare}. exists ({rest}). cbv delta [{name} {name}_{s + 1}] beta; ring. Qed.",
-                ]
+                lines.append(f"Definition {name}_{s + 1} : R := {self.text(P.derivative(s))}.")
+                lines += self.slope(name, P, s, f"{name}_{s + 1}")
         used = " ".join([*functions, *(f"{name}_{s + 1}" for name in functions for s in range(claim.dim))])
 
         def entry(i: int, j: int, ending: str) -> str:
