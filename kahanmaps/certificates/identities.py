@@ -81,8 +81,8 @@ class MapData:
         return tuple(zip(*columns, strict=True))
 
     @cached_property
-    def derivative(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
-        """L, the derivative of r - M x~ in x at fixed x~, in the variables, `new`, the symbols and eps."""
+    def residuals(self) -> tuple[fmpq_mpoly, ...]:
+        """r - M x~, in the variables, `new`, the symbols and eps."""
         n = self.dim
         context = ring((*self.variables, *self.new, *self.names[n:]))
         letters = context.gens()
@@ -91,7 +91,12 @@ class MapData:
         for row in self.rows:
             *entries, right = (entry.compose(*old, ctx=context) for entry in row)
             residuals.append(right - sum((e * y for e, y in zip(entries, new, strict=True)), context.constant(0)))
-        return tuple(tuple(residual.derivative(j) for j in range(n)) for residual in residuals)
+        return tuple(residuals)
+
+    @cached_property
+    def derivative(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+        """L, the derivative of r - M x~ in x at fixed x~."""
+        return tuple(tuple(residual.derivative(j) for j in range(self.dim)) for residual in self.residuals)
 
     def at_points(self, *functions: fmpq_mpoly) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
         """The functions of x as functions of x and of x~, in the ring of `derivative`."""
