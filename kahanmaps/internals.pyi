@@ -59,7 +59,7 @@ from .documents.files import parse_system as parse_system
 from .documents.inline import inline_file as inline_file
 from .documents.iterates import iterates_in as iterates_in
 from .documents.iterates import with_iterates as with_iterates
-from .documents.structured_facts import KEYS as KEYS
+from .documents.structured_facts import FACT_KEYS as FACT_KEYS
 from .documents.structured_facts import relations as relations
 from .documents.tensor import tensor_file as tensor_file
 from .errors import InputError as InputError

@@ -12,7 +12,7 @@ from flint import fmpq
 
 import kahanmaps as km
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.integrals_and_densities import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.languages.convert import convert
 
 # Reserved or special somewhere: I, E, S, N, C, D, O, Q, gamma, beta, Pi, lambda, end, _x, a_1 next to a1, point.

@@ -19,7 +19,7 @@ from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
 from kahanmaps.checks.settings import Settings
-from kahanmaps.invariants.phase_functions import ClaimedDensity, ClaimedIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.integrals_and_densities import ClaimedDensity, ClaimedIntegral, ModifiedHamiltonian
 from kahanmaps.invariants.poisson import HamiltonianTensor
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.preserve.darboux import affine_functions

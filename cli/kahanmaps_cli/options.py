@@ -72,29 +72,32 @@ parameter_option: Callable[[F], F] = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     callback=_split_pairs,
-    help="Set parameters of the system, e.g. a=2/3 or a=1,b=2; orbit, degrees and the checks also accept algebraic "
-    "numbers: a='root of t^2 - 2', a='sqrt(2)'. Repeatable.",
+    help="Set parameters of the system, e.g. a=2/3 or a=1,b=2; most commands also accept an algebraic "
+    "number: a='root of t^2 - 2', a='sqrt(2)'. Repeatable.",
 )
 
 inline_options: Callable[[F], F] = stack(
-    click.option("--vars", "variables", metavar="X,Y,...", help="Variables of an inline system or map."),
+    click.option(
+        "--vars", "variables", metavar="X,Y,...", help="Variables of a system or map given on the command line."
+    ),
     click.option(
         "--rhs",
         multiple=True,
         metavar="EXPR",
-        help="Right-hand side of an inline system, repeated for each variable; or \"x' = x*y; y' = -x\".",
+        help="Right-hand side of a system given on the command line, repeated for each variable; or all equations: "
+        "\"x' = x*y; y' = -x\".",
     ),
     click.option(
         "--image",
         multiple=True,
         metavar="EXPR",
-        help="Component of an inline map, repeated for each variable.",
+        help="Component of a map given on the command line, repeated for each variable.",
     ),
     click.option(
         "--inverse",
         multiple=True,
         metavar="EXPR",
-        help="Component of the inverse map, repeated.",
+        help="Component of the inverse of that map, repeated for each variable.",
     ),
     parameter_option,
 )
@@ -193,7 +196,8 @@ check_options: Callable[[F], F] = stack(
         "--start",
         type=PointText(True),
         metavar="X",
-        help="Initial point of the exact test orbit (default: random); may contain t with -p 't = root of ...'.",
+        help="Initial point of the exact test orbit (default: random); its coordinates may be polynomials in an "
+        "algebraic number t, given by -p 't = root of ...'.",
     ),
     click.option("--steps", type=int, metavar="N", help="Number of steps of the test orbit (default 10)."),
     evidence_options,

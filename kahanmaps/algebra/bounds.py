@@ -282,10 +282,10 @@ def log2(value: fmpz | int) -> float:
 
 
 def _lcm(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the least common multiple of two products of denominators."""
+    """Return the least common multiple of two products of powers of denominators: exponents by denominator."""
     return {number: max(left.get(number, 0), right.get(number, 0)) for number in {*left, *right}}
 
 
 def _product(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
-    """Return the product of two products of denominators."""
+    """Return the product of two products of powers of denominators: exponents by denominator."""
     return {number: left.get(number, 0) + right.get(number, 0) for number in {*left, *right}}

@@ -255,7 +255,9 @@ def parse_rational_function(
     if denominator is None or not numerator.value:
         return RationalFunction(work.polynomial(numerator), work.ring.constant(1))
     # Make the denominator integral first: otherwise its normal form would take one lcm for each coefficient.
-    return RationalFunction(work.polynomial(numerator) * denominator.scale, denominator.value * denominator.scale)
+    return RationalFunction(
+        work.polynomial(numerator) * denominator.common_denominator, denominator.value * denominator.common_denominator
+    )
 
 
 def parse_constant(
@@ -306,14 +308,16 @@ _OPERAND = "expected a number, a name or '('"
 
 
 class _Polynomial(NamedTuple):
-    """A polynomial, or a number, of known size: `scale` times it has integer coefficients of size at most 2**bits.
+    """A polynomial, or a number, of known size.
+
+    `common_denominator` times it has integer coefficients of absolute value at most 2**bits.
 
     FLINT keeps one common denominator for all coefficients, so this is the size of FLINT's representation as well.
     Numbers are fmpq, which is much faster than constant polynomials.
     """
 
     value: Any
-    scale: fmpz
+    common_denominator: fmpz
     bits: int
     terms: int = 1
     degree: int = 0
@@ -504,7 +508,7 @@ class _Arithmetic:
         value = self.names.get(token)
         if value is None:
             raise self.unknown(str(token), token.start_pos)
-        self.check_bits(max(value.numerator.bits, _bits(value.numerator.scale)), token.start_pos)
+        self.check_bits(max(value.numerator.bits, _bits(value.numerator.common_denominator)), token.start_pos)
         return value
 
     def sum(self, pieces: list[Any]) -> _Quotient:
@@ -590,7 +594,7 @@ class _Arithmetic:
             raise self.error_at("found a division by 0", column)
         number = _constant(_Quotient(numerator, None))
         if number is not None:
-            return _Quotient(self.scaled(denominator, 1 / number, column), None)
+            return _Quotient(self.times_number(denominator, 1 / number, column), None)
         if not self.quotients:
             raise self.error_at("found a division by something with variables in it, expected a polynomial", column)
         leading = numerator.value.leading_coefficient()
@@ -598,21 +602,23 @@ class _Arithmetic:
             return _Quotient(denominator, numerator)
         # Make the leading coefficient 1, so that denominators which differ by a constant become equal.
         self.spend(numerator.terms, numerator.bits, column)
-        monic = numerator._replace(value=numerator.value / leading, scale=abs((leading * numerator.scale).p))
-        return _Quotient(self.scaled(denominator, 1 / leading, column), monic)
+        monic = numerator._replace(
+            value=numerator.value / leading, common_denominator=abs((leading * numerator.common_denominator).p)
+        )
+        return _Quotient(self.times_number(denominator, 1 / leading, column), monic)
 
     def negative(self, value: _Quotient, column: int) -> _Quotient:
-        return _Quotient(self.scaled(value.numerator, fmpq(-1), column), value.denominator)
+        return _Quotient(self.times_number(value.numerator, fmpq(-1), column), value.denominator)
 
     # Arithmetic of numbers and polynomials: estimate the size, then raise an error or compute.
 
     def add(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
-        scale = left.scale
+        scale = left.common_denominator
         bits = max(left.bits, right.bits) + 1
-        if left.scale != right.scale:
-            scale = left.scale.lcm(right.scale)
+        if left.common_denominator != right.common_denominator:
+            scale = left.common_denominator.lcm(right.common_denominator)
             size = _bits(scale)
-            bits = 2 + max(side.bits + size - side.scale.bit_length() for side in (left, right))
+            bits = 2 + max(side.bits + size - side.common_denominator.bit_length() for side in (left, right))
             self.check_bits(size, column)
         self.check_bits(bits, column)
         self.spend(left.terms + right.terms, bits, column)
@@ -624,30 +630,32 @@ class _Arithmetic:
         self.check_degree(left.degree + right.degree, "a product", column)
         pairs = left.terms * right.terms
         bits = left.bits + right.bits + (max(1, min(left.terms, right.terms)) - 1).bit_length()
-        self.check_bits(max(bits, _bits(left.scale) + _bits(right.scale)), column)
+        self.check_bits(max(bits, _bits(left.common_denominator) + _bits(right.common_denominator)), column)
         bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
             given = f"found a product of polynomials with {left.terms} and {right.terms} terms"
             raise self.error_at(f"{given}, which is too large to expand", column)
         self.spend(pairs, bits_of_pair, column)
-        return self.counted(left.value * right.value, left.scale * right.scale, bits, column)
+        return self.counted(left.value * right.value, left.common_denominator * right.common_denominator, bits, column)
 
-    def scaled(self, value: _Polynomial, number: fmpq, column: int) -> _Polynomial:
+    def times_number(self, value: _Polynomial, number: fmpq, column: int) -> _Polynomial:
         if number == 1:
             return value
         bits = value.bits + _bits(number.p)
-        self.check_bits(max(bits, _bits(value.scale) + _bits(number.q)), column)
+        self.check_bits(max(bits, _bits(value.common_denominator) + _bits(number.q)), column)
         self.spend(value.terms, bits, column)
-        return value._replace(value=value.value * number, scale=value.scale * number.q, bits=bits)
+        return value._replace(
+            value=value.value * number, common_denominator=value.common_denominator * number.q, bits=bits
+        )
 
     def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
         """Compute the n-th power by squaring, n > 0; each product is checked."""
         self.check_degree(value.degree * n, "a power", column)
         if value.terms == 1:
             bits = value.bits * n
-            self.check_bits(max(bits, _bits(value.scale) * n), column)
+            self.check_bits(max(bits, _bits(value.common_denominator) * n), column)
             self.spend(1, bits, column)
-            return _Polynomial(value.value**n, value.scale**n, bits, 1, value.degree * n)
+            return _Polynomial(value.value**n, value.common_denominator**n, bits, 1, value.degree * n)
         result = value
         for digit in f"{n:b}"[1:]:
             result = self.times(result, result, column)

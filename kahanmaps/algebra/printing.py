@@ -148,7 +148,7 @@ def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _
     ('-2*(x + y)^2/(3*y*(x - 1)^3)', 'x + y')
     """
     parts = []
-    for number, powers in sides(factors, constant):
+    for number, powers in numerator_and_denominator(factors, constant):
         bases = [(f"({format_polynomial(g)})" if len(g) > 1 else format_polynomial(g), k) for g, k in powers]
         powers_text = [base + (f"^{k}" if k > 1 else "") for base, k in bases]
         parts.append(([str(number)] if number > 1 else []) + powers_text)
@@ -161,8 +161,13 @@ def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _
     return f"{sign}{numerator or 1}/({denominator})" if len(parts[1]) > 1 else f"{sign}{numerator or 1}/{denominator}"
 
 
-def sides(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq) -> list[tuple[int, list[tuple[fmpq_mpoly, int]]]]:
-    """Return, for numerator and denominator of a product, the positive integer and the powers, short ones first."""
+def numerator_and_denominator(
+    factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq
+) -> list[tuple[int, list[tuple[fmpq_mpoly, int]]]]:
+    """Return numerator and denominator of a product.
+
+    Each is a positive integer and powers (polynomial, exponent), short polynomials first.
+    """
 
     def size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
         return len(power[0]), [-int(e) for e in power[0].monoms()[0]]
@@ -251,8 +256,12 @@ class Notation:
             numerator, denominator = map(self.polynomial, parts)
             is_polynomial = parts[1].is_one()
         else:
-            is_negative, (upper, lower) = factored[1] < 0, sides(*factored)
-            numerator, denominator, is_polynomial = self._product(*upper), self._product(*lower), lower == (1, [])
+            is_negative, (numerator_factors, denominator_factors) = (
+                factored[1] < 0,
+                numerator_and_denominator(*factored),
+            )
+            numerator, denominator = self._product(*numerator_factors), self._product(*denominator_factors)
+            is_polynomial = denominator_factors == (1, [])
         absolute = numerator if is_polynomial else self.fraction(numerator, denominator)
         return self.row(self.signs[0] + absolute) if is_negative else absolute
 
@@ -348,10 +357,10 @@ NUMBER = re.compile(r"[+-]?(?:[0-9]+/0*[1-9][0-9]*|(?:[0-9]+(?:\.[0-9]*)?|\.[0-9
 _FORMULA = re.compile(r"'*[=+\-@\t\r\n]")
 
 
-def guarded(text: str) -> str:
+def spreadsheet_safe(text: str) -> str:
     """Add an apostrophe to text that a spreadsheet would run as a formula; numbers stay unchanged.
 
-    >>> [guarded(text) for text in ("-3", "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
+    >>> [spreadsheet_safe(text) for text in ("-3", "-1/2", "=HYPERLINK(1)", "-x", "'-x")]
     ['-3', '-1/2', "'=HYPERLINK(1)", "'-x", "''-x"]
     """
     return "'" + text if _FORMULA.match(text) and not NUMBER.fullmatch(text) else text

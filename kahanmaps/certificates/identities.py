@@ -81,10 +81,14 @@ class MapData:
         return tuple(zip(*columns, strict=True))
 
     @cached_property
+    def residuals(self) -> tuple[fmpq_mpoly, ...]:
+        """r - M x~, in the ring of `two_points`."""
+        return tuple(-residual for residual in self.residual(self.two_points, 0, self.dim))
+
+    @cached_property
     def derivative(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
-        """L, the derivative of r - M x~ in x at fixed x~, in the variables, `new`, the symbols and eps."""
-        residuals = self.residual(self.two_points, 0, self.dim)
-        return tuple(tuple(-residual.derivative(j) for j in range(self.dim)) for residual in residuals)
+        """L, the derivative of r - M x~ in x at fixed x~."""
+        return tuple(tuple(residual.derivative(j) for j in range(self.dim)) for residual in self.residuals)
 
     @property
     def two_points(self) -> tuple[str, ...]:

@@ -370,8 +370,33 @@ class _Script:
         lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
         names = [name for row in entries("l", self.data.dim) for name in row]
         flat = [entry for row in self.data.derivative for entry in row]
-        definitions = [f"Definition {name} : R := {self.text(L)}." for name, L in zip(names, flat, strict=True)]
-        return [*lines, *definitions], " ".join(names)
+        lines += [f"Definition {name} : R := {self.text(L)}." for name, L in zip(names, flat, strict=True)]
+        for i, difference in enumerate(self.data.residuals, 1):
+            terms = " + ".join(f"m{i}{k + 1} * {y}" for k, y in enumerate(self.new))
+            used = " ".join(f"m{i}{k + 1}" for k in range(self.data.dim))
+            lines += [
+                f"Definition e{i} ({self.x} : R) : R := {self.text(difference)}.",
+                f"Lemma residual{i} : e{i} {self.x} = r{i} - ({terms}).",
+                f"Proof. cbv delta [e{i} r{i} {used}] beta; ring. Qed.",
+            ]
+            for s in range(self.data.dim):
+                lines += self.slope(f"e{i}", difference, s, f"l{i}{s + 1}")
+        return lines, " ".join(names)
+
+    def slope(self, function: str, P: fmpq_mpoly, s: int, name: str) -> list[str]:
+        """The lemma that d, with this name, is a derivative: P(x + t e_s) = P(x) + t d + t^2 times a polynomial."""
+        names, spare, old = names_of(P), "t_", " ".join(self.old)
+        context = ring((*names, "".join(names) + "_"))  # t may be a variable: a name longer than all others
+        *letters, t = context.gens()
+        moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
+        at = [polynomial.compose(*letters, ctx=context) for polynomial in (P, P.derivative(s))]
+        rest = polynomial_text((moved - at[0] - t * at[1]) / t**2, [*(self.letters[x] for x in names), spare])
+        point = " ".join(f"({x} + {spare})" if k == s else x for k, x in enumerate(self.old))
+        return [
+            f"Lemma derivative_{function}_{s + 1} : forall {spare}, exists rest,",
+            f"  {function} {point} = {function} {old} + {spare} * {name} + {spare} ^ 2 * rest.",
+            f"Proof. intro {spare}. exists ({rest}). cbv delta [{function} {name}] beta; ring. Qed.",
+        ]
 
     def poisson(self, claim: InvariantTensor, theorem: str) -> list[str]:
         """The theorems L T(x) L^T = M T(x~) M^T, entry by entry, and the Jacobi identities."""
@@ -429,28 +454,12 @@ class _Script:
     def jacobi(
         self, claim: InvariantTensor, names: Mapping[Any, str], functions: Mapping[str, fmpq_mpoly], theorem: str
     ) -> list[str]:
-        """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3.
-
-        Lemmas define the derivatives: the value at x + t e_s is that at x, plus t d, plus t^2 times a polynomial.
-        """
+        """The Jacobi identities for all i < j < k: T_is d/dx_s T_jk, summed cyclically, times den^3."""
         old, lines = self.x, list[str]()
-        context, spare = ring((*names_of(claim.denominator), "t")), "t_"
-        *letters, t = context.gens()
         for name, P in functions.items():
             for s in range(claim.dim):
-                moved = P.compose(*letters[:s], letters[s] + t, *letters[s + 1 :], ctx=context)
-                slope = P.derivative(s)
-                at = [P.compose(*letters, ctx=context), slope.compose(*letters, ctx=context)]
-                rest = polynomial_text(
-                    (moved - at[0] - t * at[1]) / t**2, [*(self.letters[x] for x in names_of(P)), spare]
-                )
-                point = " ".join(f"({x} + {spare})" if k == s else x for k, x in enumerate(self.old))
-                lines += [
-                    f"Definition {name}_{s + 1} : R := {self.text(slope)}.",
-                    f"Lemma derivative_{name}_{s + 1} : forall {spare}, exists rest,",
-                    f"  {name} {point} = {name} {old} + {spare} * {name}_{s + 1} + {spare} ^ 2 * rest.",
-                    f"Proof. intro {spare}. exists ({rest}). cbv delta [{name} {name}_{s + 1}] beta; ring. Qed.",
-                ]
+                lines.append(f"Definition {name}_{s + 1} : R := {self.text(P.derivative(s))}.")
+                lines += self.slope(name, P, s, f"{name}_{s + 1}")
         used = " ".join([*functions, *(f"{name}_{s + 1}" for name in functions for s in range(claim.dim))])
 
         def entry(i: int, j: int, ending: str) -> str:

@@ -46,6 +46,7 @@ _PARI_TOOLS = {
     "scale": "scale(c, A) = c*A;",
     "act": "act(A, v) = (A*v~)~;",
     "dot": "dot(v, w) = v*w~;",  # concat is a function of PARI
+    "derivative": "derivative(v, letters) = matrix(#v, #letters, i, j, deriv(v[i], letters[j]));",
     "bracket": """\
 bracket(P, Q, i, j, k) = {  \\\\ Q^3 times the sum of T_is d/dx_s T_jk over s, T = P/Q
   sum(s = 1, n, P[i+1,s]*(deriv(P[j+1,k+1], old[s])*Q - P[j+1,k+1]*deriv(Q, old[s])));
@@ -121,6 +122,9 @@ def concat(v, w):
     "dot": """\
 def dot(v, w):
     return sum((a * b for a, b in zip(v, w)), R.zero)""",
+    "derivative": """\
+def derivative(v, letters):
+    return [[a.diff(letter) for letter in letters] for a in v]""",
     "bracket": """\
 def bracket(P, Q, i, j, k):  # Q^3 times the sum of T_is d/dx_s T_jk over s, T = P/Q
     return sum((P[i][s] * (P[j][k].diff(old[s]) * Q - P[j][k] * Q.diff(old[s])) for s in range(n)), R.zero)""",
@@ -311,10 +315,15 @@ class _Script:
         self.polynomial("C", claim.cofactor)
         self.check(f"{label}: D^k P(N/D) = C P", f"image(P, {claim.degree}, old) == C*P")
 
+    def derivative(self, label: str) -> None:
+        """L, the derivative of r - M x~ in x at fixed x~; that of the map is M^-1 L."""
+        self.define("L", self.polynomials(self.data.derivative))
+        self.check(f"{label}: L is the derivative of r - M x~ in x", "derivative(scale(-1, E), old) == L")
+
     @prove.register
     def volume(self, claim: InvariantVolume, label: str) -> None:
         self.fraction(claim)
-        self.define("L", self.polynomials(self.data.derivative))
+        self.derivative(label)
         says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
         if claim.is_free:
             identity = "put(P, old, new)*Q*det(M) == P*put(Q, old, new)*det(L)"
@@ -339,7 +348,7 @@ class _Script:
         self.define("P", self.polynomials([[claim.entry(i, j) for j in range(n)] for i in range(n)]))
         self.polynomial("Q", claim.denominator)
         self.check(f"{label}: P is skew", "transposed(P) == scale(-1, P)")
-        self.define("L", self.polynomials(self.data.derivative))
+        self.derivative(label)
         says = f"{label}: L(x, x~) T(x) L^T = M T(x~) M^T"
         one, other = "mul(mul({}, P), transposed({}))", "mul(mul(M, {}), transposed(M))"
         if claim.is_free:

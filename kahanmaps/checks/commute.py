@@ -108,8 +108,8 @@ def check_commute(
             raise InputError("a second step needs a second system: kahanmaps check-commute SYSTEM OTHER --eps2 E")
         if file.member is None:
             raise InputError(
-                f"{file.name} is of kind [{file.kind}], and every map commutes with itself: "
-                "give a second system, or one of kind [family], whose associated maps are compared pairwise"
+                f"found the single map of {file.name}, and every map commutes with itself: give a second system; "
+                "only a file of kind [family] is compared with its own associated maps"
             )
         return _check_member(file, file.member, settings)
     second = as_file(other)

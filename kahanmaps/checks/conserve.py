@@ -21,7 +21,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
-from kahanmaps.invariants.phase_functions import (
+from kahanmaps.invariants.integrals_and_densities import (
     ClaimedFunction,
     ClaimedIntegral,
     CommutantIntegral,

@@ -15,11 +15,11 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.settings import Settings, claimed_function, claimed_tensor, run_orbit, settings_and_claim
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.phase_functions import (
+from kahanmaps.invariants.integrals_and_densities import (
     ClaimedDensity,
     DeterminantDensity,
     PhaseFunction,
-    jacobian_determinant_sides,
+    jacobian_determinant_fraction,
 )
 from kahanmaps.invariants.poisson import (
     HamiltonianTensor,
@@ -49,7 +49,7 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
         density_after, density_before = density.value(field, eps_value, image), density.value(field, eps_value, point)
         if density_after is None or density_before is None:
             return None
-        numerator, denominator = jacobian_determinant_sides(kahan, point, image)
+        numerator, denominator = jacobian_determinant_fraction(kahan, point, image)
         if field.is_zero(numerator) or field.is_zero(denominator):
             return None  # if the map has no inverse, both sides may vanish, which says nothing about a measure
         return [density_after * denominator], [density_before * numerator]

@@ -109,9 +109,10 @@ _CHECKS = [
         """
         Without --eps the integrals are checked for every eps.
 
-        Known integrals are the modified Hamiltonian of Hamiltonian systems, in both normalizations of the paper, and
-        for members of the family the K~ of all rational associated systems. Claimed integrals are the [integrals] of
-        the file. With --integral only the given ones are checked; --integral known adds the others.
+        A Hamiltonian system has a known integral, the modified Hamiltonian, in both normalizations of the paper; a
+        member of the family also has the K~ of all rational associated systems. The section [integrals] of the file
+        claims further ones. By default all of them are checked, with --integral only the given ones. --integral known
+        stands for all known and claimed ones.
         """,
         "conserved",
         ClaimOption(
@@ -129,8 +130,8 @@ _CHECKS = [
         "Is the measure dx/phi invariant under the map of SYSTEM?",
         ("paper_m3", "lotka_volterra --eps 1/10", "--vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\\n--density x*y"),
         """
-        Without --eps the measure is checked for every eps. By default phi is det(I - eps f'(x)) for Hamiltonian
-        systems, and the [density] of the file; --density gives another phi instead.
+        Without --eps the measure is checked for every eps. By default phi is both det(I - eps f'(x)), for a Hamiltonian
+        system, and the [density] of the file, where there is one; --density gives another phi instead.
         """,
         "invariant",
         ClaimOption("--density", "EXPR", "A claimed density phi: a rational function of the variables and eps."),

@@ -18,7 +18,7 @@ from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import belongs
 from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix, minimal_degree
 from kahanmaps.family.tensor import commutes
-from kahanmaps.invariants.phase_functions import CommutantIntegral
+from kahanmaps.invariants.integrals_and_densities import CommutantIntegral
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -122,10 +122,10 @@ def _text(text: str, width: int = _TEXT) -> str:
 
 def analysis_title(analysis: Analysis) -> str:
     """The title of a report: the system, its dimension and parameters, and eps."""
-    step = eps_suffix(analysis.eps, analysis.file.map)
+    eps_text = eps_suffix(analysis.eps, analysis.file.map)
     values = "".join(f", {name} = {value}" for name, value in analysis.file.parameters.items())
     formulas = f"; formulas for every {', '.join(analysis.symbols)}" if analysis.symbols else ""
-    return f"{analysis.file.name}, dimension {analysis.dim}{values}{step}{formulas}"
+    return f"{analysis.file.name}, dimension {analysis.dim}{values}{eps_text}{formulas}"
 
 
 def analysis_head(analysis: Analysis) -> str:

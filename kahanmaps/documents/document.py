@@ -50,7 +50,7 @@ def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
 
 
 # What makes a map of right-hand sides (polynomials in the variables, symbols, then eps) and their degree, and the
-# degree: the usual one and the largest.
+# degree: the default and the largest.
 _DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], MapFamily], int, int]] = {
     "kahan": (_kahan, 2, 2),
     "polarised": (polarised_map, 3, MAX_DEGREE),
@@ -110,7 +110,7 @@ class DocumentReader(PartReader):
             self._unknown_keys("density", section)
             value = self._required("density", section, "phi")
             density = self._claim("density.phi", value) if value is not None else None
-            if density is not None and density.numerator.is_zero() and not self.unsure:
+            if density is not None and density.numerator.is_zero() and not self.has_bad_parameter:
                 self._mistake("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
         if catalog := self._table("catalog"):
             self._unknown_keys("catalog", catalog)
@@ -234,7 +234,7 @@ class DocumentReader(PartReader):
                 hint = written if isinstance(given, str) and "sqrt" in given else ""
                 self._mistake(path, f"{error}{hint}")
                 self.parameters[name] = fmpq(1)  # or each use of the parameter would be reported as a further mistake
-                self.unsure = True
+                self.has_bad_parameter = True
         if self.root is not None:
             self.symbols = (self.root[0],)
         declared = self.document.get("parameters", {})
@@ -283,16 +283,16 @@ class DocumentReader(PartReader):
         if method not in _DISCRETIZATIONS:
             allowed = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
             return self._refused("system.discretization", f"found {show(method)}, expected one of {allowed}")
-        make, usual, largest = _DISCRETIZATIONS[method]
-        degree = section.get("degree", usual)
+        make, default_degree, largest = _DISCRETIZATIONS[method]
+        degree = section.get("degree", default_degree)
         if type(degree) is not int or not 2 <= degree <= largest:
             return self._refused("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
         formulas = self._required("system", section, "rhs")
         right_sides = self._each("system.rhs", formulas, lambda path, value: self._polynomial(path, value, degree))
         rhs = self._list("system", "rhs", formulas, "right-hand side")
-        if rhs is None or right_sides is None or self.variables is None or self.unsure:
+        if rhs is None or right_sides is None or self.variables is None or self.has_bad_parameter:
             return None
-        return self._made("system.rhs", make, right_sides, degree)
+        return self._try_make("system.rhs", make, right_sides, degree)
 
     def _read_bilinear(self, section: Mapping[str, Any]) -> MapFamily | None:
         new = section.get("new", [name.upper() for name in self.variables or ()])
@@ -315,9 +315,9 @@ class DocumentReader(PartReader):
             return None if old_side is None or new_side is None else old_side - new_side
 
         polynomials = self._each("bilinear.equations", formulas, equation)
-        if polynomials is None or self.unsure:
+        if polynomials is None or self.has_bad_parameter:
             return None
-        return self._sound(bilinear_map, "bilinear", self.variables, polynomials)
+        return self._checked_map(bilinear_map, "bilinear", self.variables, polynomials)
 
     def _read_map(self, section: Mapping[str, Any]) -> MapFamily | None:
         self._required("map", section, "image")
@@ -325,13 +325,18 @@ class DocumentReader(PartReader):
             self._each(f"map.{key}", self._list("map", key, section.get(key), "function"), self._claim) or None
             for key in ("image", "inverse")
         )
-        if image is None or self.variables is None or self.unsure or ("inverse" in section and inverse is None):
+        if (
+            image is None
+            or self.variables is None
+            or self.has_bad_parameter
+            or ("inverse" in section and inverse is None)
+        ):
             return None
-        return self._sound(explicit_map, "map", self.variables, image, inverse)
+        return self._checked_map(explicit_map, "map", self.variables, image, inverse)
 
-    def _sound(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
+    def _checked_map(self, make: Callable[..., ImplicitMap], path: str, *arguments: Any) -> ImplicitMap | None:
         """Return the map if it is defined and dominant, and a given inverse is right; otherwise note a mistake."""
-        map_ = self._made(path, make, *arguments)
+        map_ = self._try_make(path, make, *arguments)
         if map_ is None:
             return None
         if reason := why_no_map(map_, None if self.root is None else self.root[1]):
@@ -347,15 +352,15 @@ class DocumentReader(PartReader):
         n = len(self.variables) if self.variables is not None else None
         J: fmpq_mat | None = None
         if matrix == "standard":
-            J = None if n is None else self._made("hamiltonian.J", standard_structure, n)
+            J = None if n is None else self._try_make("hamiltonian.J", standard_structure, n)
         elif isinstance(matrix, str):
             self._mistake("hamiltonian.J", f'found {show(matrix)}, expected "standard" or a skew matrix')
         else:
             J = self._matrix("hamiltonian.J", matrix, n)
-        if J is None or self.variables is None or self.unsure:
+        if J is None or self.variables is None or self.has_bad_parameter:
             return None
         zero = parse_polynomial("0", self.variables)
-        hamiltonian = self._made("hamiltonian.J", CubicHamiltonian, zero if H is None else H, J)
+        hamiltonian = self._try_make("hamiltonian.J", CubicHamiltonian, zero if H is None else H, J)
         return None if H is None else hamiltonian
 
     def _read_field(self, section: Mapping[str, Any]) -> MapFamily | None:
@@ -383,7 +388,7 @@ class DocumentReader(PartReader):
         signs_are_good = isinstance(signs, list) and all(type(sign) is int and sign in (1, -1) for sign in signs)
         if not signs_are_good:
             self._mistake("family.signs", f"found {show(signs)}, expected a list of 1 and -1")
-        if A is None or H is None or self.unsure:
+        if A is None or H is None or self.has_bad_parameter:
             return None
         try:
             from kahanmaps.family.associated import FamilyMember
@@ -404,14 +409,16 @@ class DocumentReader(PartReader):
                 self._mistake("composition.of", f"found {show(entries)}, expected {EXPECTED['composition', 'of']}")
             return None
         factors = self._each("composition.of", entries, self._part)
-        if factors is None or self.unsure:
+        if factors is None or self.has_bad_parameter:
             return None
         if sum(abs(part.power) for part in factors) > _MAX_FACTORS:
-            return self._refused("composition.of", f"found more than {_MAX_FACTORS} steps, expected at most so many")
+            return self._refused(
+                "composition.of", f"found more than {_MAX_FACTORS} steps, expected at most {_MAX_FACTORS}"
+            )
         self.document = {**self.document, "composition": {"of": [part.plain for part in factors]}}
         values = [part.values for part in factors]
         make = partial(composed_map, variables=self.variables, symbols=self.symbols, values=values)
-        return self._made("composition.of", make, *((part.map, part.power) for part in factors))
+        return self._try_make("composition.of", make, *((part.map, part.power) for part in factors))
 
     def _part(self, path: str, entry: Any) -> _Part | None:
         if not isinstance(entry, dict):
@@ -457,7 +464,10 @@ class DocumentReader(PartReader):
         return _Part(map_, -power if inverse else power, values, {"map": json_like(document), **plain})
 
     def _part_parameters(self, path: str, entry: Mapping[str, Any]) -> tuple[dict[str, fmpq], Values]:
-        """Return the values of the parameters of a part: numbers, or functions of the symbols."""
+        """Return the values that a composition gives to the parameters of one of its maps.
+
+        The first result has the rational numbers, the second one the functions of the symbols.
+        """
         numbers: dict[str, fmpq] = {}
         values: Values = {}
         parameters = entry.get("parameters", {})
@@ -465,7 +475,7 @@ class DocumentReader(PartReader):
             self._mistake(f"{path}.parameters", f"found {show(parameters)}, expected a table of numbers")
             return numbers, values
         table = entry.get("map")
-        if isinstance(table, dict) and "parameters" not in table:  # and those of the tables that contain it
+        if isinstance(table, dict) and "parameters" not in table:  # it can use the parameters of this file
             context = ring(self.symbols)
             for name, symbol in zip(self.symbols, context.gens(), strict=True):
                 values[name] = RationalFunction(symbol, context.constant(1))
@@ -474,7 +484,7 @@ class DocumentReader(PartReader):
             if text is None:
                 continue
             entry_path = f"{path}.parameters.{name}"
-            function = self._made(entry_path, parse_rational_function, text, self.symbols, self.parameters)
+            function = self._try_make(entry_path, parse_rational_function, text, self.symbols, self.parameters)
             if function is None:
                 continue
             values.pop(name, None)
@@ -491,7 +501,7 @@ class DocumentReader(PartReader):
         """Return the reader for a part of a composition."""
         self.parts[0] += 1
         if self.parts[0] > _MAX_FACTORS:
-            raise InputError(f"found more than {_MAX_FACTORS} maps in one composition, expected at most so many")
+            raise InputError(f"found more than {_MAX_FACTORS} maps in one composition, expected at most {_MAX_FACTORS}")
         name, name_or_path, other = "map", "", self.other
         if key == "map":
             if not isinstance(value, dict):

@@ -15,7 +15,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.algebra.roots import Root
 from kahanmaps.documents.iterates import parse_with_iterates
-from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
+from kahanmaps.documents.structured_facts import FACT_KEYS
 from kahanmaps.errors import InputError, UnknownName, counted, quoted, show
 from kahanmaps.maps.polarised import MAX_DEGREE
 from kahanmaps.systems.quadratic import MAX_DIMENSION
@@ -33,7 +33,7 @@ KEYS = {
     "composition": {"of"},
     "composition.of": {"file", "system", "map", "power", "inverse", "parameters", "involution"},
     "density": {"phi"},
-    "catalog": {"title", "sources", "convention", "facts", *STRUCTURED_KEYS},
+    "catalog": {"title", "sources", "convention", "facts", *FACT_KEYS},
 }
 EXPECTED = {
     ("system", "rhs"): "a list of polynomials of degree at most 2 in quotes, one for each variable",
@@ -68,7 +68,7 @@ class PartReader:
         self.parts = [0]  # how many were read in all
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
-        self.unsure = False  # a parameter could not be read: parts that depend on it are not checked
+        self.has_bad_parameter = False  # a parameter could not be read: what depends on it is not checked
         self.variables: tuple[str, ...] | None = None
         self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
         self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number, which is such a symbol
@@ -82,7 +82,7 @@ class PartReader:
         self._mistake(key, sentence)
         return None
 
-    def _made(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
+    def _try_make(self, path: str, make: Callable[..., T], *arguments: Any) -> T | None:
         """Return make(*arguments); on InputError note a mistake and return None."""
         try:
             return make(*arguments)
@@ -105,32 +105,33 @@ class PartReader:
 
     def _text(self, path: str, value: Any) -> str | None:
         if isinstance(value, int | str) and not isinstance(value, bool):
-            return value if isinstance(value, str) else self._made(path, format_number, fmpq(value))
+            return value if isinstance(value, str) else self._try_make(path, format_number, fmpq(value))
         return self._refused(path, f"found {show(value)}, expected an expression in quotes")
 
     def _polynomial(
         self, path: str, value: Any, at_most: int, extra_names: Sequence[str] = (), *, of_map: bool = True
     ) -> fmpq_mpoly | None:
-        """A polynomial in the variables, `more` names and, of a map, the symbols and eps; its degree in the variables
-        is bounded.
+        """Return a polynomial in the variables, `extra_names` and, for a map, the symbols and eps.
+
+        Its degree in the variables is at most `at_most`; otherwise note a mistake and return None.
         """
         text = self._text(path, value)
         if text is None or self.variables is None:
             return None
         try:
-            tail = (*self.symbols, "eps") if of_map else ()
-            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *tail), self.parameters)
+            further_names = (*self.symbols, "eps") if of_map else ()
+            polynomial = parse_polynomial(text, (*self.variables, *extra_names, *further_names), self.parameters)
         except UnknownName as error:
             where = "in [parameters], by -p NAME=VALUE, or System(..., NAME=VALUE)"
             return self._refused(path, f"{error}\nif it is a parameter, give its value: {where}")
         except InputError as error:
             return self._refused(path, str(error))
         actual_degree = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
-        if actual_degree > at_most and not self.unsure:
+        if actual_degree > at_most and not self.has_bad_parameter:
             degree = "" if actual_degree == 3 else f" and degree = {actual_degree}"
-            polarised = f'discretization = "polarised"{degree} into [system] of a file'
-            polarised = f"\nfor a field of degree {actual_degree} write {polarised}"
-            hint = polarised if path.startswith("system.rhs") and actual_degree <= MAX_DEGREE else ""
+            keys = f'discretization = "polarised"{degree}'
+            advice = f"\nfor a field of degree {actual_degree} write {keys} into [system] of a file"
+            hint = advice if path.startswith("system.rhs") and actual_degree <= MAX_DEGREE else ""
             return self._refused(
                 path, f"found a polynomial of degree {actual_degree}, expected at most {at_most}{hint}"
             )
@@ -144,7 +145,7 @@ class PartReader:
             return self._refused(path, f"found {expected} rows, expected at most {MAX_DIMENSION}")
         bad = False
         if len(value) != expected:
-            self._mistake(path, f"found {len(value)} rows, expected {expected}")
+            self._mistake(path, f"found {counted(len(value), 'row')}, expected {expected}")
             bad = True
         entries: list[fmpq] = []
         for i, row in enumerate(value):
@@ -154,7 +155,7 @@ class PartReader:
             for j, entry in enumerate(row):
                 entry_path = f"{path}[{i + 1}][{j + 1}]"
                 text = self._text(entry_path, entry)
-                number = None if text is None else self._made(entry_path, parse_constant, text, self.parameters)
+                number = None if text is None else self._try_make(entry_path, parse_constant, text, self.parameters)
                 entries.append(fmpq(0) if number is None else number)
                 bad = bad or number is None
         return None if bad else fmpq_mat(expected, expected, entries)
@@ -191,8 +192,8 @@ class PartReader:
             return None
         others = (*self.symbols, "eps")
         if path.startswith("integrals."):
-            return self._made(path, parse_with_iterates, text, self.variables, others, self.parameters)
-        return self._made(path, parse_rational_function, text, (*self.variables, *others), self.parameters)
+            return self._try_make(path, parse_with_iterates, text, self.variables, others, self.parameters)
+        return self._try_make(path, parse_rational_function, text, (*self.variables, *others), self.parameters)
 
 
 def json_like(value: Any) -> Any:

@@ -31,7 +31,7 @@ from kahanmaps.sources import SOURCES
 
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
-KEYS = ("degrees", "growth", "dynamical_degree", "verdict", "codimension", "relations")
+FACT_KEYS = ("degrees", "growth", "dynamical_degree", "verdict", "codimension", "relations")
 MAX_MONOMIALS = 100_000
 _UP_TO = re.compile(r"degree <= ([0-9]{1,3})")
 _RELATION_KEYS = ("monomials", "dimension")

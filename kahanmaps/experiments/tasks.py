@@ -44,7 +44,7 @@ def _register_check(check: Check) -> None:
     def perform(system: SystemFile, other: SystemFile | None = None, eps2: Any = None, **options: Any) -> FullResult:
         is_requested = options["start"] is not None or options["steps"] != Settings.steps
         settings = Settings(**options, orbit_is_requested=is_requested)
-        return _of_report(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
+        return _full_result(check(system, other, settings, eps2) if check.is_of_pair else check(system, settings))
 
     perform.__doc__ = check.for_batch or check.question
     options = {"other": None, "eps": None, "eps2": None, **_CHECKED} if check.is_of_pair else _CHECKED
@@ -70,7 +70,7 @@ def verify_member(
     from kahanmaps.paper.verify import VerifyOptions, verify
 
     settings = Settings(eps=eps, seed=seed, error_bits=error_bits)
-    return _of_report(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)))
+    return _full_result(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)))
 
 
 @task("verify-universal", reports=True)
@@ -86,7 +86,7 @@ def verify_in_general(
     from kahanmaps.paper.verify import VerifyOptions, verify
 
     settings = Settings(seed=seed, error_bits=error_bits)
-    return _of_report(verify(None, settings, VerifyOptions(sections, order, None, controls), m=m))
+    return _full_result(verify(None, settings, VerifyOptions(sections, order, None, controls), m=m))
 
 
 @task("family-space", needs=MEMBER)
@@ -240,7 +240,7 @@ def _drawn(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
     return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
 
 
-def _of_report(report: Report) -> FullResult:
+def _full_result(report: Report) -> FullResult:
     """Return the verdict, the counts of verdicts, and the refuted or undecided claims with their witnesses."""
     counted = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in counted)

@@ -19,7 +19,7 @@ from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.algebra.printing import format_polynomial, format_univariate
 from kahanmaps.algebra.roots import MAX_DEGREE, Root
 from kahanmaps.display_protocols import HtmlDisplay, ResultPart
-from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.errors import HypothesisError, InputError, counted
 from kahanmaps.family.cubics import chain
 from kahanmaps.family.skew_hamiltonian import Factor, chi, evaluate_at_matrix, factors_of_chi, require_skew_hamiltonian
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -84,12 +84,12 @@ class ConjugateAssociate:
                 terms[monomial] = terms.get(monomial, 0 * coefficient) + coefficient * number
         context = self.chain[0].context()
         ordered = context.from_dict({monomial: 1 for monomial, c in terms.items() if c != 0}).monoms()
-        written = (
+        term_texts = (
             f"({format_univariate(terms[monomial].polynomial, self.name)})*"
             f"{format_polynomial(context.from_dict({monomial: 1}))}"
             for monomial in ordered
         )
-        return " + ".join(written) or "0"
+        return " + ".join(term_texts) or "0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,9 @@ class FamilyMember(HtmlDisplay, ResultPart):
     def associate(self, signs: Sequence[int]) -> AssociatedSystem:
         """Return the associated system with these signs, 1 or -1 for each factor. Raises InputError for other signs."""
         if len(signs) != len(self.factors):
-            raise InputError(f"found {len(signs)} signs, expected {len(self.factors)}, one for each factor of chi")
+            raise InputError(
+                f"found {counted(len(signs), 'sign')}, expected {len(self.factors)}, one for each factor of chi"
+            )
         if any(sign not in (1, -1) for sign in signs):
             raise InputError(f"found the signs {list(signs)}, expected numbers 1 or -1")
         polynomial = sign_polynomial(self.factors, signs)

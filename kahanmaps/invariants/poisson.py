@@ -25,8 +25,8 @@ from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
 from kahanmaps.algebra.printing import format_rational_function
 from kahanmaps.documents.toml_text import TomlKind
-from kahanmaps.errors import InputError, SystemFileError, quoted
-from kahanmaps.invariants.phase_functions import at_eps, where
+from kahanmaps.errors import InputError, SystemFileError, counted, quoted
+from kahanmaps.invariants.integrals_and_densities import at_eps, where
 from kahanmaps.maps.implicit import Map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
@@ -130,7 +130,9 @@ class MatrixPoissonTensor(PoissonTensor):
         """Parse a tensor whose entries are rational functions of the variables, the parameters and eps."""
         names = (*variables, "eps")
         if len(rows) != len(variables):
-            raise InputError(f"found a tensor with {len(rows)} rows, expected {len(variables)}, one for each variable")
+            raise InputError(
+                f"found a tensor with {counted(len(rows), 'row')}, expected {len(variables)}, one for each variable"
+            )
         return cls([[parse_rational_function(entry, names, parameters or {}) for entry in row] for row in rows])
 
     @classmethod

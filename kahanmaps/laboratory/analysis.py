@@ -78,19 +78,20 @@ class Analysis(AnalysisResult, PrintableResult):
     @property
     def sections(self) -> list[tuple[str, list[Statement]]]:
         """The sections of the report that have statements: titles and statements."""
-        return self._sections(self._titled)
+        return self._sections(self._reported_steps)
 
     @property
     def final_sections(self) -> list[tuple[str, list[Statement]]]:
         """The sections before the first one that a pending step may still change."""
-        waiting = (k for k, step in enumerate(self._titled) if {step.name, *step.requires}.intersection(self.pending))
-        return self._sections(self._titled[: next(waiting, None)])
+        steps = self._reported_steps
+        waiting = (k for k, step in enumerate(steps) if {step.name, *step.requires}.intersection(self.pending))
+        return self._sections(steps[: next(waiting, None)])
 
     @property
-    def _titled(self) -> list[AnalysisStep]:
+    def _reported_steps(self) -> list[AnalysisStep]:
         """The steps with statements, in the order of the report."""
-        titled = [step for step in self.analyses if step.statements is not None]
-        return sorted(titled, key=lambda step: TITLES.index(step.title) if step.title in TITLES else len(TITLES))
+        reported = [step for step in self.analyses if step.statements is not None]
+        return sorted(reported, key=lambda step: TITLES.index(step.title) if step.title in TITLES else len(TITLES))
 
     def _sections(self, steps: Sequence[AnalysisStep]) -> list[tuple[str, list[Statement]]]:
         sections = [(step.title, list(step.statements(self))) for step in steps if step.statements is not None]

@@ -60,9 +60,9 @@ class _Facts:
         degrees = result.degrees
         self.result, self.degrees, self.count = result, degrees, result.integral_count
         self.growth = degrees.growth if degrees is not None else Growth.UNKNOWN
-        self.grown = degrees.known if degrees is not None else Certainty.MEASURED
-        self.phrase = degrees.kind_text if degrees is not None else "degrees not measured"
-        self.basis = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
+        self.growth_certainty = degrees.known if degrees is not None else Certainty.MEASURED
+        self.growth_text = degrees.kind_text if degrees is not None else "degrees not measured"
+        self.basis_text = f" ({degrees.basis})" if degrees is not None and degrees.recurrence is not None else ""
         # The number of integrals, or a lower bound.
         where = f" in dimension {result.dim}"
         number = counted(self.count, "independent integral") if self.count else "no integral"
@@ -88,7 +88,7 @@ class _Facts:
 def conclude(result: AnalysisResult) -> Conclusion:
     """Return the verdict of the first rule in `_RULES` that applies, or that the growth is undecided."""
     facts = _Facts(result)
-    undecided = f"The growth is undecided: {facts.phrase}; {facts.integrals}."
+    undecided = f"The growth is undecided: {facts.growth_text}; {facts.integrals}."
     verdict = next(filter(None, (rule(facts) for rule in _RULES)), _Verdict("undecided", undecided, ground=None))
     sentence = verdict.sentence
     if result.eps is not None:
@@ -140,7 +140,7 @@ def _not_birational(facts: _Facts) -> _Verdict | None:
     """Give no verdict on maps that are not birational: degrees and closed orbits mean nothing for these."""
     if not facts.result.defect or facts.growth is Growth.ZERO:
         return None
-    return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.phrase}.", ground=None)
+    return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.growth_text}.", ground=None)
 
 
 def _linearisable(facts: _Facts) -> _Verdict | None:
@@ -150,14 +150,14 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
         sentence = f"The map is periodic: {proof.reason} (proved); {facts.integrals}."
         return _Verdict("linearisable", sentence, ground=Certainty.PROVED)
     if facts.closes:
-        return _Verdict("linearisable", f"{_capital(facts.closes)}: the map is periodic there; {facts.phrase}.")
+        return _Verdict("linearisable", f"{_capital(facts.closes)}: the map is periodic there; {facts.growth_text}.")
     if facts.growth is Growth.ZERO:
         return _Verdict("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
     if facts.growth is not Growth.BOUNDED:
         return None
-    bounded = f"The degrees of the iterates are bounded{facts.basis}"
+    bounded = f"The degrees of the iterates are bounded{facts.basis_text}"
     sentence = f"{bounded}: the map is linearisable in the sense of bounded degrees; {facts.integrals}."
-    return _Verdict("linearisable", sentence, ground=facts.grown)
+    return _Verdict("linearisable", sentence, ground=facts.growth_certainty)
 
 
 def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
@@ -169,46 +169,48 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
     where = "" if result.eps is not None or not result.file.map.has_eps else ", for all but finitely many eps"
     sentence = (
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
-        f"function is an integral; {facts.phrase}{facts.basis}."
+        f"function is an integral; {facts.growth_text}{facts.basis_text}."
     )
     return _Verdict("not integrable", sentence, _confining(result), Certainty.PROVED)
 
 
 def _on_curves(facts: _Facts) -> _Verdict | None:
-    """Maps whose orbits lie on curves: proved, or supported if the growth is not known."""
-    result, proved = facts.result, 0
-    if result.integrals is not None:  # independent ones
-        proved = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
-        proved = max(proved, 0 if result.integrals.symbols else result.integrals.by_theorems)
-    if result.dim > 1 and proved >= result.dim - 1:
+    """The verdict on a map whose orbits lie on curves: by proved integrals, or by those found if no growth is known."""
+    result, proved_integrals = facts.result, 0  # independent ones
+    if result.integrals is not None:
+        proved_integrals = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
+        proved_integrals = max(proved_integrals, 0 if result.integrals.symbols else result.integrals.by_theorems)
+    if result.dim > 1 and proved_integrals >= result.dim - 1:
         sense = "superintegrable" if result.dim > 2 else "integrable"
         genus = result.pencil.genus if result.pencil is not None else None
         if genus is None and result.dim == 2:  # not computed, but determined by the growth
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
-        sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.phrase}{facts.basis}."
+        sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.growth_text}{facts.basis_text}."
         return _Verdict("integrable", sentence, sense, Certainty.PROVED)
     on_curves = orbits_lie_on_curves(result)
     if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
         return None
     curves = ", so that orbits lie on curves" if on_curves else ""
-    sentence = f"Integrable: {facts.integrals}{curves}; degrees: {facts.phrase}."
+    sentence = f"Integrable: {facts.integrals}{curves}; degrees: {facts.growth_text}."
     return _Verdict("integrable", sentence, *_sense(facts.liouville))
 
 
 def _by_growth(facts: _Facts) -> _Verdict | None:
     """Exponential and polynomial growth, measured or derived."""
     count, integrals = facts.count, facts.integrals
-    exact = facts.growth is Growth.EXPONENTIAL  # else the phrase says that it is estimated
+    exact = facts.growth is Growth.EXPONENTIAL  # else the text says that it is estimated
     if exact or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
-        growth = f"{facts.phrase}{facts.basis if exact else ''}"
+        growth = f"{facts.growth_text}{facts.basis_text if exact else ''}"
         sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{although}."
-        ground = facts.grown if exact else Certainty.ESTIMATED
+        ground = facts.growth_certainty if exact else Certainty.ESTIMATED
         return _Verdict("not integrable", sentence, _confining(facts.result), ground)
     if facts.growth in _POLYNOMIAL:
-        sentence = f"Integrable in the sense of zero algebraic entropy: {facts.phrase}{facts.basis}; {integrals}."
-        return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.grown))
+        sentence = (
+            f"Integrable in the sense of zero algebraic entropy: {facts.growth_text}{facts.basis_text}; {integrals}."
+        )
+        return _Verdict("integrable", sentence, *_sense(facts.liouville, facts.growth_certainty))
     return None
 
 

@@ -238,7 +238,7 @@ class _ProjectiveMap:
 def default_eps(prime: int) -> list[fmpq]:
     """The first two of a fixed list of eps that are not 0 and not equal up to sign (the inverse map) modulo the prime.
 
-    For p > 5 those with eps^4 = 1 are left out, at which maps may be periodic that are not so for other eps.
+    For p > 5 those with eps^4 = 1 are left out: there a map may be periodic that is not periodic at other eps.
 
     >>> default_eps(101)
     [1/7, 2/11]

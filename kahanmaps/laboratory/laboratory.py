@@ -46,7 +46,11 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols, split_names
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
-from kahanmaps.invariants.phase_functions import density_condition, integral_condition, jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import (
+    density_condition,
+    integral_condition,
+    jacobian_determinant_fraction,
+)
 from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, NoPoint, Point, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.darboux.cofactors import (
@@ -533,12 +537,12 @@ def verdict_on(
     map_ = as_map(given)
     n, root = map_.dim, map_.root
 
-    def sides(field: Field, values: tuple[Any, ...], step: Any) -> Sides | None:
+    def sides(field: Field, values: tuple[Any, ...], eps_value: Any) -> Sides | None:
         """P(x~) Q(x) and P(x) Q(x~) for I = P/Q, for a density times the determinants, in x, the symbols and eps."""
         x, symbols = values[:n], values[n:]
-        map_at_eps = map_.at(step, field, symbols)
+        map_at_eps = map_.at(eps_value, field, symbols)
         image = map_at_eps.step(x)
-        parameters = (*(symbols if root is None else (root.over(field),)), step)
+        parameters = (*(symbols if root is None else (root.over(field),)), eps_value)
         at_x, at_image = (*x, *parameters), (*image, *parameters)
         P, Q = (evaluate(part, field, at_x) for part in (function.numerator, function.denominator))
         P_image, Q_image = (evaluate(part, field, at_image) for part in (function.numerator, function.denominator))
@@ -550,15 +554,15 @@ def verdict_on(
             left = left * evaluate(factor.denominator, field, at_x)
             right = right * evaluate(factor.numerator, field, at_x)
         if is_density:
-            numerator, denominator = jacobian_determinant_sides(map_at_eps, x, image)
+            numerator, denominator = jacobian_determinant_fraction(map_at_eps, x, image)
             if field.is_zero(numerator):
                 return None  # the map is not invertible at x, and 0 = 0 says nothing
             left, right = left * denominator, right * numerator
         return [left], [right]
 
     condition = (density_condition if is_density else integral_condition)(function, n, eps, root)
-    step = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
-    values = " and ".join([*step, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
+    eps_text = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
+    values = " and ".join([*eps_text, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     restriction = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
     scope = f"for {values}{restriction}" if values else restriction.removeprefix(", ").strip()
     subject = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))

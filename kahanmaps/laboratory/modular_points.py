@@ -16,7 +16,7 @@ from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, monomials
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanMap, as_map
 from kahanmaps.systems.polynomial import PolynomialField
@@ -74,7 +74,7 @@ class ModularMap:
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
         """Return the sides of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x))."""
         count(25 + 8 * self.dim + self.dim**3 / 10)
-        numerator, denominator = jacobian_determinant_sides(self.map, x, self.map.point(image))
+        numerator, denominator = jacobian_determinant_fraction(self.map, x, self.map.point(image))
         return int(numerator), int(denominator)
 
     def pairs(self, count: int) -> Iterator[tuple[Point, Point]]:

@@ -12,7 +12,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.maps.implicit import ImplicitMap
 
 TITLE = "bilinear map"
@@ -40,7 +40,7 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
     """
     names, n = tuple(variables), len(variables)
     if len(equations) != n:
-        raise InputError(f"found {len(equations)} equations for {n} variables, expected as many")
+        raise InputError(f"found {counted(len(equations), 'equation')} for {counted(n, 'variable')}, expected as many")
     if not all(isinstance(equation, fmpq_mpoly) for equation in equations):
         raise InputError(
             f"found {equations!r}, expected polynomials: parse_polynomial('X - x - 2*eps*x*X', ['x', 'X', 'eps'])"

@@ -89,9 +89,10 @@ class Equation:
 
     @cached_property
     def explicit(self) -> Equation | None:
-        """The forms of an explicit map (rows Q_i x~_i = P_i) without common factor, as an equation with one row.
+        """Numerators and common denominator of an explicit map (rows Q_i x~_i = P_i), as the one row of an equation.
 
-        None if the map is not explicit, if the forms are long, and over fields other than QQ and GF(p).
+        They have no common factor. None if the map is not explicit, if they are long, and over fields other than QQ
+        and GF(p).
         """
         if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):
             return None

@@ -11,7 +11,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.maps.implicit import ImplicitMap
 
 TITLE = "explicit map"
@@ -43,7 +43,9 @@ def explicit_map(
     names = tuple(variables)
     for functions in (image, inverse or image):
         if len(functions) != len(names):
-            raise InputError(f"found {len(functions)} functions for {len(names)} variables, expected as many")
+            raise InputError(
+                f"found {counted(len(functions), 'function')} for {counted(len(names), 'variable')}, expected as many"
+            )
     return ImplicitMap(names, _rows(names, image), TITLE, backward=None if inverse is None else _rows(names, inverse))
 
 

@@ -50,7 +50,7 @@ def around(first: Sequence[Any], bound: int, multiples: Sequence[Any] = ()) -> d
 
 
 def _next(terms: Sequence[Any], H: Any) -> Any:
-    """Return the term after four given terms."""
+    """Return the term after four given terms, for alpha = H^2 and beta = -H^3."""
     previous, a, b, c = terms
     return (H**2 * c * a - H**3 * b * b) / previous
 

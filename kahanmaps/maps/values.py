@@ -9,7 +9,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.errors import InexactNumber, InputError, counted
 
 
 def is_float_value(value: Any) -> bool:
@@ -46,7 +46,7 @@ def coordinates(values: Any, field: Field, variables: Sequence[str], dim: int) -
         raise InputError(f"found {values!r}, expected a sequence of {dim} exact numbers")
     if len(values) != dim:
         named = f": {', '.join(variables)}" if variables else ""
-        raise InputError(f"found a point with {len(values)} coordinates, expected {dim}{named}")
+        raise InputError(f"found a point with {counted(len(values), 'coordinate')}, expected {dim}{named}")
     try:
         return tuple(field.convert(value) for value in values)
     except InexactNumber as error:

@@ -159,7 +159,7 @@ def integral_of_any_cubic(T: Multilinear = T, skew: Multilinear | None = None) -
     yield T(X, X, X) + T(X, X, Y - X), T(X, X, Y)  # H + (1/3) nabla H . (y - x), which is the second form
 
 
-def measure_of_any_hamiltonian_map(J_transposed: int = -1) -> Pairs:
+def measure_of_any_hamiltonian_map(sign_of_transpose: int = -1) -> Pairs:
     """Yield the identities behind (12): det(I + eps J S) = det(I - eps J S) for a skew J and a symmetric S.
 
     Transposition gives det(I + eps J S) = det(I - eps S J); that this is det(I - eps J S) is read off two products of
@@ -170,7 +170,7 @@ def measure_of_any_hamiltonian_map(J_transposed: int = -1) -> Pairs:
 
     def transposed(expression: Expression) -> Expression:
         terms = expression.coefficients.items()
-        return combine([(word[::-1], c * J_transposed ** word.count("J")) for word, c in terms])
+        return combine([(word[::-1], c * sign_of_transpose ** word.count("J")) for word, c in terms])
 
     yield transposed(one + EPS * J.times(S)), one - EPS * S.times(J)
     A, C = EPS * J, S

@@ -28,7 +28,7 @@ from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import third_derivatives
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
-from kahanmaps.invariants.phase_functions import ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.integrals_and_densities import ModifiedHamiltonian, PaperIntegral
 from kahanmaps.invariants.poisson import poisson_tensor
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.systems.quadratic import SystemOver

@@ -210,7 +210,7 @@ class Verifier:
             if self.options.controls:
                 controls = self.controls(claim)
                 findings += controls
-                if self.outside(claim) is None and not any(finding.is_as_expected for finding in controls):
+                if self.why_outside(claim) is None and not any(finding.is_as_expected for finding in controls):
                     without.append(claim.key)
             else:
                 findings.append(self.verify_claim(claim))
@@ -277,8 +277,8 @@ class Verifier:
             return 1
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
 
-    def outside(self, claim: Claim) -> str | None:
-        """Return why a claim does not apply; empty if it does."""
+    def why_outside(self, claim: Claim) -> str | None:
+        """Return why a claim does not apply to the member; None if it does."""
         if self.member is None or self.member.is_generic:
             return None
         bounds = self.bounds()
@@ -318,7 +318,7 @@ class Verifier:
 
     def verify_claim(self, claim: Claim) -> Finding:
         """Verify one claim and return its finding."""
-        reason = self.outside(claim)
+        reason = self.why_outside(claim)
         if reason is not None:
             return self._finding(claim, Certainty.UNDECIDED, Evidence("outside the hypotheses", reason))
         if claim.kind is not ClaimKind.EQUAL:
@@ -327,9 +327,11 @@ class Verifier:
         decision = decide(statement, self.settings.seed, self.settings.error_bits)
         finding = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
         if claim.misprint and decision.verdict is Certainty.SUPPORTED:
-            silent = Evidence("special member", f"the misprint does not show for this member: {self.what_is_special()}")
+            special = Evidence(
+                "special member", f"the misprint does not show for this member: {self.what_is_special()}"
+            )
             return replace(
-                finding, verdict=Certainty.UNDECIDED, evidence=silent, also=(finding.evidence,), applies=False
+                finding, verdict=Certainty.UNDECIDED, evidence=special, also=(finding.evidence,), applies=False
             )
         if claim.misprint or decision.verdict is Certainty.REFUTED:
             return finding
@@ -480,7 +482,7 @@ class Verifier:
             return [self.verify_claim(claim)]
         controls = []
         for name in claim.breaks:
-            if self.m < CONTROLS[name].least_m or self.outside(claim) is not None:
+            if self.m < CONTROLS[name].least_m or self.why_outside(claim) is not None:
                 continue
             outcome = self._broken(claim, name)
             if outcome is None:

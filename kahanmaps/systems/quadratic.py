@@ -20,7 +20,7 @@ from kahanmaps.algebra.parsing import check_names, parse_polynomial
 from kahanmaps.algebra.polynomials import digits_of, evaluate, linear_combinations, names_of, ring
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.display_protocols import LatexDisplay
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.systems.polynomial import PolynomialField
 
 # f'' has dim^3 entries: 10^6 of them at the largest dimension.
@@ -55,7 +55,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         check_names(names)
         if len(self.rhs) != n:
             raise InputError(
-                f"found {len(self.rhs)} right-hand sides for the {n} variables {', '.join(names)}, expected {n}"
+                f"found {counted(len(self.rhs), 'right-hand side')}, expected {n}, one for each of {', '.join(names)}"
             )
         for name, polynomial in zip(names, self.rhs, strict=True):
             degree = max((sum(m[:n]) for m in polynomial.monoms()), default=0)

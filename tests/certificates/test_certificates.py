@@ -243,6 +243,23 @@ def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker,
     assert run(checker, wrong, tmp_path).returncode != 0
 
 
+WRONG_DERIVATIVES = {  # with the same determinant, so that the identity of the volume form holds
+    "rocq": [("l12 : R := eps", "l12 : R := - eps"), ("l21 : R := - eps", "l21 : R := eps")],
+    "gp": [("L = [1, eps; - eps, 1]", "L = [1, - eps; eps, 1]")],
+    "sympy": [("in [[1, eps], [- eps, 1]]]", "in [[1, - eps], [eps, 1]]]")],
+}
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+@pytest.mark.parametrize("claim", ["volume", "poisson"])
+def test_a_matrix_that_is_not_the_derivative_of_the_equation_is_refused(claim, checker, tmp_path):
+    wrong = certificate(load("harmonic"), checker, [claim])
+    for old, new in WRONG_DERIVATIVES[checker]:
+        assert old in wrong
+        wrong = wrong.replace(old, new)
+    assert run(checker, wrong, tmp_path).returncode != 0
+
+
 def test_a_check_that_raises_an_error_ends_gp_with_a_status_that_is_not_0(tmp_path):
     # gp goes on with the next line after an error, unless recover is 0 (PARI/GP 2.17).
     text = certificate(load("lotka_volterra"), "gp", ["volume"])
@@ -256,6 +273,11 @@ def test_a_check_that_raises_an_error_ends_gp_with_a_status_that_is_not_0(tmp_pa
 def test_variables_with_the_names_of_words_of_the_programs_are_renamed(checker, tmp_path):
     text = certificate(System("I' = fun; fun' = -I"), checker, integrals={"O": "(I^2 + fun^2)/3"})
     assert run(checker, text, tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+def test_a_variable_t_is_not_the_step_of_a_derivative(checker, tmp_path):
+    assert run(checker, certificate(System("t' = x; x' = -t"), checker, density="1"), tmp_path).returncode == 0
 
 
 @given(st.integers(1, 50), st.integers(1, 50), st.integers(1, 50), st.integers(1, 20))

@@ -35,7 +35,7 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
-from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.integrals_and_densities import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -12,7 +12,7 @@ from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.conserve import check_integrals, conservation
 from kahanmaps.checks.decide import Decision, Identity
 from kahanmaps.checks.settings import Settings
-from kahanmaps.invariants.phase_functions import ClaimedIntegral
+from kahanmaps.invariants.integrals_and_densities import ClaimedIntegral
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
 CONSERVED = "(1 - eps^2*y^2)/(1 + 2*eps^2*z^2)"

@@ -15,7 +15,7 @@ from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
-from kahanmaps.invariants.phase_functions import ClaimedDensity, ClaimedIntegral, DeterminantDensity
+from kahanmaps.invariants.integrals_and_densities import ClaimedDensity, ClaimedIntegral, DeterminantDensity
 from kahanmaps.invariants.poisson import HamiltonianTensor
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.paper import specialize

@@ -29,7 +29,7 @@ from kahanmaps.checks import theorems
 from kahanmaps.checks.theorems import commutant_integral
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
-from kahanmaps.invariants.phase_functions import CommutantIntegral
+from kahanmaps.invariants.integrals_and_densities import CommutantIntegral
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 MEMBER = random_member_with_eigenvalues([1, -2, 3], seed=3)

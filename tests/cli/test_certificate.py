@@ -116,3 +116,16 @@ def test_a_report_links_the_certificate_that_it_writes(kahanmaps, tmp_path):
     assert "dx/phi is invariant" in proof.read_text()
     assert "Certificate" not in kahanmaps("report lotka_volterra --from checks --no-pictures").out
     assert kahanmaps(f"report lotka_volterra --eps 1/2 --certificate '{proof}'").status == 2
+
+
+def test_verify_writes_the_certificate_of_a_member(kahanmaps, tmp_path):
+    path = tmp_path / "member.gp"
+    outcome = kahanmaps("verify paper_m2 --section 1 --certificate", path)
+    assert outcome.status == 0
+    assert "paper_m2: a certificate for gp" in outcome.err
+    text = path.read_text()
+    assert all(name in text for name in ("H0", "H1", "volume", "poisson"))
+    outcome = kahanmaps("verify --universal --m 1 --certificate", tmp_path / "none.gp")
+    assert outcome.status == 2
+    assert "a certificate is about one member" in outcome.err
+    assert not (tmp_path / "none.gp").exists()

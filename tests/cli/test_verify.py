@@ -49,7 +49,7 @@ def test_controls_are_refuted_and_that_is_success(once):
 
 def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
     # H~ with twice its value is not the function that (61) says.
-    from kahanmaps.invariants.phase_functions import PaperIntegral
+    from kahanmaps.invariants.integrals_and_densities import PaperIntegral
 
     original = PaperIntegral.value
     monkeypatch.setattr(PaperIntegral, "value", lambda self, K, eps, x: original(self, K, eps, x) * K.convert(2))

@@ -150,7 +150,7 @@ def test_exponents_are_those_of_the_library():
         ("cycles", TOP, {"prime": 2}, "expected an odd prime"),
         ("cycles", TOP, {"prime": 31, "steps": 5}, "found steps = 5 without samples"),
         ("cycles", TOP, {"prime": 7, "eps": "1/7"}, "the prime 7 divides the denominator of 1/7"),
-        ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found 1 steps after 0, expected at least 2"),
+        ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found steps = 1 and transient = 0, expected at least 2"),
     ],
 )
 def test_an_impossible_task_is_refused_in_a_sentence(name, system, requested, words):

@@ -31,11 +31,11 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.random_members import random_member_with_chi
-from kahanmaps.invariants.phase_functions import (
+from kahanmaps.invariants.integrals_and_densities import (
     CommutantIntegral,
     ModifiedHamiltonian,
     PaperIntegral,
-    jacobian_determinant_sides,
+    jacobian_determinant_fraction,
     where,
 )
 from kahanmaps.invariants.poisson import HamiltonianTensor, jacobi_defects, poisson_tensor, transformation_sides
@@ -103,7 +103,7 @@ def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, e
     system, x = drawn
     kahan = KahanMap(system, eps)
     try:
-        above, below = jacobian_determinant_sides(kahan, x, kahan.step(x))
+        above, below = jacobian_determinant_fraction(kahan, x, kahan.step(x))
     except SingularStep:
         assume(False)
     jacobian = kahan_jacobian(system, fraction(eps), exact(*x))

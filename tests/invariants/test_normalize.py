@@ -8,7 +8,7 @@ import kahanmaps as km
 from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.printing import format_factored
-from kahanmaps.invariants.phase_functions import normalized
+from kahanmaps.invariants.integrals_and_densities import normalized
 from kahanmaps.laboratory.laboratory import Laboratory
 
 CLAIMED = [

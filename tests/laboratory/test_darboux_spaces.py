@@ -113,7 +113,7 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
     D = determinant_polynomial(laboratory.map)
     complete = Cofactor("D", 1, D)
     for x, image in map_.pairs(3):
-        assert complete.sides(map_, x, image) == DETERMINANT.sides(map_, x, image)
+        assert complete.modular_fraction(map_, x, image) == DETERMINANT.modular_fraction(map_, x, image)
     context = D.context()
     others = D
     for entry in determinant_factors(laboratory.map):

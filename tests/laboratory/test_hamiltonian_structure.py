@@ -17,7 +17,7 @@ from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomia
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.invariants.phase_functions import DeterminantDensity, ModifiedHamiltonian
+from kahanmaps.invariants.integrals_and_densities import DeterminantDensity, ModifiedHamiltonian
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson.hamiltonian_structure import (

@@ -44,7 +44,7 @@ def values_along_orbit(file, ratio, count=3):
     points = [tuple(fmpq(k + 2, 3 * k + 5) for k in range(file.dim))]
     while len(points) < ratio.length + count:
         points.append(map_.step(points[-1]))
-    return [P / Q for P, Q in [ratio.sides(QQ, points[k:], [eps]) for k in range(count)]]
+    return [P / Q for P, Q in [ratio.numerator_and_denominator(QQ, points[k:], [eps]) for k in range(count)]]
 
 
 # Affine ones, of the others those in x, and in x and x~, ...: four with the one that bases of quadrics give.

@@ -11,7 +11,7 @@ from kahanmaps.algebra.matrices import det
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import SingularStep
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.convention import time_step
 from kahanmaps.maps.explicit import explicit_map
@@ -47,7 +47,7 @@ def test_a_step_and_its_derivatives_are_those_of_the_formula(name, field):
         assert all(field.equal(a, b) for a, b in zip(entry.step(x), other.step(x), strict=True))
         pairs = zip(entry.jacobian(x).entries(), other.jacobian(x).entries(), strict=True)
         assert all(field.equal(a, b) for a, b in pairs)
-        above, below = jacobian_determinant_sides(entry, x, entry.step(x))
+        above, below = jacobian_determinant_fraction(entry, x, entry.step(x))
         assert field.equal(above, below * det(other.jacobian(x)))
 
 

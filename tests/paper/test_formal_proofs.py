@@ -42,7 +42,7 @@ def test_every_identity_of_a_formal_proof_holds(key):
         (formal_proofs.jacobian_of_any_map, {"Q": WITHOUT_SYMMETRY}),
         (formal_proofs.integral_of_any_cubic, {"T": Multilinear("T")}),
         (formal_proofs.integral_of_any_cubic, {"skew": Multilinear("G", symmetry=1)}),
-        (formal_proofs.measure_of_any_hamiltonian_map, {"J_transposed": 1}),
+        (formal_proofs.measure_of_any_hamiltonian_map, {"sign_of_transpose": 1}),
     ],
 )
 def test_a_formal_proof_fails_without_one_hypothesis(proof, broken):

@@ -12,7 +12,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.integrals_and_densities import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.maps.floats.float_orbit import FloatOrbit
 from kahanmaps.plots.drifts.drift import _Bins, _edges, clipped_from, plot_drift, small_start, survey_drift
 from kahanmaps.plots.drifts.drift_functions import OfTheImage, functions_of, known_functions, requested_functions

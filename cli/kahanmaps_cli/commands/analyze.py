@@ -44,8 +44,10 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     belongs to the commuting family, in these or other affine coordinates. Claims in the file are ignored. Without --eps
     all results hold for every eps.
 
-    proved, supported: formulas, as identities in x and eps. derived: from the measured singularity patterns. measured:
-    modulo primes and along orbits, which is evidence. The number of integrals and the growth are independent results.
+    Each statement begins with its status. Formulas are "proved" or "supported" as identities in x and eps. A growth of
+    degrees is "derived" if it follows from the measured singularity patterns. What was computed modulo primes or along
+    orbits is "measured", which is evidence and no proof. The number of integrals and the growth of degrees are computed
+    separately, neither from the other.
 
     Exit status: 0 the verdict is decided, 2 usage error, 3 undecided.
     """

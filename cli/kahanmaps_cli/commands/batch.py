@@ -66,9 +66,10 @@ def command() -> None:
       kahanmaps batch status --db study.db
       kahanmaps batch summary --db study.db --by m,eps
       kahanmaps batch export --db study.db --csv -o study.csv
-      kahanmaps batch tasks                     # what an experiment can do
+      kahanmaps batch tasks                     # the kinds of tasks
 
-    docs/batch.md describes the file and the use of several machines.
+    Each experiment of the file gives one task for each combination of its systems and options, and each task has one
+    result. docs/batch.md describes the file and the use of several machines.
     """
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
+from kahanmaps.errors import counted
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import as_typed, print_stderr
@@ -78,7 +79,7 @@ def write_text(text: str, what: str, output: str | None, quiet: bool) -> None:
         return
     lib.write_atomically(output, text.encode())
     if not quiet:
-        print_stderr(f"{output}: {what}, {len(text.splitlines())} lines")
+        print_stderr(f"{output}: {what}, {counted(len(text.splitlines()), 'line')}")
 
 
 def _split(text: str) -> list[str]:

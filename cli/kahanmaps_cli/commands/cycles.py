@@ -43,9 +43,9 @@ def command(system: str | None, **options: Any) -> int:
 
     A point is indeterminate if the map is not defined there; common factors of the forms of the map are divided out
     first (up to dimension 6). A point is pre-indeterminate if its orbit reaches an indeterminate point, and preperiodic
-    if its orbit reaches a cycle without the point being on it. The counts are exact, and are compared with no bound:
-    integrable maps, too, may have cycles longer than P + 1 + 2 sqrt P, on level sets with several components or on
-    level sets that the map exchanges.
+    if its orbit reaches a cycle without the point being on it. The counts are exact. They are not compared with Hasse's
+    bound, as cycles of integrable maps, too, may be longer than P + 1 + 2 sqrt P: on level sets with several
+    components, and on level sets that the map exchanges.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table with a line for each value or
     combination of values; with --json, a record on each line. Values for which there is no map are listed at the end.

@@ -53,7 +53,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
       kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 \\
           --steps 1000 --integral F1
 
-    FILE.npy is an array (records, orbits, dimension): record k holds step k K. It grows during the computation and is
+    FILE.npy is an array (records, orbits, dimension): record k holds the points after
+    k K steps, with K of --every. It grows during the computation and is
     valid at all times, also after Ctrl-C. It contains NaN for orbits that ended early. Initial points in text files are
     exact numbers, separated by commas or blanks; # begins a comment, and the first line may name the columns.
 

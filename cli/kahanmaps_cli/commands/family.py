@@ -26,7 +26,12 @@ draw_options: Callable[[F], F] = opt.stack(
     click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
     click.option("--generic", is_flag=True, help="Draw a random integer polynomial chi, typically irreducible over Q."),
     click.option("--chi", metavar="EXPR", help="The polynomial chi in t, e.g. '(t-1)*(t^2-2)'."),
-    click.option("--size", type=int, metavar="N", help="Bound for the random integer coefficients (default 2 or 1)."),
+    click.option(
+        "--size",
+        type=int,
+        metavar="N",
+        help="Bound for the random integer coefficients (default 1 with --generic or --chi, else 2).",
+    ),
 )
 DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 
@@ -100,7 +105,7 @@ def draw_member(
     if eigenvalues is not None:
         values = lib.parse_point(eigenvalues)
         if m is not None and m != len(values):
-            raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
+            raise click.UsageError(f"found {counted(len(values), 'eigenvalue')}, expected m = {m}")
         return lib.random_member_with_eigenvalues(values, seed, size or 2)
     if chi is not None:
         polynomial = lib.parse_chi(chi)

@@ -28,9 +28,9 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-density nahm_tetrahedral --toml
       kahanmaps find-density zander_120 --flow
 
-    phi (called density) is a polynomial of the least degree, or a product of powers of known polynomials, of any degree
-    and with exponents of either sign. If there is neither, the command searches for integrals and tries products of
-    powers of their factors too. Every formula is verified as an identity.
+    phi is called density here. The command searches for a polynomial of least degree, and for products of known
+    polynomials to positive and negative powers, of any degree. If it finds neither, it searches for integrals and tries
+    products of powers of their factors too. Every formula is verified as an identity.
 
     phi times any integral is a density again: the shortest one is shown, --json lists all of them.
 

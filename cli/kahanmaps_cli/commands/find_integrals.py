@@ -33,16 +33,22 @@ from kahanmaps_cli.screen.value_rows import Cell, rows_of, table
     "sets",
     metavar="LIST",
     multiple=True,
-    help="Instead: a Hirota-Kimura basis of these polynomials, e.g. 'x^2,y^2,1'; x~ is the image of x.",
+    help="Search for a Hirota-Kimura basis of these polynomials instead, e.g. 'x^2,y^2,1'; x~ is the image of x.",
 )
 @click.option(
     "--darboux",
     type=click.IntRange(1, 12),
     metavar="DEGREE",
-    help="Instead: discrete Darboux polynomials up to this degree; with --flow those of the differential equation.",
+    help="Search for discrete Darboux polynomials up to this degree instead; with --flow for those of the differential "
+    "equation.",
 )
 @click.option("--flow", is_flag=True, help="Integrals of the differential equation, compared with those of the map.")
-@click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
+@click.option(
+    "--max-degree",
+    type=click.IntRange(1, 20),
+    metavar="D",
+    help="Largest degree of the polynomial relations between the points of an orbit.",
+)
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
     """Search for integrals of the map of SYSTEM: their number, closed forms P/Q, and proofs.
@@ -192,8 +198,8 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
             }
         )
         return 3 if reason else 0
-    step = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
-    print_stdout(f"Hirota-Kimura bases: {file.name}{step}, measured on two orbits modulo each of two primes")
+    eps_text = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
+    print_stdout(f"Hirota-Kimura bases: {file.name}{eps_text}, measured on two orbits modulo each of two primes")
     for row in rows:
         print_stdout(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:

@@ -27,10 +27,12 @@ def command(system: str | None, as_json: bool, quiet: bool, start: Any, **option
       kahanmaps geometry paper_m2 --start 1,2,3,4 --eps 1/7 --json | jq '.planes[0].j'
 
     The level set is a product of elliptic curves, one in each plane of the normal form, and the map is a translation
-    of it. For each irreducible factor of chi the command prints k^3 of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, the
-    j-invariant, the order of the translation (finite or infinite, proved), and at rational roots its canonical height;
-    for each real root the rotation number, in (0, 1/2] and up to sign, with an error bound, and that of the flow at the
-    time step 2 eps. At a pair of complex roots the two numbers are coordinates in a reduced basis of the periods.
+    of it. The planes belong to the roots of chi, where chi(t)^2 = det(t I - A). For each irreducible factor of chi the
+    command prints k^3 of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, the j-invariant, and the order of the translation
+    (finite or infinite, proved); at a rational root also the canonical height of the translation. For each real root it
+    prints the rotation number, in (0, 1/2] and up to sign, with an error bound, and that of the flow at the time step
+    2 eps. A pair of complex roots has two numbers instead: the coordinates of the translation in a reduced basis of the
+    lattice of periods.
 
     The command also recognizes systems of the family that are not declared as such.
 

@@ -51,7 +51,7 @@ height_options: Callable[[opt.F], opt.F] = opt.stack(
     type=PointText(),
     multiple=True,
     metavar="X",
-    help="Instead: this initial point, e.g. 1/2,-1/3,0.25. Repeatable.",
+    help="Use this initial point instead of random ones, e.g. 1/2,-1/3,0.25. Repeatable.",
 )
 @height_options
 @opt.output_options

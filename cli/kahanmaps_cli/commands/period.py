@@ -21,7 +21,9 @@ _LONG_PRIME, _MAX_PRIME = 90, 192  # bits; between them the computation takes se
 @click.command("period")
 @system_options
 @click.option("--start", type=PointText(), metavar="X", help="Initial point, e.g. 1/2,-1/3,0.25.")
-@click.option("--levels", type=int, metavar="N", help="Instead: the levels on which all orbits have period N.")
+@click.option(
+    "--levels", type=int, metavar="N", help="Instead of --start: find the levels on which all orbits have period N."
+)
 @eps_options
 @click.option(
     "--arithmetic",

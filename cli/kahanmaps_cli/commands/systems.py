@@ -64,7 +64,7 @@ def command(
                 "facts": list(file.catalog.get("facts", [])),
                 "convention": file.catalog.get("convention", ""),
                 "sources": [lib.source(key) for key in file.catalog.get("sources", [])],
-                "known": _known(file),
+                "known": _structured_facts(file),
                 "document": file.document,
             }
         )
@@ -82,9 +82,9 @@ def _summary(file: Any) -> dict[str, Any]:
     }
 
 
-def _known(file: Any) -> dict[str, Any]:
-    """Return the structured facts; null if the file has none."""
-    return {key: file.document.get("catalog", {}).get(key) for key in lib.KEYS}
+def _structured_facts(file: Any) -> dict[str, Any]:
+    """Return the facts that programs can use, by key; None for a fact that the file does not state."""
+    return {key: file.document.get("catalog", {}).get(key) for key in lib.FACT_KEYS}
 
 
 def _latex(file: Any) -> str:
@@ -122,7 +122,7 @@ def _show(file: Any) -> None:
         print_stdout(f"{claimed}integral {name} = {formula(lib.format_factored(integral))}")
     if file.density is not None:
         print_stdout(f"{claimed}density phi = {formula(lib.format_factored(file.density))}  (dx/phi is invariant)")
-    facts, lines = _known(file), []
+    facts, lines = _structured_facts(file), []
     if facts["verdict"]:
         lines.append(f"verdict: {facts['verdict']}")
     growth = f"{facts['growth']} growth" if facts["growth"] else ""

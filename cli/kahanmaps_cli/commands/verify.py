@@ -12,6 +12,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.checks import headline, sections_of, witness_lines
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
 from kahanmaps_cli.screen.terminal import NUMBER_WIDTH, console, on_terminal, print_raw, print_stdout, shorten, styled
@@ -53,7 +54,9 @@ _LEGEND = {
     "--universal", is_flag=True, help="Verify the claims for the generic member, at random points over GF(p)."
 )
 @click.option(
-    "--beyond", is_flag=True, help="Print which statements remain true for other H, J, steps and A; counterexamples."
+    "--beyond",
+    is_flag=True,
+    help="Print which statements remain true for other H, J, steps and A, with counterexamples.",
 )
 @click.option("--controls", is_flag=True, help="Check that every claim fails if one hypothesis is violated.")
 @click.option(
@@ -70,13 +73,14 @@ _LEGEND = {
     metavar="N",
     default=3,
     show_default=True,
-    help="Order in eps^2 of the series of the integrals.",
+    help="Verify N terms of the series of the integrals in powers of eps^2.",
 )
 @click.option(
     "--balls", "ball_bits", type=int, metavar="BITS", help="Also compute over complex balls that enclose all roots."
 )
 @opt.evidence_options
 @click.option("--markdown", "as_markdown", is_flag=True, help="Print the table in Markdown.")
+@certificate_option
 @opt.verbose_option
 @opt.output_options
 def command(system: str | None, **options: Any) -> int:
@@ -93,15 +97,23 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --beyond             # generalizations
 
     The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi; by default m = 3. Claims are
-    proved by symbolic expansion, verified exactly, or supported at random points over GF(p) with a bound on the error.
-    Formulas with misprints are listed both as printed and corrected. m is at most 8; for m > 6 claims with sums over
-    all eigenvalues are only supported.
+    proved by symbolic expansion or formally, verified exactly, or supported at random points over GF(p) with a bound on
+    the error. Formulas with misprints are listed both as printed and corrected. m is at most 8; for m > 6 claims with
+    sums over all eigenvalues are only supported.
+
+    --certificate FILE also writes the proofs of `kahanmaps certificate` for the member: its integrals, invariant
+    measure and Poisson tensor. (`kahanmaps certificate SYSTEM --commute associates` is about its commuting maps.)
 
     Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 usage error, 3 one is undecided.
     Misprints are expected to be refuted and do not count.
     """
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")
+    require_every_eps(options)
+    if options["certificate"] is not None and (options["universal"] or options["beyond"] or options["controls"]):
+        raise click.UsageError(
+            "a certificate is about one member: give --certificate without --universal, --beyond and --controls"
+        )
     drawn = {name: options[name] for name in DRAWN}
     given = [name for name, value in drawn.items() if value is not None and value is not False]
     if options["universal"] or options["beyond"]:
@@ -140,10 +152,13 @@ def command(system: str | None, **options: Any) -> int:
     elif options["as_markdown"]:
         print_raw(markdown(report))
     elif as_json or not on_terminal():
-        return print_report(report, as_json, verbose, options["quiet"])
+        print_report(report, as_json, verbose, options["quiet"])
     else:
         _print_terminal(report, verbose)
-    return exit_status(report)
+    status = exit_status(report)
+    if options["certificate"] is None:
+        return status
+    return write_certificate(options, file.name, lambda checker: lib.certificate(file, checker), status)
 
 
 def markdown(report: lib.Report) -> str:

@@ -190,7 +190,7 @@ def _starts(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, o
         wrong = next((x for x in options["start"] if len(x) != file.dim), None)
         if wrong is not None:
             raise click.UsageError(
-                f"found an initial point with {len(wrong)} coordinates, expected {file.dim}: "
+                f"found an initial point with {counted(len(wrong), 'coordinate')}, expected {file.dim}: "
                 f"{', '.join(file.variables)}"
             )
         return lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)

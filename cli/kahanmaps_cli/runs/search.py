@@ -57,8 +57,8 @@ def scope(result: Any) -> str:
     """Return the text that follows the name of the map: for which eps and symbols the formulas hold."""
     if getattr(result, "flow", False):
         return ", the flow x' = f(x)" + (f", every {', '.join(result.symbols)}" if result.symbols else "")
-    step = lib.eps_suffix(result.eps, result.file.map)
-    return f"{step}, every {', '.join(result.symbols)}" if result.symbols else step
+    eps_text = lib.eps_suffix(result.eps, result.file.map)
+    return f"{eps_text}, every {', '.join(result.symbols)}" if result.symbols else eps_text
 
 
 def heading(name: str, result: Any, search: SearchProgress) -> dict[str, Any]:

@@ -73,7 +73,7 @@ class OutputFile(click.Path):
             in_its_place = target.exists() and (self.grows or not target.is_file())
             if not os.access(path if in_its_place else folder, os.W_OK):
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)
-            _files(ctx).note(path, is_written=True)
+            _recorded_files(ctx).note(path, is_written=True)
         return path
 
 
@@ -86,10 +86,10 @@ class OutputFolder(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = super().convert(value, param, ctx)
         if ctx is not None:
-            _files(ctx)  # start to record what is read
+            _recorded_files(ctx)  # from here on the files that the command reads are recorded
         if ctx is None or ctx.resilient_parsing:
             return path
-        # Check that files can be written there, by creating the folder, before anything is computed.
+        # Check before anything is computed that files can be written there: create the folder, then remove it again.
         folder = Path(os.fsdecode(path))
         missing = [directory for directory in (folder, *folder.parents) if not directory.exists()]
         try:
@@ -120,10 +120,10 @@ def deliver(path: str, content: bytes) -> bool:
 
 def will_write(path: str) -> None:
     """Refuse a file that this command has read."""
-    _files(click.get_current_context()).note(path, is_written=True)
+    _recorded_files(click.get_current_context()).note(path, is_written=True)
 
 
-def _files(context: click.Context) -> _Files:
+def _recorded_files(context: click.Context) -> _Files:
     _install_hook()
     files = context.meta.get(_KEY)
     if not isinstance(files, _Files):

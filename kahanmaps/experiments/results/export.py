@@ -29,7 +29,7 @@ from importlib import import_module
 from math import inf
 from typing import IO, Any
 
-from kahanmaps.algebra.printing import NUMBER, csv_line, guarded
+from kahanmaps.algebra.printing import NUMBER, csv_line, spreadsheet_safe
 from kahanmaps.atomic_files import atomic_write
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.records import Row, encodable
@@ -102,7 +102,7 @@ def plain(value: Any) -> str:
 
 def cell(value: Any) -> str:
     """Return a value as text for a CSV file; text that a spreadsheet would execute is escaped by an apostrophe."""
-    return guarded(plain(value)) if isinstance(value, str) else plain(value)
+    return spreadsheet_safe(plain(value)) if isinstance(value, str) else plain(value)
 
 
 def is_number(value: Any) -> bool:

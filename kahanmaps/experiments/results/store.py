@@ -365,13 +365,13 @@ class Store(HtmlDisplay):
             raise kind(f"{self.name} {reason}") from error
 
     @contextmanager
-    def _reading(self, what: str) -> Iterator[None]:
-        """Report errors in the block, where values of the file are parsed, as damage of the file at `what`."""
+    def _reading(self, entry: str) -> Iterator[None]:
+        """Report errors of parsing in the block as damage of the file; `entry` says which of its entries is parsed."""
         try:
             yield
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             reason = quoted(" ".join(str(error).split()), 100)
-            raise StoreError(f"{self.name} is damaged ({what}: {reason}): restore an earlier copy") from error
+            raise StoreError(f"{self.name} is damaged ({entry}: {reason}): restore an earlier copy") from error
 
     def _task(self, key: str, text: str) -> Task:
         with self._reading(f"the task {key}"):

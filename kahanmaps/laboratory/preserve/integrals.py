@@ -25,7 +25,7 @@ from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.display_protocols import ResultPart, latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.phase_functions import normalized
+from kahanmaps.invariants.integrals_and_densities import normalized
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory, is_kept_by_flow
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, NoPoint, Point

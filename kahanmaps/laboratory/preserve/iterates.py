@@ -33,7 +33,7 @@ from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.display_protocols import LatexDisplay, ResultPart, latex
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.invariants.phase_functions import normalized, orbit_about
+from kahanmaps.invariants.integrals_and_densities import normalized, orbit_about
 from kahanmaps.laboratory.laboratory import Laboratory, certified
 from kahanmaps.laboratory.modular_points import Independent, ModularMap, Point, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux.affine_functions import affine_integrals, quotient_by
@@ -102,8 +102,10 @@ class RatioOfIterates:
         ratio, letters = self.formula
         return r",\quad ".join([latex(ratio), *(f"{latex(ring([F]).gens()[0])} = {latex(P)}" for F, P in letters)])
 
-    def sides(self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]) -> tuple[Any, Any]:
-        """Numerator and denominator on successive points of an orbit, at the values of the symbols and eps."""
+    def numerator_and_denominator(
+        self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]
+    ) -> tuple[Any, Any]:
+        """Return numerator and denominator on successive points of an orbit, at the values of the symbols and eps."""
         rows = [
             [evaluate(F, field, (*x, *iterate, *values)) for F in self.functions]
             for x, iterate in zip(points, points[self.lift.shift :], strict=False)
@@ -164,7 +166,7 @@ def verdict_on_ratio(
         except BudgetExceeded:
             too_long.add(ratio.length)
             raise
-        pairs = [ratio.sides(field, points[k:], values) for k in (0, 1)]
+        pairs = [ratio.numerator_and_denominator(field, points[k:], values) for k in (0, 1)]
         (P, Q), (P_later, Q_later) = pairs
         if field.is_zero(Q) or field.is_zero(Q_later):
             return None
@@ -325,6 +327,6 @@ def gradient_of(ratio: RatioOfIterates, exact: MapFamily, map_: ModularMap, poin
         points = [tuple(field.dual(c, int(i == k)) for i, c in enumerate(point))]
         while len(points) < ratio.length:
             points.append(over.step(points[-1]))
-        P, Q = ratio.sides(field, points, (*values, eps))
+        P, Q = ratio.numerator_and_denominator(field, points, (*values, eps))
         row.append(int(P.slope * Q.value - P.value * Q.slope))
     return row

@@ -41,7 +41,7 @@ from kahanmaps.algebra.polynomials import (
 from kahanmaps.algebra.printing import format_product
 from kahanmaps.algebra.work import Budget, count, counted_cache
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.darboux.cofactors import Cofactor
@@ -130,17 +130,17 @@ def _irreducible(polynomials: Iterable[fmpq_mpoly], n: int, eps: fmpq | None) ->
 @counted_cache(4)  # may take half a second, and the searches for integrals and densities both need it
 def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str, fmpq_mpoly]:
     """Return the factors of numerator and denominator of det dPhi^-1 and, with `both`, of det dPhi."""
-    n, sides = map_.dim, list[Function]()
+    n, fractions = map_.dim, list[Function]()
     for backward in (False, True) if both else (True,):
         field = FunctionField(map_.names, _BUDGET, reduces=True)
-        *x, step = field.variables
+        *x, eps_variable = field.variables
         try:
-            local = map_.at(step, field, x[n:])
+            local = map_.at(eps_variable, field, x[n:])
             local = local.inverse if backward else local
-            sides += jacobian_determinant_sides(local, x[:n], local.generic_step(tuple(x[:n])))
+            fractions += jacobian_determinant_fraction(local, x[:n], local.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
-    return _irreducible((part for side in sides for part in (side.numerator, side.denominator)), n, eps)
+    return _irreducible((part for function in fractions for part in (function.numerator, function.denominator)), n, eps)
 
 
 class _Line:
@@ -162,7 +162,7 @@ class _Line:
     def _apply(self, factor: ElementaryMap) -> None:
         """Apply one factor of the map to the image; its determinant is numerator Z^n / (denominator Z~^n)."""
         p, n, curve = self.prime, factor.dim, self.image
-        top, size = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
+        map_degree, curve_degree = max(1, factor.equation.degree), max(int(entry.degree()) for entry in curve)
 
         def step(t: int) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
             """Return the point of the curve at t, its image and Z."""
@@ -175,11 +175,11 @@ class _Line:
 
         def homogeneous(t: int) -> list[int]:
             x, image, Z = step(t)
-            denominator = int(factor.determinant(x)) * pow(Z, n * top, p)
+            denominator = int(factor.determinant(x)) * pow(Z, n * map_degree, p)
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
         # Without the common factor: its degree would multiply in each further map, and its zeros are not those of Z~.
-        raw = _interpolated(homogeneous, n * top * size, p)
+        raw = _interpolated(homogeneous, n * map_degree * curve_degree, p)
         common = reduce(nmod_poly.gcd, raw)
         self.image = [entry // common for entry in raw]
         self.denominator = self.denominator * raw[-1]
@@ -187,11 +187,13 @@ class _Line:
 
         def numerator(t: int) -> list[int]:
             x, image, Z = step(t)
-            scale = pow(Z, n * (top - 1), p) * pow(int(image_Z(t)), n, p)
+            scale = pow(Z, n * (map_degree - 1), p) * pow(int(image_Z(t)), n, p)
             return [int(det(factor.numerator_matrix(x, image))) * scale % p]
 
         image_degree = max(int(entry.degree()) for entry in self.image)
-        self.numerator = self.numerator * _interpolated(numerator, n * ((top - 1) * size + image_degree), p)[0]
+        self.numerator = (
+            self.numerator * _interpolated(numerator, n * ((map_degree - 1) * curve_degree + image_degree), p)[0]
+        )
 
     def along(self, g: fmpq_mpoly, curve: Sequence[nmod_poly]) -> nmod_poly:
         """Evaluate g on a curve (X : Z): the numerator Z^deg g(X/Z)."""

@@ -61,8 +61,8 @@ class Search(PrintableResult):
         """The comment of a system file that formulas hold at one eps only; empty where the formulas contain eps."""
         if self.eps is None:
             return []
-        step = eps_suffix(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
-        return [f"# for eps = {self.eps} only{step}: check with --eps {self.eps}"]
+        time_step_text = eps_suffix(self.eps, self.file.map).removeprefix(f", eps = {self.eps}")
+        return [f"# for eps = {self.eps} only{time_step_text}: check with --eps {self.eps}"]
 
 
 def closing_period(maps: Sequence[ModularMap]) -> int | None:

@@ -268,7 +268,7 @@ def interpolate_bases(
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
 
     @cache
-    def again_at(prime: int, values: tuple[int, ...]) -> SpaceSearch | None:
+    def repeat_at(prime: int, values: tuple[int, ...]) -> SpaceSearch | None:
         try:
             return repeat_search(result, laboratory.map_for(prime, values), reference)
         except (NoPoint, BadPrime):
@@ -283,7 +283,7 @@ def interpolate_bases(
             def alike(
                 prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
             ) -> list[DarbouxSpace] | None:
-                other = again_at(prime, values)
+                other = repeat_at(prime, values)
                 return None if other is None else group_by_pattern(other.spaces[number])[kind]
 
             distinguished = find_branches(model, alike, names, laboratory.seed, budget, laboratory.root)
@@ -293,11 +293,11 @@ def interpolate_bases(
                 return [], f"integrals were found modulo primes, but no closed form: {cause}"
             branches.setdefault(number, {})[kind] = distinguished
 
-    def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
-        again = repeat_search(result, map_, reference, branches)
-        return None if again is None else again.all_spaces
+    def repeated_spaces(map_: ModularMap) -> list[DarbouxSpace] | None:
+        repetition = repeat_search(result, map_, reference, branches)
+        return None if repetition is None else repetition.all_spaces
 
-    forms = laboratory.formulas(result.all_spaces, spaces_on, budget)
+    forms = laboratory.formulas(result.all_spaces, repeated_spaces, budget)
     if forms.bases is None:
         return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
     return forms.bases, ""

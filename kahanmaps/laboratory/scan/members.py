@@ -111,8 +111,8 @@ class Scanned:
                 values = point_on(equations, len(self.names), field, rng)
                 if values is None:
                     continue
-                *parameters, step = values if len(self.names) > len(self.map.symbols) else (*values, self.eps)
-                over = self.map.at(field.random(rng) if step is None else field.convert(step), field, parameters)
+                *parameters, eps = values if len(self.names) > len(self.map.symbols) else (*values, self.eps)
+                over = self.map.at(field.random(rng) if eps is None else field.convert(eps), field, parameters)
             except BadPrime:
                 continue
             break

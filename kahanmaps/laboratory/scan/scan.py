@@ -210,8 +210,8 @@ def scan(
                 return component
             if component.dimension == 0:
                 analyzed.add(component.degrees)
-            member, step = family.member(component.values)
-            result = analyze(member, eps=step, effort=analysis, seed=family.seed)
+            member, eps_of_member = family.member(component.values)
+            result = analyze(member, eps=eps_of_member, effort=analysis, seed=family.seed)
             return replace(component, verdict=result.conclusion)
 
         known, missed = run.apply(known, "analysis of a member on component", 1, with_verdict)
@@ -371,11 +371,11 @@ def _measure_growth(component: Component, family: Scanned, budget: Budget) -> De
     """Return the growth at a rational member; if there is none or it is special, the growth fitted to more degrees."""
     known = None
     if component.values is not None:
-        member, step = family.member(component.values)
+        member, eps_of_member = family.member(component.values)
         for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps, which may be special
             known = degree_growth(
                 member.map,
-                step,
+                eps_of_member,
                 seed=family.seed + attempt,
                 effort=Budget(min(_GROWTH_UNITS, budget.left)),
                 steps=STEPS,

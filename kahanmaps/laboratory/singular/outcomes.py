@@ -270,7 +270,7 @@ class Tracking:
         return letters
 
     def along(self, form: Any, field: PrimeField) -> Tracked:
-        """Return the functions that are tracked along a curve through the hypersurface of a form."""
+        """Return the functions whose orders are measured along curves through the hypersurface of `form`."""
         forms, stage = [*self.critical, *self.excess], self.stage or 0
         return Tracked(
             tuple(form_order(tracked.form, field) for tracked in forms),

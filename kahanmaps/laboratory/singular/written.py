@@ -234,19 +234,20 @@ def name_of(form: Any, map_: MapFamily) -> str:
 def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) -> tuple[Hypersurface, ...]:
     """The hypersurfaces that a map contracts at one eps, each with its polynomial over Q[eps] where that is found.
 
-    Exact: at this eps the polynomial is that of the hypersurface, up to a factor. None is found for compositions that
-    are multiplied out, where forms are large, and at an eps where a polynomial is reducible.
+    Exact: at this eps the polynomial is that of the hypersurface, up to a factor. It is left empty for
+    compositions that are multiplied out, where forms are large, and where it is reducible at this eps.
     """
-    names: dict[int | None, dict[str, str]] = {}
-    named = []
+    polynomials: dict[int | None, dict[str, str]] = {}  # by factor of the map, then by polynomial at this eps
+    result = []
     for hypersurface in hypersurfaces:
-        if hypersurface.stage not in names:
-            names[hypersurface.stage] = _named(map_, eps, hypersurface.stage)
-        named.append(replace(hypersurface, generic=names[hypersurface.stage].get(hypersurface.polynomial, "")))
-    return tuple(named)
+        if hypersurface.stage not in polynomials:
+            polynomials[hypersurface.stage] = _generic_polynomials(map_, eps, hypersurface.stage)
+        generic = polynomials[hypersurface.stage].get(hypersurface.polynomial, "")
+        result.append(replace(hypersurface, generic=generic))
+    return tuple(result)
 
 
-def _named(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
+def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[str, str]:
     """Find the polynomials over Q[eps] of the hypersurfaces that a map contracts, from those at one eps."""
     variables = map_.variables
     if map_.symbols or "eps" in variables or "Z" in variables:

@@ -62,8 +62,8 @@ class Equivalence(ResultPart):
         if self.P == QQ.identity(len(self.q)) and not any(e != 0 for e in self.q):
             change = "with its variables called " + ", ".join(self.variables)
         factor = "-" if self.c == -1 else f"{format_number(1 / self.c)}*"
-        step = "" if self.c == 1 else f", with {factor}eps in place of eps"
-        return f"equivalent to {self.name}{f' at {values}' if values else ''} {change}{step}"
+        eps_text = "" if self.c == 1 else f", with {factor}eps in place of eps"
+        return f"equivalent to {self.name}{f' at {values}' if values else ''} {change}{eps_text}"
 
     def __str__(self) -> str:
         return self.text

@@ -43,7 +43,7 @@ class ClassicalOrbit:
         if method not in METHODS:
             raise InputError(f"found the method {str(method)[:40]!r}, expected {' or '.join(METHODS)}")
         if len(start) != system.dim:
-            raise InputError(f"found a point with {len(start)} coordinates, expected {system.dim}")
+            raise InputError(f"found a point with {counted(len(start), 'coordinate')}, expected {system.dim}")
         self.steps, self.method = steps, method
         self.end: OrbitEnd | None = None
         self._dim = system.dim

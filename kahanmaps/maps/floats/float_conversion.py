@@ -79,7 +79,7 @@ class _Floats:
 
     @staticmethod
     def value(polynomial: Any, point: Sequence[float]) -> None:
-        """Return None: a polynomial is evaluated term by term."""
+        """Return None: floating-point numbers have no method of their own, so `evaluate` sums the terms."""
 
     @staticmethod
     def is_zero(value: float) -> bool:

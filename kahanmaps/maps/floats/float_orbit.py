@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.floats.ensemble import (
     SAMPLED,
@@ -85,7 +85,8 @@ class FloatOrbit:
         require_every(every)
         if len(start) != system.dim:
             raise InputError(
-                f"found a point with {len(start)} coordinates, expected {system.dim}: {', '.join(system.variables)}"
+                f"found a point with {counted(len(start), 'coordinate')}, "
+                f"expected {system.dim}: {', '.join(system.variables)}"
             )
         self.start = to_floats(start)
         self.steps = steps

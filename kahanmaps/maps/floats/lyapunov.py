@@ -159,13 +159,13 @@ def lyapunov_exponents(
     eps, transient = rational(resolve_eps(eps, time_step, h, floats=True)), integer(transient, "transient")
     if starts is None:
         raise InputError("found no initial point, expected x0=[...]")
-    size = to_float(eps)
-    if size == 0.0:
+    float_eps = to_float(eps)
+    if float_eps == 0.0:
         raise InputError(
             "eps rounds to 0 as a floating-point number, expected another number: the map is the identity at eps = 0"
         )
     if steps < 2 or transient < 0:
-        raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
+        raise InputError(f"found steps = {steps} and transient = {transient}, expected at least 2 and at least 0")
     x = start_rows(starts)
     map_ = as_map(system).real_approximation
     n = map_.dim
@@ -189,24 +189,25 @@ def lyapunov_exponents(
             alive &= ~np.isnan(after).any(axis=(0, 2))
             points = np.concatenate([previous, after])[:, alive]
             with np.errstate(all="ignore"):
-                maps, logs = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
-                maps, logs = maps.reshape(count, -1, n, n), logs.reshape(count, -1)
+                maps, log_dets = _tangent_maps(equations, points[:-1].reshape(-1, n), points[1:].reshape(-1, n))
+                maps, log_dets = maps.reshape(count, -1, n, n), log_dets.reshape(count, -1)
                 norms = np.log(np.linalg.norm(maps, axis=(2, 3)))
-            sound = np.isfinite(logs).all(axis=0) & (norms < _MAX_NORM).all(axis=0)
+            sound = np.isfinite(log_dets).all(axis=0) & (norms < _MAX_NORM).all(axis=0)
             alive[alive] = sound
-            maps, logs, norms, Q = maps[:, sound], logs[:, sound], norms[:, sound], frames[alive]
-            volumes[alive] += logs.sum(axis=0)
-            # The condition of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|; conditions are submultiplicative.
-            conditions = np.maximum(
-                np.log(2.0) + n * (norms - np.log(n) / 2) - logs, norms * _MAX_CONDITION / _MAX_NORM
+            maps, log_dets, norms, Q = maps[:, sound], log_dets[:, sound], norms[:, sound], frames[alive]
+            volumes[alive] += log_dets.sum(axis=0)
+            # Logarithms of bounds: the condition number of dPhi is at most 2 (|dPhi|/sqrt n)^n/|det dPhi|, and that of
+            # a product at most the product of those of the factors.
+            log_conditions = np.maximum(
+                np.log(2.0) + n * (norms - np.log(n) / 2) - log_dets, norms * _MAX_CONDITION / _MAX_NORM
             )
             first, total = 0, 0.0
-            for k, condition in enumerate([*conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
-                if k and total + condition > _MAX_CONDITION:
+            for k, log_condition in enumerate([*log_conditions.max(axis=1, initial=0.0).tolist(), np.inf]):
+                if k and total + log_condition > _MAX_CONDITION:
                     Q, R = np.linalg.qr(reduce(lambda product, map_: map_ @ product, maps[first:k], Q))
                     sums[alive] += np.log(np.abs(np.diagonal(R, axis1=1, axis2=2)))
                     first, total = k, 0.0
-                total += condition
+                total += log_condition
             frames = np.zeros((len(x), n, n))
             frames[alive] = Q
             if orbits.step == transient:
@@ -218,9 +219,9 @@ def lyapunov_exponents(
     counted = max(0, done - transient)
     ended = len(x) - int(alive.sum())
     alive &= counted > 0
-    unit = convention.time_step(size, map_) or 1.0
+    unit = convention.time_step(float_eps, map_) or 1.0
     order = np.argsort(-sums[alive] / unit, axis=1)  # the unit is negative for negative eps
-    early = half[alive] / (unit * (steps // 2) if counted >= steps // 2 else np.nan)
+    first_half = half[alive] / (unit * (steps // 2) if counted >= steps // 2 else np.nan)
     return Lyapunov(
         unit,
         counted,
@@ -228,7 +229,7 @@ def lyapunov_exponents(
         len(x),
         ended,
         np.take_along_axis(sums[alive], order, axis=1) / (unit * max(1, counted)),
-        np.take_along_axis(early, order, axis=1),
+        np.take_along_axis(first_half, order, axis=1),
         volumes[alive] / (unit * max(1, counted)),
         ended < len(x) and counted < steps,
     )

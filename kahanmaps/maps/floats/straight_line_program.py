@@ -124,33 +124,41 @@ class Value:
         self.code, self.number = code, number
 
     def __neg__(self) -> Any:
-        positive = _negated(self)
+        positive = _operand_of_negation(self)
         return self.code.emit("neg", self) if positive is None else positive
 
     def __add__(self, other: Any) -> Any:
         if is_zero(other):
             return self
         for x, y in ((self, other), (other, self)):
-            if _negated(y) is not None:
-                return x - _negated(y)
+            if _operand_of_negation(y) is not None:
+                return x - _operand_of_negation(y)
         return self.code.emit("add", self, other)
 
     def __sub__(self, other: Any) -> Any:
         if is_zero(other):
             return self
-        return self.code.emit("sub", self, other) if _negated(other) is None else self + _negated(other)
+        return (
+            self.code.emit("sub", self, other)
+            if _operand_of_negation(other) is None
+            else self + _operand_of_negation(other)
+        )
 
     def __rsub__(self, other: Any) -> Any:
         if is_zero(other):
             return -self
-        return self.code.emit("sub", other, self) if _negated(self) is None else other + _negated(self)
+        return (
+            self.code.emit("sub", other, self)
+            if _operand_of_negation(self) is None
+            else other + _operand_of_negation(self)
+        )
 
     def __mul__(self, other: Any) -> Any:
         if not isinstance(other, Value) and other in (0.0, 1.0, -1.0):
             return 0.0 if other == 0.0 else self if other == 1.0 else -self
         for x, y in ((self, other), (other, self)):
-            if _negated(y) is not None:
-                return -(x * _negated(y))
+            if _operand_of_negation(y) is not None:
+                return -(x * _operand_of_negation(y))
         return self.code.emit("mul", self, other)
 
     def __truediv__(self, other: Any) -> Any:
@@ -160,7 +168,7 @@ class Value:
         return 0.0 if is_zero(other) else self.code.emit("div", other, self)
 
     def __abs__(self) -> Any:
-        positive = _negated(self)
+        positive = _operand_of_negation(self)
         return self.code.emit("abs", self if positive is None else positive)
 
     def __gt__(self, other: Any) -> Any:
@@ -184,7 +192,7 @@ class Value:
     __radd__, __rmul__, __rand__, __ror__ = __add__, __mul__, __and__, __or__
 
 
-def _negated(x: Any) -> Any:
+def _operand_of_negation(x: Any) -> Any:
     """Return y if x was computed as -y, else None."""
     if not isinstance(x, Value) or x.number < x.code.inputs:
         return None

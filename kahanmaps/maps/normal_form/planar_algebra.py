@@ -166,7 +166,7 @@ class ShortElements:
 
     @staticmethod
     def divisor(value: EtaleElement) -> EtaleElement:
-        """Return the inverse, by which `difference` and `combined` divide."""
+        """Return 1/value: `difference` and `combined` divide by multiplying with it."""
         return 1 / value
 
     def difference(

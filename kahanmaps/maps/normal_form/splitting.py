@@ -17,7 +17,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
 from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.printing import format_univariate
-from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
@@ -90,7 +90,7 @@ class Splitting:
         """Return the homogeneous coordinates (2 eps u : 2 eps v : 1) of a point in every plane."""
         n, m = self.dim, self.form.m
         if len(x) != n:
-            raise InputError(f"found a point with {len(x)} coordinates, expected {n}")
+            raise InputError(f"found a point with {counted(len(x), 'coordinate')}, expected {n}")
         with self.field.working():
             z = (self._inverse * self.field.matrix(n, 1, list(x))).entries()
             z = [entry * self._scale for entry in z]

@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
-from kahanmaps.algebra.printing import csv_line, guarded
+from kahanmaps.algebra.printing import csv_line, spreadsheet_safe
 from kahanmaps.atomic_files import atomic_write, open_append, write_atomically
 from kahanmaps.errors import InputError
 from kahanmaps.maps.convention import eps_record_suffix
@@ -128,7 +128,7 @@ class Csv(Writer):
     def header(self, header: dict[str, Any]) -> None:
         self._header = header
         self._write_metadata(None)
-        self._line(csv_line(["step", *self.variables, *map(guarded, self.integrals)])[:-1])
+        self._line(csv_line(["step", *self.variables, *map(spreadsheet_safe, self.integrals)])[:-1])
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))

@@ -58,20 +58,20 @@ def inverse_tensor(o: PaperObjects) -> Pairs:
 def functions_P_and_Q(o: PaperObjects) -> Pairs:
     """P_0 and Q_i are as printed for m = 3, with s_0 = 1 and the s_i the eigenvalues of I - eps^2 f'^2
     P_0 = (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4, Q_1 = (-1/s_0 - 1/s_1 + 1/s_2 + 1/s_3)/(4 eps^2), ..."""
-    one, squared = o.K.one, o.eps * o.eps
-    reciprocal = [one / (one - squared * o.eigenvalue_of_square(i, o.x)) for i in o.each]
+    one, eps_squared = o.K.one, o.eps * o.eps
+    reciprocal = [one / (one - eps_squared * o.eigenvalue_of_square(i, o.x)) for i in o.each]
     yield o.P0(o.x) * o.number(4), one + o.sum(reciprocal)
     for i in o.each:
         right = o.sum(reciprocal) - reciprocal[i] - reciprocal[i] - one
-        yield o.Q(i, o.x) * (o.number(4) * squared), right
+        yield o.Q(i, o.x) * (o.number(4) * eps_squared), right
 
 
 @claim("(102)", "s0", "B", only_m=3)
 def function_s0(o: PaperObjects) -> Pairs:
     """s_0 is 1, that is p_0 = q_1 + q_2 + q_3
     s_0 = 1 - eps^2 (p_0 - q_1 - q_2 - q_3) = 1"""
-    squared = o.eps * o.eps
-    yield o.K.one - squared * o.p0(o.x) + squared * o.sum([o.q(i, o.x) for i in o.each]), o.K.one
+    eps_squared = o.eps * o.eps
+    yield o.K.one - eps_squared * o.p0(o.x) + eps_squared * o.sum([o.q(i, o.x) for i in o.each]), o.K.one
 
 
 @claim("(102)", "s0", "B")
@@ -85,12 +85,15 @@ def sum_of_the_q(o: PaperObjects) -> Pairs:
 def functions_s(o: PaperObjects) -> Pairs:
     """The two forms of s_1, s_2, s_3 agree
     s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ..."""
-    squared = o.eps * o.eps
+    eps_squared = o.eps * o.eps
     q = [o.q(i, o.x) for i in o.each]
     for i in o.free:
         j, k = (other for other in o.each if other != i)
-        yield o.s(i, o.x), o.K.one - squared * o.p0(o.x) + squared * q[i] - squared * q[j] - squared * q[k]
-        yield o.s(i, o.x), o.K.one - (squared + squared) * q[j] - (squared + squared) * q[k]
+        yield (
+            o.s(i, o.x),
+            o.K.one - eps_squared * o.p0(o.x) + eps_squared * q[i] - eps_squared * q[j] - eps_squared * q[k],
+        )
+        yield o.s(i, o.x), o.K.one - (eps_squared + eps_squared) * q[j] - (eps_squared + eps_squared) * q[k]
 
 
 @claim("(103)-(105)", "s1", "B")
@@ -105,15 +108,15 @@ def functions_s_are_eigenvalues(o: PaperObjects) -> Pairs:
 def H_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
     """H and the K_i give H~; all three lines hold
     H~ = 2 P_0 x^T J f + 2 eps^2 sum Q_i x^T B_i J f = ... = -6 P_0 H - 6 eps^2 sum Q_i K_i"""
-    squared = o.eps * o.eps
+    eps_squared = o.eps * o.eps
     P0, Q = o.P0(o.x), [o.Q(i, o.x) for i in o.each]
     first = P0 * o.dot(o.x, o.J * o.fx) * o.number(2)
     second = P0 * o.dot(o.x, o.grad(o.x)) * o.number(-2)
     third = P0 * o.H(o.x) * o.number(-6)
     for i in o.each:
-        first = first + squared * Q[i] * o.dot(o.x, o.B(i) * (o.J * o.fx)) * o.number(2)
-        second = second - squared * Q[i] * o.dot(o.x, o.B(i) * o.grad(o.x)) * o.number(2)
-        third = third - squared * Q[i] * o.Kf(o.B(i), o.x) * o.number(6)
+        first = first + eps_squared * Q[i] * o.dot(o.x, o.B(i) * (o.J * o.fx)) * o.number(2)
+        second = second - eps_squared * Q[i] * o.dot(o.x, o.B(i) * o.grad(o.x)) * o.number(2)
+        third = third - eps_squared * Q[i] * o.Kf(o.B(i), o.x) * o.number(6)
     for line in (first, second, third):
         yield o.H_tilde(o.x), line
 
@@ -170,7 +173,7 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
     """The five lines of the proof of (94) hold for each i
     -B_1 nabla H~/6 = P_0 nabla K_1 + eps^2 H nabla Q_1 + eps^2 Q_1 nabla H + K_1 nabla P_0 - ... = -nabla K~_1/6"""
     v = o.vector("v")
-    squared = o.eps * o.eps
+    eps_squared = o.eps * o.eps
     Q = [o.Q(i, o.x) for i in o.each]
     K = [o.Kf(o.B(i), o.x) for i in o.each]
     dK = [o.dot(v, o.B(i) * o.grad(o.x)) for i in o.each]
@@ -182,10 +185,10 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
         along = o.B(i).transpose() * v
         before = o.slope(lambda o, x: o.H_tilde(x), o.x, along) * o.number(-1, 6)
         yield before, _product_rule(o, along)
-        lines = o.P0(o.x) * dK[i] + squared * o.H(o.x) * dQ[i]
-        lines = lines + squared * Q[i] * dH + K[i] * dP
-        lines = lines - squared * (Q[j] * dK[k] + K[j] * dQ[k])
-        lines = lines - squared * (Q[k] * dK[j] + K[k] * dQ[j])
+        lines = o.P0(o.x) * dK[i] + eps_squared * o.H(o.x) * dQ[i]
+        lines = lines + eps_squared * Q[i] * dH + K[i] * dP
+        lines = lines - eps_squared * (Q[j] * dK[k] + K[j] * dQ[k])
+        lines = lines - eps_squared * (Q[k] * dK[j] + K[k] * dQ[j])
         yield before, lines
         yield lines, o.slope(lambda o, x: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
 

@@ -13,7 +13,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.invariants.phase_functions import CommutantIntegral, ModifiedHamiltonian, measured_integrals
+from kahanmaps.invariants.integrals_and_densities import CommutantIntegral, ModifiedHamiltonian, measured_integrals
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
 from kahanmaps.plots.point_functions import PointFunction, point_function

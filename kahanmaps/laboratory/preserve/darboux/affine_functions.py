@@ -276,12 +276,12 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     rng = random.Random("a point of the hyperplane")
     free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
     point = [evaluate(x, QQ, free) for x in on_hyperplane]
-    for outcome, step in (("undefined", eps), ("contracted", -eps)):
-        if KahanFamily(system).at(step).determinant(point) != 0:  # one point suffices: no need to expand
+    for outcome, signed_eps in (("undefined", eps), ("contracted", -eps)):
+        if KahanFamily(system).at(signed_eps).determinant(point) != 0:  # one point suffices: no need to expand
             continue
         field, one = FunctionField(system.variables, _BUDGET), context.constant(1)
         entries = [
-            Function(field, int(i == j) - f.derivative(j).compose(*on_hyperplane, ctx=context) * step, one)
+            Function(field, int(i == j) - f.derivative(j).compose(*on_hyperplane, ctx=context) * signed_eps, one)
             for i, f in enumerate(system.rhs)
             for j in range(n)
         ]

@@ -31,7 +31,7 @@ from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_facto
 from kahanmaps.algebra.printing import format_polynomial, format_product
 from kahanmaps.algebra.work import SPENT, Budget
 from kahanmaps.algebra.work import count as count_work
-from kahanmaps.invariants.phase_functions import jacobian_determinant_sides
+from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (
     DarbouxSpace,
@@ -66,10 +66,10 @@ class Cofactor:
     polynomial: fmpq_mpoly | None
     kind: str = "reversed"
 
-    def over(self, map_: Map, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
+    def fraction(self, map_: Map, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
         """Return numerator and denominator of the value at a point, at these values of the symbols."""
         if self.polynomial is None:
-            return jacobian_determinant_sides(map_, x, image)
+            return jacobian_determinant_fraction(map_, x, image)
         field, eps = map_.field, map_.eps
         g = evaluate(self.polynomial, field, (*x, *values, eps))
         if self.kind == "reversed":
@@ -78,12 +78,12 @@ class Cofactor:
             return evaluate(self.polynomial, field, (*image, *values, eps)), g
         return (g, field.one) if self.kind == "factor" else (field.one, g)
 
-    def sides(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
+    def modular_fraction(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
         """Return numerator and denominator of the value at a point modulo a prime."""
         if self.polynomial is None:
             return map_.determinant(x, image)
         residues = ([map_.map.field.convert(c) for c in entries] for entries in (x, image, map_.values))
-        numerator, denominator = self.over(map_.map, *residues)
+        numerator, denominator = self.fraction(map_.map, *residues)
         return int(numerator), int(denominator)
 
     @property
@@ -122,7 +122,7 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     try:
         over = map_.at(eps, field, x[n:])
         image = over.step(x[:n])
-        numerator, denominator = jacobian_determinant_sides(over, x[:n], image)
+        numerator, denominator = jacobian_determinant_fraction(over, x[:n], image)
         J = numerator / denominator
     except BudgetExceeded:
         D = None
@@ -201,7 +201,7 @@ class Sample:
     map: ModularMap
     pairs: list[tuple[Point, Point]]
     cofactors: Sequence[Cofactor]
-    sides: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # cache: values by cofactor, then point
+    fractions: dict[int, list[tuple[int, int]]] = field(default_factory=dict)  # cache: values by cofactor, then point
 
     @property
     def up_to_numbers(self) -> bool:
@@ -220,11 +220,11 @@ class Sample:
         for k, (power, cofactor) in enumerate(zip(product.powers, self.cofactors, strict=True)):
             if power:
                 count_work(4 * len(values))
-                if k not in self.sides:
-                    self.sides[k] = [cofactor.sides(self.map, x, image) for x, image in self.pairs]
+                if k not in self.fractions:
+                    self.fractions[k] = [cofactor.modular_fraction(self.map, x, image) for x, image in self.pairs]
                 values = [
                     (a * pow(c, power, prime) % prime, b * pow(d, power, prime) % prime)
-                    for (a, b), (c, d) in zip(values, self.sides[k], strict=False)
+                    for (a, b), (c, d) in zip(values, self.fractions[k], strict=False)
                 ]
         return values
 
@@ -299,8 +299,8 @@ def _values(
     """Return the rows C m(x) and m(x~) of the monomials m, both times the denominator of C, one row for each point."""
     at_points, at_images, count = [], [], len(places) + _SPARE
     count_work(count * len(places) / 8)
-    for (x, image), sides in zip(sample.pairs[:count], sample.values(product, count), strict=True):
-        before, after = sample.map.moved(x, image, degree, sides)
+    for (x, image), fraction in zip(sample.pairs[:count], sample.values(product, count), strict=True):
+        before, after = sample.map.moved(x, image, degree, fraction)
         at_points.append([before[k] for k in places])
         at_images.append([after[k] for k in places])
     return at_points, at_images

@@ -263,7 +263,7 @@ def _closed_form(
             rhs = rhs * evaluate(factor.numerator, field, (*values, eps))
             for cofactor, power in zip(cofactors, product.powers, strict=True):
                 if power:
-                    numerator, denominator = cofactor.over(map_at_eps, x, image, symbols)
+                    numerator, denominator = cofactor.fraction(map_at_eps, x, image, symbols)
                     for _ in range(power):
                         lhs, rhs = lhs * denominator, rhs * numerator
             return [lhs], [rhs]

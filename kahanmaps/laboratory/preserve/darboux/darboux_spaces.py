@@ -414,7 +414,10 @@ class TwoPointMap(ModularMap):
 
 
 def two_point_spaces(map_: ModularMap, lift: TwoPointBasis) -> list[DarbouxSpace]:
-    """Find the spaces of functions with a common cofactor; for rank 2 the space of all functions in relations."""
+    """Find the spaces of functions of two points with a common cofactor.
+
+    For rank 2 this is the one space of all functions that occur in relations along orbits.
+    """
     two_point_map = TwoPointMap(map_, lift)
     if lift.rank == 1:
         return darboux_spaces(two_point_map, TWO_POINT_DEGREE) or []

@@ -307,7 +307,7 @@ class _Search:
 
 
 def _is_irrational(residue: int, modulus: int) -> bool:
-    """Whether this is the residue of an algebraic number of degree 2 to 8 with simple coefficients, and not rational.
+    """Whether this is the residue of a root of an irreducible polynomial of degree 2 to 8 with small coefficients.
 
     >>> p = 7**60
     >>> root = 3  # of x^2 - 2 modulo 7

@@ -37,7 +37,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count as count_work
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, counted
-from kahanmaps.invariants.phase_functions import modified
+from kahanmaps.invariants.integrals_and_densities import modified
 from kahanmaps.laboratory.modular_points import ModularMap, Point
 from kahanmaps.laboratory.preserve.darboux.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.maps.kahan import KahanFamily, KahanMap, SystemLike

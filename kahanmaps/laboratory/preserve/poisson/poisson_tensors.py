@@ -33,7 +33,7 @@ from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
 from kahanmaps.display_protocols import LatexDisplay, ResultPart, latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, KahanmapsError, counted, quoted
-from kahanmaps.invariants.phase_functions import at_eps
+from kahanmaps.invariants.integrals_and_densities import at_eps
 from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.defaults import budget_for, tensor_degree
 from kahanmaps.laboratory.laboratory import Laboratory, certified

@@ -395,18 +395,18 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     return where(dim, numerator) if denominator.is_zero() else where(dim, numerator, denominator)
 
 
-def jacobian_determinant_sides(kahan: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
-    """Return numerator and denominator of det dPhi(x), for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x)).
+def jacobian_determinant_fraction(map_at_eps: Map, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
+    """Return numerator and denominator of det dPhi(x); for a Kahan map det(I + eps f'(x~)) and det(I - eps f'(x)).
 
     For a map with several factors they are the products over the factors.
     """
-    factors, points = zip(*kahan.stages(x), strict=True)
+    factors, points = zip(*map_at_eps.stages(x), strict=True)
     numerator = [
         det(factor.numerator_matrix(before, after))
         for factor, before, after in zip(factors, points, (*points[1:], image), strict=True)
     ]
     denominator = [factor.determinant(before) for factor, before in zip(factors, points, strict=True)]
-    with kahan.field.working():
+    with map_at_eps.field.working():
         return reduce(mul, numerator), reduce(mul, denominator)
 
 
