@@ -92,8 +92,7 @@ def test_modified_h_written_out_is_supported():
 
 @pytest.mark.parametrize(("term", "power"), [("q", 300), ("eps^2/(1 - 2*eps^2*q)", 50)])
 def test_modified_h_with_one_coefficient_wrong_in_a_far_digit_is_refuted(term, power):
-    text = f"{written_out(WEIERSTRASS)} + ({term})/10^{power}"
-    assert check_claim(WEIERSTRASS.system, text).verdict is REFUTED
+    assert check_claim(WEIERSTRASS.system, f"{written_out(WEIERSTRASS)} + ({term})/10^{power}").verdict is REFUTED
 
 
 @pytest.mark.parametrize(

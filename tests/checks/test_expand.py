@@ -20,8 +20,7 @@ AT_ONE_TENTH = "(1 - y^2/100)/(1 + 2*z^2/100)"
 
 
 def identity(claim: str, eps: fmpq | None):
-    function = parse_rational_function(claim, ["x", "y", "z", "eps"])
-    return conservation(TOP, ClaimedIntegral("I", function), eps)
+    return conservation(TOP, ClaimedIntegral("I", parse_rational_function(claim, ["x", "y", "z", "eps"])), eps)
 
 
 def test_a_conserved_quantity_is_proved_for_every_eps():

@@ -74,8 +74,7 @@ def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_co
     assert kahanmaps("orbit", tmp_path / "top.toml", others).records[1:] == from_catalogue
     inline = "--vars x1,x2,x3 --rhs x2*x3 --rhs -2*x3*x1 --rhs=x1*x2"
     assert kahanmaps(f"orbit {inline} {others}").records[1:] == from_catalogue
-    piped = shell(f"kahanmaps orbit - {others}", tmp_path, stdin=toml.encode())
-    assert piped.records[1:] == from_catalogue
+    assert shell(f"kahanmaps orbit - {others}", tmp_path, stdin=toml.encode()).records[1:] == from_catalogue
 
 
 def test_text_is_tab_separated_between_comments(kahanmaps):
@@ -181,8 +180,7 @@ def points(run) -> list:
 @pytest.mark.parametrize("suffix", ["jsonl", "csv", "npz"])
 def test_steps_beyond_machine_integers_are_written_in_every_format(kahanmaps, tmp_path, suffix):
     path = tmp_path / f"far.{suffix}"
-    line = f"{MEMBER} --at 5,{10**30} --arithmetic mod:10007 --method doubling -o {path}"
-    assert kahanmaps(line).status == 0
+    assert kahanmaps(f"{MEMBER} --at 5,{10**30} --arithmetic mod:10007 --method doubling -o {path}").status == 0
     assert path.stat().st_size > 0
 
 

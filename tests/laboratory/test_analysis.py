@@ -162,8 +162,7 @@ NONE = "at eps = 1 det(I - eps f'(x)) is 0 at all of them, where the map is not 
     ],
 )
 def test_what_is_said_of_fixed_points_holds_at_the_eps_in_force(given, eps, expected):
-    analysis = analyze(given, eps=eps, analyses=QUICK_STEPS)
-    assert lines_of(analysis, "vector field")[-1].startswith(expected)
+    assert lines_of(analyze(given, eps=eps, analyses=QUICK_STEPS), "vector field")[-1].startswith(expected)
 
 
 NOWHERE = "at eps = 1 the map is defined nowhere: det(I - eps f'(x)) is identically 0"

@@ -113,8 +113,7 @@ def test_degrees_that_contradict_the_singularities_are_no_result():
 def test_the_pole_of_a_resonant_system_is_confined_after_k_steps():
     k = 13
     run = singularities(resonant(k), "1/7")
-    ends = [(h.confined_at, h.settled_at) for h in run.hypersurfaces if h.status == CONFINED]
-    assert ends == [(k, k)]
+    assert [(h.confined_at, h.settled_at) for h in run.hypersurfaces if h.status == CONFINED] == [(k, k)]
     assert run.text == "some confined, others not within 1000 steps"
     assert singularities(resonant(k), "1/7", steps=k - 1).text == f"not confined within {k - 1} steps"
     assert len(next(h for h in run.hypersurfaces if h.status == CONFINED).steps) == k + 2

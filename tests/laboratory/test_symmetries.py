@@ -107,8 +107,7 @@ def test_a_translation_is_found_where_it_is_needed():
 )
 def test_permutations_of_scaled_variables(rhs, actions):
     """With and without a rational scale; the last one is spoiled by a linear term."""
-    symmetries = linear_symmetries(system("x y", *rhs))
-    assert {t.text for t in symmetries.signed if not t.reversing} == set(actions)
+    assert {t.text for t in linear_symmetries(system("x y", *rhs)).signed if not t.reversing} == set(actions)
 
 
 def test_matrices_that_are_no_signed_permutations():

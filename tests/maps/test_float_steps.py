@@ -208,8 +208,7 @@ def test_a_zero_denominator_in_normal_form_is_singular_and_a_small_one_is_counte
 @over_kernels
 def test_an_overflow_ends_one_orbit_and_leaves_the_others(kernel):
     system = QuadraticSystem.from_text(["x", "y"], ["x", "x*y"])  # x~ = 3 x for eps = 1/2
-    starts = np.array([[1e300, 0.0]] + [[1e-300, 0.5]] * 200)
-    orbits = FloatEnsemble(system, "1/2", starts, kernel=kernel)
+    orbits = FloatEnsemble(system, "1/2", np.array([[1e300, 0.0]] + [[1e-300, 0.5]] * 200), kernel=kernel)
     orbits.advance(30)
     # 3^17 1e300 = 1.3e308 is in the range, 3^18 1e300 is not
     assert orbits.end(0) == OrbitEnd("overflow", 17, "step 18 leaves the range of floating-point numbers")

@@ -95,8 +95,7 @@ def test_at_complex_roots_the_orbit_returns_when_multiples_of_the_translation_ar
     def returns(shift):
         """Whether the orbit is close to its start after those numbers of steps for which this shift returns best."""
         multiples = np.arange(1, 20_001)[:, None] * shift
-        distances = np.abs(multiples - np.round(multiples)).max(axis=1)
-        return bool((moved[distances.argsort()[:4]] < close).all())
+        return bool((moved[np.abs(multiples - np.round(multiples)).max(axis=1).argsort()[:4]] < close).all())
 
     shift = np.array([float(x) for x in rotation.numbers])
     assert len(shift) == 2

@@ -104,8 +104,7 @@ def test_beside_a_proof_stand_random_points_with_the_error_bound_asked_for(reque
 @pytest.mark.parametrize("name", quick(["m=3, irreducible", "m=2, complex"], ["m=2, complex"]))
 def test_claims_about_one_block_hold_over_the_algebra_of_all_roots(name):
     report = verify(file(name), options=SIXTH)
-    methods = [evidence.method for evidence in by_key(report)["commutativity"].also]
-    assert "exact over Q[t]/chi" in methods
+    assert "exact over Q[t]/chi" in [evidence.method for evidence in by_key(report)["commutativity"].also]
 
 
 @pytest.mark.parametrize("name", quick(["m=2, complex", "m=3, irreducible", "m=3, split"], ["m=2, complex"]))

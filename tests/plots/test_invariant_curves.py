@@ -41,8 +41,7 @@ def defect(cubic, u, v):
 
 
 def another_structure():
-    hamiltonian = load("paper_m2").hamiltonian
-    return SystemFile.from_hamiltonian(CubicHamiltonian(hamiltonian.H, 3 * standard_structure(4)))
+    return SystemFile.from_hamiltonian(CubicHamiltonian(load("paper_m2").hamiltonian.H, 3 * standard_structure(4)))
 
 
 PLUS = random_member_with_eigenvalues([1, -2], seed=7)
@@ -170,8 +169,7 @@ def test_a_system_without_normal_form_is_refused_with_the_reason():
 
 def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_color_in_all_panels(curves):
     result = curves("m = 3")
-    figure = plot_invariant_curves(result, STYLE, original=(0, 1))
-    clouds = [axes.collections[0] for axes in figure.axes[:4]]
+    clouds = [axes.collections[0] for axes in plot_invariant_curves(result, STYLE, original=(0, 1)).axes[:4]]
     for cloud in clouds:
         assert np.array_equal(cloud.get_array(), np.arange(61))
         assert cloud.norm is clouds[0].norm
@@ -181,8 +179,7 @@ def test_the_dots_drawn_are_the_orbit_and_those_of_one_step_have_one_color_in_al
 
 def test_the_lines_drawn_lie_on_the_curve(curves):
     result = curves("m = 2")
-    axes = plot_invariant_curves(result, STYLE).axes[0]
-    lines = [line for line in axes.lines if line.get_marker() == "None"]
+    lines = [line for line in plot_invariant_curves(result, STYLE).axes[0].lines if line.get_marker() == "None"]
     u, v = (np.concatenate([line.get_data()[k] for line in lines]) for k in (0, 1))
     window = view_of(result.planes[0])
     inside = np.hypot(u, v) < 10 * np.abs(window.window).max()  # what is farther is cut off where it is not seen

@@ -114,8 +114,7 @@ def test_neighbours_on_two_circles_are_joined_and_the_circles_are_not():
 
 def test_an_orbit_that_has_not_come_round_has_two_ends_and_one_in_bunches_none():
     assert len(neighbours(circle(np.linspace(0, 5, 50)))) == 49
-    nearly_rational = neighbours(circle((2 * np.pi / 20 + 1e-4) * np.arange(200)))
-    assert np.bincount(nearly_rational.ravel()).tolist() == [2] * 200
+    assert np.bincount(neighbours(circle((2 * np.pi / 20 + 1e-4) * np.arange(200))).ravel()).tolist() == [2] * 200
 
 
 def test_a_cloud_has_no_curve():
@@ -124,8 +123,7 @@ def test_a_cloud_has_no_curve():
 
 
 def test_initial_points_and_equilibria_have_different_marks_and_both_are_in_the_legend():
-    result = orbits(8)
-    shown = replace(portrait_of(result, AXES), flow=plane_flow(LOTKA_VOLTERRA, (0, 1), ((-1, 3), (-1, 3))))
+    shown = replace(portrait_of(orbits(8), AXES), flow=plane_flow(LOTKA_VOLTERRA, (0, 1), ((-1, 3), (-1, 3))))
     [legend] = plot_portrait(shown, STYLE).legends
     marks = {
         text.get_text(): line.get_marker() for text, line in zip(legend.get_texts(), legend.get_lines(), strict=True)
@@ -242,8 +240,7 @@ def test_orbits_from_chosen_starts_stay_and_move_and_are_the_same_every_time(nam
 
 def test_starts_of_the_predator_and_its_prey_surround_the_equilibrium_of_the_equations():
     # a = 2, b = 1, c = 1, d = 3: the equilibrium with positive coordinates is (d/c, a/b) = (3, 2)
-    starts = automatic_starts(load("lotka_volterra", {"a": "2", "d": "3"}).system, "1/40")
-    assert (starts > [3, 2]).all()
+    assert (automatic_starts(load("lotka_volterra", {"a": "2", "d": "3"}).system, "1/40") > [3, 2]).all()
 
 
 def test_starts_lie_along_the_plane_that_is_named_and_need_no_equilibrium_and_no_motion():

@@ -59,8 +59,7 @@ def test_orbits_in_javascript_are_those_of_the_library(name):
         x = map_.step(x)
     integrals = analysis.integrals.integrals
     if integrals:
-        first = integrals[0].function.value(km.QQ, [*start, fmpq(1, 8)])
-        assert np.allclose(values, to_float(first), rtol=1e-9)
+        assert np.allclose(values, to_float(integrals[0].function.value(km.QQ, [*start, fmpq(1, 8)])), rtol=1e-9)
 
 
 @pytest.mark.skipif(NODE is None, reason="needs node")
@@ -101,8 +100,7 @@ def test_the_page_has_the_verdict_and_nothing_of_the_network(name):
 
 
 def test_a_verdict_for_one_eps_says_so():
-    page = Page(report_html(km.analyze(FILES["plane"], eps="1/7"), explore=True))
-    assert "at eps = 1/7 only" in page.text
+    assert "at eps = 1/7 only" in Page(report_html(km.analyze(FILES["plane"], eps="1/7"), explore=True)).text
     assert "for every eps" in Page(report_html(search_catalog("plane"), explore=True)).text
 
 
