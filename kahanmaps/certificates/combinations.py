@@ -72,18 +72,6 @@ def three_points(data: MapData) -> tuple[str, ...]:
     return (*data.variables, *data.new, *(f"{name}2" for name in data.new), *data.names[data.dim :])
 
 
-def residual(data: MapData, names: Sequence[str], first: int, second: int) -> list[fmpq_mpoly]:
-    """e(x, y) = M(x) y - r(x) in the ring of the names, x beginning at the letter `first` and y at `second`."""
-    n, context = data.dim, ring(names)
-    letters = context.gens()
-    constants = letters[len(names) - len(data.names) + n :]
-    result = []
-    for row in data.rows:
-        *entries, right = (entry.compose(*letters[first : first + n], *constants, ctx=context) for entry in row)
-        result.append(sum((e * y for e, y in zip(entries, letters[second : second + n], strict=True)), -right))
-    return result
-
-
 def row_multiples(data: MapData) -> list[fmpq]:
     """The numbers by which the rows of I - eps f' of a Kahan map were multiplied: M at x = 0 and eps = 0."""
     return [row[i][(0,) * len(data.names)] for i, row in enumerate(data.rows)]
@@ -150,18 +138,18 @@ def affine_symmetry(
         FalseClaim: if it does not.
     """
     target = target or data
-    n, names = data.dim, (*data.variables, *data.new, *data.names[data.dim :])
+    n, names = data.dim, data.two_points
     context = ring(names)
     gens = context.gens()
     divisor = lcm(*(int(entry.q) for entry in (*S.entries(), *shift)))
     at = [[_affine(S, shift, gens[k : k + n], i) for i in range(n)] for k in (0, n)]
     first, second = reversed(at) if reversing else at
-    moved = [P.compose(*first, *second, *gens[2 * n :], ctx=context) for P in residual(target, names, 0, n)]
+    moved = [P.compose(*first, *second, *gens[2 * n :], ctx=context) for P in target.residual(names, 0, n)]
     scale, own_scale = row_multiples(target), row_multiples(data)
     K = [[(-1 if reversing else 1) * S[i, j] * scale[i] / own_scale[j] for j in range(n)] for i in range(n)]
     multiple = lcm(*(int(entry.q) for row in K for entry in row))
     matrix = tuple(tuple(int(entry * multiple) for entry in row) for row in K)
-    own = residual(data, names, 0, n)
+    own = data.residual(names, 0, n)
     for row, value in zip(matrix, moved, strict=True):
         if value * multiple != sum((c * P for c, P in zip(row, own, strict=True)), context.constant(0)):
             raise FalseClaim(f"{name} is no {'reversing ' * reversing}symmetry: no certificate can be written")
@@ -207,7 +195,7 @@ def _orbit_integral(
     multipliers = [[c * s for c, s in zip(side, rows, strict=True)] for side in (first, second)]
     total = ring(names).constant(0)
     for side, k in zip(multipliers, (0, n), strict=True):
-        for c, e in zip(side, residual(data, names, k, k + n), strict=True):
+        for c, e in zip(side, data.residual(names, k, k + n), strict=True):
             total += c * e
     if total != next_value - value:
         raise FalseClaim(f"{name} is not conserved: no certificate can be written")

@@ -82,26 +82,33 @@ class MapData:
 
     @cached_property
     def residuals(self) -> tuple[fmpq_mpoly, ...]:
-        """r - M x~, in the variables, `new`, the symbols and eps."""
-        n = self.dim
-        context = ring((*self.variables, *self.new, *self.names[n:]))
-        letters = context.gens()
-        old, new = [*letters[:n], *letters[2 * n :]], letters[n : 2 * n]
-        residuals = []
-        for row in self.rows:
-            *entries, right = (entry.compose(*old, ctx=context) for entry in row)
-            residuals.append(right - sum((e * y for e, y in zip(entries, new, strict=True)), context.constant(0)))
-        return tuple(residuals)
+        """r - M x~, in the ring of `two_points`."""
+        return tuple(-residual for residual in self.residual(self.two_points, 0, self.dim))
 
     @cached_property
     def derivative(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
         """L, the derivative of r - M x~ in x at fixed x~."""
         return tuple(tuple(residual.derivative(j) for j in range(self.dim)) for residual in self.residuals)
 
+    @property
+    def two_points(self) -> tuple[str, ...]:
+        """The variables of x and of x~, and the constants."""
+        return (*self.variables, *self.new, *self.names[self.dim :])
+
+    def residual(self, names: Sequence[str], first: int, second: int) -> list[fmpq_mpoly]:
+        """M(x) y - r(x) in the ring of the names, x beginning at the letter `first` and y at `second`."""
+        n, context = self.dim, ring(names)
+        letters = context.gens()
+        constants = letters[len(names) - len(self.names) + n :]
+        result = []
+        for row in self.rows:
+            *entries, right = (entry.compose(*letters[first : first + n], *constants, ctx=context) for entry in row)
+            result.append(sum((e * y for e, y in zip(entries, letters[second : second + n], strict=True)), -right))
+        return result
+
     def at_points(self, *functions: fmpq_mpoly) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
         """The functions of x as functions of x and of x~, in the ring of `derivative`."""
-        n = self.dim
-        context = ring((*self.variables, *self.new, *self.names[n:]))
+        n, context = self.dim, ring(self.two_points)
         letters = context.gens()
         points = letters[:n], letters[n : 2 * n]
         at_old, at_new = ([F.compose(*x, *letters[2 * n :], ctx=context) for F in functions] for x in points)

@@ -15,7 +15,7 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
 from kahanmaps.certificates.chains import Chain
-from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral, residual
+from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral
 from kahanmaps.certificates.identities import (
     Claim,
     ConservedFunction,
@@ -144,10 +144,9 @@ class _Script:
         defined = " ".join(dict.fromkeys(name for names in (*points[1:], *denominators) for name in names if name))
         for k, (letter, source, v) in enumerate(claim.arrows, 1):
             s, data = claim.value_of(source), claim.maps[letter]
-            names = (*data.variables, *data.new, *data.names[n:])
-            for i, residual_i in enumerate(residual(data, names, 0, n)):
+            for i, residual in enumerate(data.residual(data.two_points, 0, n)):
                 moved, powers = self._without_denominators(
-                    residual_i, [*points[s], *points[v]], [*denominators[s], *denominators[v]]
+                    residual, [*points[s], *points[v]], [*denominators[s], *denominators[v]]
                 )
                 lines += [
                     f"Lemma arrow{k}_{i + 1} : {letter}{i + 1} {texts[s]} {texts[v]} = 0.",

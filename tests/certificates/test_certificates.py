@@ -52,7 +52,6 @@ from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
 from kahanmaps.laboratory.preserve.densities import find_densities
-from kahanmaps.languages.formulas import Formulas
 
 PROGRAMS = {
     "rocq": (["coqc"], ".v", r"(Definition cofactor : R := )", r"\1 1 + "),
@@ -95,8 +94,7 @@ def test_a_certificate_with_one_coefficient_changed_is_refused(name, checker, tm
 def claims_of(name: str, *wanted: str):
     """The map of a system, and the claims with these names, or the first one of a search."""
     file = load(name)
-    formulas = Formulas(file)
-    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    formulas, data = _prepared(file, "gp")
     known = dict(_known_claims(formulas, data))
     return [known[claim]()[-1] if claim in known else _claims_of(_SEARCHES[claim](file), data)[0] for claim in wanted]
 
@@ -222,8 +220,7 @@ def test_jacobi_identities_are_checked_for_a_tensor_that_is_invariant_but_not_po
 
 
 def test_false_claims_of_each_kind_have_no_certificate():
-    formulas = Formulas(load("euler_top"))
-    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    _, data = _prepared(load("euler_top"), "gp")
     x = ring(data.names).gens()
     refuses("D is no Darboux polynomial", darboux_polynomial, data, "D", x[0] + x[1], error=FalseClaim)
     with pytest.raises(FalseClaim, match="T is no symmetry"):
@@ -286,10 +283,8 @@ def test_a_variable_t_is_not_the_step_of_a_derivative(checker, tmp_path):
 @given(st.integers(1, 50), st.integers(1, 50), st.integers(1, 50), st.integers(1, 20))
 def test_the_scaled_value_is_that_at_the_image(x, y, z, eps):
     """D^k P(N/D) against P at the image that the map itself computes, modulo a prime."""
-    formulas, field = Formulas(load("euler_top")), GF(2**61 - 1)
-    names = (*formulas.names, "eps")
-    data = map_data(formulas.equation, formulas.variables, formulas.new, names)
-    P = parse_rational_function("x1^2*x2 - 3*x3 + eps*x1 + 5", names).numerator
+    (formulas, data), field = _prepared(load("euler_top"), "gp"), GF(2**61 - 1)
+    P = parse_rational_function("x1^2*x2 - 3*x3 + eps*x1 + 5", data.names).numerator
     point = [field.convert(value) for value in (x, y, z)]
     step = field.convert(f"1/{eps}")
     image = formulas.map.at(f"1/{eps}", field).step(tuple(point))
@@ -308,8 +303,7 @@ def test_the_scaled_value_is_that_at_the_image(x, y, z, eps):
 
 
 def test_the_adjugate_solves_the_equation_of_the_map():
-    formulas = Formulas(load("volterra_periodic_4"))
-    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    _, data = _prepared(load("volterra_periodic_4"), "gp")
     n = data.dim
     for i in range(n):
         row = data.rows[i]
@@ -329,11 +323,9 @@ def test_a_quotient_of_darboux_polynomials_with_different_cofactors_has_no_certi
 
 
 def test_a_density_that_is_not_invariant_has_no_certificate():
-    formulas = Formulas(load("lotka_volterra"))
-    names = (*formulas.names, "eps")
-    data = map_data(formulas.equation, formulas.variables, formulas.new, names)
+    _, data = _prepared(load("lotka_volterra"), "gp")
     with pytest.raises(FalseClaim, match="dx/phi is not invariant"):
-        invariant_volume(data, "volume", parse_rational_function("x", names))
+        invariant_volume(data, "volume", parse_rational_function("x", data.names))
 
 
 @pytest.mark.parametrize(
@@ -382,8 +374,7 @@ def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note
 
 
 def test_the_conserved_polynomials_have_the_same_cofactor_over_Z():
-    formulas = Formulas(load("euler_top"))
-    data = map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
+    formulas, data = _prepared(load("euler_top"), "gp")
     claim = conserved_function(data, "F1", formulas.integrals["F1"])
     assert homogeneous_value(claim.numerator, claim.degree, data) == claim.cofactor * claim.numerator
     assert homogeneous_value(claim.denominator, claim.degree, data) == claim.cofactor * claim.denominator

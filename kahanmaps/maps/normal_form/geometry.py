@@ -19,13 +19,13 @@ from flint import acb, acb_poly, arb, ctx, fmpq, fmpz
 from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display_protocols import PrintableResult
-from kahanmaps.errors import InputError, PrecisionLost
+from kahanmaps.errors import PrecisionLost
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.normal_form.level_curves import Jacobian
-from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
+from kahanmaps.maps.normal_form.periods import PeriodKind, classify, normal_form_and_start, torsion_order
 from kahanmaps.maps.normal_form.splitting import Splitting
 
 _ACCURACY = 1e-15  # of rotation numbers
@@ -156,14 +156,9 @@ def geometry(
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> plane = geometry(QuadraticSystem.from_text(["x", "y"], ["3*y^2", "-3*x^2"]), [1, 2], "1/10").planes[0]
     >>> plane.delta, plane.order, plane.rotations[0].number.str(8, radius=False)
-    (-19683/14048504, None, '0.10396157')
+    (-2187/46225, None, '0.17182562')
     """
-    form, eps, start = system_normal_form(system), resolve_eps(eps, time_step, h), either(start=start, x0=x0)
-    if start is None or eps is None:
-        raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
-    if isinstance(form, NoNormalForm):
-        raise InputError(f"found no normal form ({form.reason}), expected a system that has one")
-    return geometry_of(form, eps, start)
+    return geometry_of(*normal_form_and_start(system, resolve_eps(eps, time_step, h), either(start=start, x0=x0)))
 
 
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:

@@ -318,12 +318,18 @@ def period(
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
     'aperiodic'
     """
-    normal_form, eps, start = system_normal_form(system), resolve_eps(eps, time_step, h), either(start=start, x0=x0)
+    given = normal_form_and_start(system, resolve_eps(eps, time_step, h), either(start=start, x0=x0))
+    return period_of(*given, None if prime is None else integer(prime, "prime"))
+
+
+def normal_form_and_start(system: SystemLike, eps: Any, start: Any) -> tuple[SystemNormalForm, Any, Sequence[Any]]:
+    """Return the normal form with eps and the initial point. Raises InputError where one of them is missing."""
+    normal_form = system_normal_form(system)
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
     if start is None or eps is None:
         raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
-    return period_of(normal_form, eps, start, None if prime is None else integer(prime, "prime"))
+    return normal_form, eps, start
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:
