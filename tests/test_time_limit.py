@@ -11,6 +11,9 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.hard_stop import TimeLimit, time_limit
 from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.poisson.poisson_tensors import find_poisson
+from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers here")
 
@@ -88,3 +91,22 @@ def test_what_an_analysis_had_completed_stays_as_it_is():
     result.interrupt(str(stop.value))
     assert result.skipped == [f"{part}: the time limit of 0.5 s is over" for part in pending]
     assert (result.interrupted, result.pending) == (True, [])
+
+
+@pytest.mark.parametrize(
+    ("search", "system", "parts"),
+    [
+        (find_poisson, "euler_top", "tensors"),
+        (find_densities, "lotka_volterra", "densities"),
+        (linear_symmetries, "euler_top", "symmetries"),
+    ],
+)
+def test_a_search_hands_over_what_it_has_before_it_goes_on(search, system, parts):
+    results = []
+    final = search(load(system), on_result=results.append)
+    assert results
+    partial = getattr(results[-1], parts)
+    assert 0 < len(partial) <= len(getattr(final, parts))
+    if search is not linear_symmetries:  # which goes on to fill its result
+        assert "interrupted" in results[-1].reason
+        assert "interrupted" not in final.reason

@@ -20,6 +20,7 @@ from kahanmaps.errors import InputError
 
 LEAST_EFFORT, MOST_EFFORT = -20, 40
 SPENT = "work limit reached; raise --effort"  # why a search ended early
+UNFINISHED = "the search was interrupted before all stages were completed"
 
 
 class _Counter(threading.local):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import fmpq
 
-from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.fields import QQ, integer
 from kahanmaps.errors import InputError, PrecisionLost
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form.geometry import rotation_numbers
@@ -41,9 +41,14 @@ def plot_rotation(
 
     Solid lines are the rotation numbers of the map, dashed lines those of its second iterate where the map exchanges
     two real components, dotted lines those of the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal
-    lines mark some 1/n. Only real roots of chi have rotation numbers. Raises InputError if no point has one.
+    lines mark some 1/n. Only real roots of chi have rotation numbers. Raises InputError if no point has one, and for
+    fewer than two points.
     """
+    if integer(points, "points") < 2:
+        raise InputError(f"found {points} points, expected at least 2")
     ends = [[QQ.convert(x) for x in end] for end in (first, last)]
+    if len(ends[0]) != len(ends[1]):
+        raise InputError(f"found points with {len(ends[0])} and {len(ends[1])} coordinates, expected as many")
     positions = [fmpq(k, points - 1) for k in range(points)]
     rows: dict[str, list[tuple[float, float, float, int]]] = {}
     for position in positions:

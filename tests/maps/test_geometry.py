@@ -126,6 +126,10 @@ def test_j_invariant_and_height_agree_with_pari(gamma):
     assert abs(float(lines[1]) - canonical_height(gamma)) < 1e-11
 
 
+def test_the_height_of_a_long_gamma_on_an_almost_singular_level():
+    assert canonical_height(1 - fmpq(1, 10**60 + 7)) == pytest.approx(5.727581599961783, abs=1e-11)  # PARI/GP
+
+
 def test_a_level_of_three_lines_and_a_fixed_point_have_no_curve():
     planes = geometry(load("paper_m2"), [1, 2, 3, 4], "1/10").planes
     assert planes[0].kind is PeriodKind.TRIANGLE

@@ -33,3 +33,16 @@ def test_no_line_leads_across_a_singular_level():
 def test_a_segment_of_fixed_points_has_no_rotation_number():
     with pytest.raises(InputError, match="no initial point with a smooth level"):
         plot_rotation(MEMBER.normal_form, "1/10", [0, 0, 0, 0], [0, 0, 0, 0], points=3)
+
+
+@pytest.mark.parametrize(
+    ("last", "points", "message"),
+    [
+        ([2, 2, 3, 5], 1, "found 1 points, expected at least 2"),
+        ([2, 2, 3, 5], "5", "found points = '5', expected an integer"),
+        ([2, 2, 3], 5, "found points with 4 and 3 coordinates"),
+    ],
+)
+def test_a_segment_needs_two_points_of_the_same_dimension(last, points, message):
+    with pytest.raises(InputError, match=message):
+        plot_rotation(MEMBER.normal_form, "1/10", [1, 2, 3, 5], last, points=points)

@@ -18,7 +18,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_factored
-from kahanmaps.algebra.work import SPENT, Budget
+from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.display_protocols import latex
@@ -167,6 +167,7 @@ def find_densities(
     effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[DensitySearch], None] = lambda _: None,
 ) -> DensitySearch:
     """Search for densities phi: the map preserves the volume form dx/phi.
 
@@ -184,6 +185,7 @@ def find_densities(
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
+        on_result: called with the densities so far before further ones are tried, for searches that may be interrupted.
 
     Returns:
         A `DensitySearch`; formulas are exact, proved or supported. That there is none up to a degree is measured.
@@ -202,7 +204,7 @@ def find_densities(
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
-    return densities_of(laboratory, max_degree, integrals, budget_for("densities", effort), progress)
+    return densities_of(laboratory, max_degree, integrals, budget_for("densities", effort), progress, on_result)
 
 
 def densities_of(
@@ -211,6 +213,7 @@ def densities_of(
     integrals: Sequence[FoundIntegral] | None,
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[DensitySearch], None] = lambda _: None,
 ) -> DensitySearch:
     """Run `find_densities` on the maps of a laboratory."""
     flow = laboratory.flow
@@ -225,6 +228,8 @@ def densities_of(
         progress("densities that are products")
         stages = budget.share([1, 2, 2])  # products; polynomials; integrals, for their factors
         product, anti_invariant = _products(laboratory, max_degree, next(stages))
+        found = () if product is None else (product,)
+        on_result(DensitySearch(*laboratory.request, found, -1, UNFINISHED, period, anti_invariant, flow=flow))
         # Reserve a share for the search for integrals, unless the caller gives them or a product is known already.
         second = budget if integrals is not None or product is not None else next(stages)
         densities, tried, cut = _search(laboratory, product, max_degree, second, progress)
@@ -237,6 +242,7 @@ def densities_of(
             densities = densities if proof is None else [FoundDensity(phi, Certainty.PROVED, proof), *densities]
     result = DensitySearch(*laboratory.request, tuple(densities), tried, cut, period, anti_invariant, flow=flow)
     if result.may_use_integrals:
+        on_result(replace(result, cut=UNFINISHED))
         if integrals is None:
             file, symbols, eps, seed, _ = laboratory.request
             searched = find_integrals(file, symbols=symbols, eps=eps, effort=budget, seed=seed, progress=progress)

@@ -20,7 +20,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, degree, ring, substitute
 from kahanmaps.algebra.printing import attributes, format_factored, format_polynomial, format_rational_function
-from kahanmaps.algebra.work import SPENT, Budget
+from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.display_protocols import ResultPart, latex
 from kahanmaps.documents.inline import as_file
@@ -54,7 +54,6 @@ from kahanmaps.maps.kahan import SystemLike
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
-_UNFINISHED = "the search was interrupted before all stages were completed"
 Formula = tuple[RationalFunction, str, str]  # a function, its origin, and its factored form (empty if not known)
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo these and the first prime with probability 1/32
 
@@ -348,7 +347,7 @@ def integrals_of(
         profile = orbit_profile(
             laboratory.maps, max_degree=max_degree, budget=next(stages), known=known, progress=progress
         )
-        on_result(result(profile, _UNFINISHED))
+        on_result(result(profile, UNFINISHED))
         stage = next(stages)
         cofactors = laboratory.cofactors()
         # For a vector field the candidates would be too many, and few integrals have other denominators than these.
@@ -367,13 +366,13 @@ def integrals_of(
     collected.offer(formulas)
     if inherited and not laboratory.symbols:
         collected.add_by_theorems(inherited[0])
-    on_result(result(profile, _UNFINISHED))
+    on_result(result(profile, UNFINISHED))
     stage = next(stages)
     if len(collected.integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
         collected.add_products(cofactors, stage)
     result_so_far, stage = result(profile, ""), next(stages)
-    on_result(replace(result_so_far, reason=_UNFINISHED))
+    on_result(replace(result_so_far, reason=UNFINISHED))
     if not result_so_far.is_complete:
         # This may take longer than all earlier stages, so it comes after their formulas.
         steps_before = len(space_search.steps)

@@ -178,13 +178,14 @@ def linear_symmetries(
     *,
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[Symmetries], None] = lambda _: None,
 ) -> Symmetries:
     """Find affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
 
     The search covers the Lie algebra of affine symmetries, and a scaling; signed permutations, also of scaled
     variables, with a translation where needed (dimension at most 12); in dimension at most 3, where that algebra has no
     linear element, all rational matrices. The result is exact and proved. Each increase of `effort` by 1 doubles the
-    work that the search may take.
+    work that the search may take. `on_result` is called with the result before each stage, which fills it.
     Source: cmoq-2013.
 
     >>> symmetries = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
@@ -194,6 +195,7 @@ def linear_symmetries(
     system = as_system(system)
     budget = budget_for("symmetries", effort)
     symmetries = Symmetries(system)
+    on_result(symmetries)
     progress("infinitesimal symmetries")
     _add_infinitesimal(symmetries)
     progress("signed permutations")

@@ -330,21 +330,25 @@ def canonical_height(gamma: fmpq) -> float:
             4 * X**3 * Z + b2 * (X * Z) ** 2 + 2 * b4 * X * Z**3 + b6 * Z**4,
         )
 
+    X, Z, left, commons = fmpz(0), fmpz(1), modulus, list[fmpz]()
+    for _ in range(_HEIGHT_TERMS):
+        X, Z = doubled(X, Z)
+        common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # of short numbers, as it divides R
+        left //= common
+        X, Z = X // common % left, Z // common % left
+        commons.append(common)
     for bits in (1 << 9, 1 << 12, 1 << 15):
-        X, Z = fmpz(0), fmpz(1)
-        left = modulus
+        real, sizes = (arb(0), arb(1)), list[arb]()
         with RR(bits).working():
-            real, total, scale = (arb(0), arb(1)), arb(0), arb(1)
             for _ in range(_HEIGHT_TERMS):
-                scale /= 4
-                X, Z = doubled(X, Z)
-                common = X.gcd(Z).gcd(resultant)
                 real = doubled(*real)
-                size = abs(real[0]).max(abs(real[1]))
-                real = (real[0] / size, real[1] / size)
+                sizes.append(abs(real[0]).max(abs(real[1])))
+                real = (real[0] / sizes[-1], real[1] / sizes[-1])
+        with RR(128).working():  # the sum converges, only the doublings lose digits
+            total, scale = arb(0), arb(1)
+            for size, common in zip(sizes, commons, strict=True):
+                scale /= 4
                 total += scale * (size.log() - arb(common).log())
-                left //= common
-                X, Z = X // common % left, Z // common % left
             if total.is_finite() and float(total.rad()) < _ACCURACY:
                 return float((total / 2).mid())
     raise PrecisionLost("the height needs more than 32768 bits: the level is almost singular")

@@ -25,7 +25,7 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
-from kahanmaps.algebra.work import SPENT, Budget, count
+from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget, count
 from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
@@ -199,6 +199,7 @@ def find_poisson(
     effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[PoissonSearch], None] = lambda _: None,
 ) -> PoissonSearch:
     """Search for the tensors P with polynomial entries up to a degree that a map preserves.
 
@@ -214,6 +215,7 @@ def find_poisson(
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
+        on_result: called with the tensors so far after each, for searches that may be interrupted.
 
     Returns:
         A `PoissonSearch`; formulas are exact, proved or supported. Combinations of products of polynomial integrals and
@@ -288,6 +290,7 @@ def find_poisson(
             P = _at(tensor, laboratory.maps[0], laboratory.maps[0].random_point())
             rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], laboratory.maps[0].prime)
             tensors.append(FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P))
+            on_result(PoissonSearch(*laboratory.request, tuple(tensors), (), degree, denominator, None, UNFINISHED))
         if len(tensors) < len(forms):
             reason = "a tensor that was found modulo primes did not pass as an identity"
         # Poisson tensors first, then by descending rank.
