@@ -82,6 +82,15 @@ def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
     return PositiveEntropy("entropy", data, backward, forms, tuple(factors[:n]), _degree(forms[-1]), line_degree, lower)
 
 
+def homogenizing(names: Sequence[str]) -> str:
+    """A name of the letter that makes forms homogeneous, which is none of the names of the map.
+
+    >>> homogenizing(["x", "h", "eps"])
+    'xhepsh'
+    """
+    return "".join(names) + "h"
+
+
 def _degree(forms: Sequence[fmpq_mpoly]) -> int:
     """The degree in the two variables and the last letter."""
     return max(int(e[0] + e[1] + e[-1]) for form in forms for e in form.monoms())
@@ -89,7 +98,7 @@ def _degree(forms: Sequence[fmpq_mpoly]) -> int:
 
 def _forms(data: MapData) -> list[fmpq_mpoly]:
     """N and D, made homogeneous in the variables by a further letter."""
-    context, parts = ring((*data.names, "h")), (*data.numerators, data.determinant)
+    context, parts = ring((*data.names, homogenizing(data.names))), (*data.numerators, data.determinant)
     degree = max(degree_in(part, 2) for part in parts)
     return [context.from_dict({(*e, degree - e[0] - e[1]): c for e, c in part.terms()}) for part in parts]
 

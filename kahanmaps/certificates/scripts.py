@@ -17,7 +17,7 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.certificates.chains import Chain
 from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral
-from kahanmaps.certificates.entropy import EPS, LINE, PRIME, PositiveEntropy
+from kahanmaps.certificates.entropy import EPS, LINE, PRIME, PositiveEntropy, homogenizing
 from kahanmaps.certificates.identities import (
     Claim,
     ConservedFunction,
@@ -189,7 +189,7 @@ class _Script:
     def __init__(self, to: Language, data: MapData) -> None:
         self.to, self.data, self.lines = to, data, list[str]()
         self.has_points = self.has_equation = self.is_solved = False
-        self.letters = letters_of(data, "[hijknpqrst]") | {"h": "h"}
+        self.letters = letters_of(data, "[hijknpqrst]") | {homogenizing(data.names): "h"}
 
     def text(self, polynomial: fmpq_mpoly) -> str:
         """The polynomial; a long sum in parts, as Python reads no expression that is nested a thousand times."""
@@ -461,7 +461,7 @@ def script_certificate(to: Language, claims: Sequence[Claim], header: Sequence[s
     names = [
         letter
         for name, letter in script.letters.items()
-        if name != "h" and (has_three_points or name[:-1] not in data.new)
+        if name != homogenizing(data.names) and (has_three_points or name[:-1] not in data.new)
     ]
     top = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
     top.append(to.start.format(letters=", ".join(names), names=",".join(names)) if to is PYTHON else to.start)

@@ -276,6 +276,15 @@ def test_variables_with_the_names_of_words_of_the_programs_are_renamed(checker, 
 
 
 @pytest.mark.parametrize("checker", PROGRAMS)
+def test_a_variable_h_is_not_the_letter_that_makes_forms_homogeneous(checker, tmp_path):
+    text = certificate(System("h' = k; k' = -h"), checker, integrals={"I": "h^2 + k^2"})
+    assert run(checker, text, tmp_path).returncode == 0
+    if checker == "gp":
+        text = certificate(System("h' = k^2 + 1; k' = h^2 - k"), checker, ["entropy"])
+        assert run(checker, text, tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
 def test_a_variable_t_is_not_the_step_of_a_derivative(checker, tmp_path):
     assert run(checker, certificate(System("t' = x; x' = -t"), checker, density="1"), tmp_path).returncode == 0
 
