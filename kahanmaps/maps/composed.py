@@ -181,10 +181,10 @@ def composed_map(
     """Compose maps: apply one step of each map after the other, all with the same eps.
 
     Args:
-        maps: in the order in which they are applied; with a power, (map, power), which may be negative. variables:
-        names for the coordinates, by default those of the first map; the others are matched by position. symbols: the
-        symbols of the composition, by default all symbols of the maps; equal names mean the same symbol. values: for
-        each map the values of its symbols as rational functions of these; by default the symbols themselves.
+        maps: in the order in which they are applied; with a power, (map, power), which may be negative.
+        variables: names for the coordinates, by default those of the first map; the others are matched by position.
+        symbols: the symbols of the composition, by default all those of the maps; equal names mean the same symbol.
+        values: for each map the values of its symbols as rational functions of these; by default themselves.
 
     Returns:
         The map, exact; its inverse is known if all the maps have one.
