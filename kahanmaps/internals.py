@@ -16,7 +16,7 @@ def __getattr__(name: str) -> Any:
     # which report wrong arguments in words, and make private names public.
     public = vars(sys.modules["kahanmaps"])
     is_stored, stored = name in public, public.get(name)
-    value = globals()[name] = _load(name)
+    value = _load(name)
     if is_stored:
         public[name] = stored
     else:
