@@ -6,6 +6,8 @@ import pytest
 from flint import fmpq
 
 from kahanmaps import QuadraticSystem, load, parse_rational_function
+from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import certify
 from kahanmaps.checks.certify import NotEqual, expansion
 from kahanmaps.checks.claims import Certainty, Evidence
@@ -103,3 +105,17 @@ def test_an_expansion_refutes_what_random_points_let_pass(monkeypatch):
     assert finding.verdict is Certainty.REFUTED
     assert finding.evidence.method == "exact rational point"
     assert finding.witness.left != finding.witness.right
+
+
+@pytest.mark.parametrize(("upper", "lower"), [(3, 1), (1, 3), (2, 2)])
+def test_powers_of_a_denominator_cancel_in_a_quotient_of_values(upper, lower):
+    """Numerator^a over numerator^b at N/D is N^(a - b)/D^(a - b), whichever power is larger."""
+    field = FunctionField(["x", "y"])
+    x, y = field.variables
+    point = (x / (x + y), y)
+    u = field.context.gen(0)
+    quotient = RationalFunction(u**upper + 1, u**lower + 2).value(field, point)
+    inverse = (x + y) / x
+    expected = (1 / inverse) ** upper + 1, (1 / inverse) ** lower + 2
+    assert field.equal(quotient * expected[1], expected[0])
+    assert not field.equal(quotient * expected[1], expected[0] + 1)
