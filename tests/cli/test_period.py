@@ -14,7 +14,7 @@ M3 = "paper_m3 --start 1,2,3,4,5,6 --eps 1/11"
 SCALED = 'variables = ["x", "y"]\n[hamiltonian]\nH = "x^3/3 + x*y^2"\nJ = [["0", "3"], ["-3", "0"]]\n'
 
 
-def walked(kahanmaps, command, steps=1_000):
+def walked(kahanmaps, command, steps=10_000):
     """The record of the end of the orbit, step after step."""
     return kahanmaps(*command, f"--steps {steps} --every {steps} --method generic --format jsonl").records[-1]
 
