@@ -47,7 +47,7 @@ def main() -> int:
     import resource
 
     from kahanmaps_cli.main import main as run
-    from kahanmaps_cli.signals import handle
+    from kahanmaps_cli.signals import end_interrupts, handle, raise_interrupt
 
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:  # ulimit -v
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -56,7 +56,7 @@ def main() -> int:
         atexit.register(_signal.signal, number, _signal.SIG_IGN)
     try:
         for number in ours:
-            handle(number, _signal.default_int_handler)
+            handle(number, raise_interrupt)
         status = run()
         if status == _INTERRUPTED:
             os._exit(status)  # everything is flushed; unloading large libraries would take a second
@@ -65,6 +65,7 @@ def main() -> int:
         _end(_signal.SIGINT, None)
         raise
     finally:
+        end_interrupts()
         for number in ours:
             _signal.signal(number, _end)
 

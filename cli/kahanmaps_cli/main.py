@@ -23,7 +23,7 @@ from kahanmaps_cli.params import HELP_OPTIONS, with_common_rules
 from kahanmaps_cli.screen.progress import as_typed, print_stderr
 from kahanmaps_cli.screen.streams import discard_unwritable_output, output_was_lost, prepare_standard_streams
 from kahanmaps_cli.screen.terminal import color_option
-from kahanmaps_cli.signals import INTERRUPTED
+from kahanmaps_cli.signals import INTERRUPTED, end_interrupts
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -212,6 +212,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _interrupted(stop: BaseException) -> int:
+    end_interrupts()
     is_over = isinstance(stop, TimeLimit)  # --seconds expired at the very end of a search
     print_stderr(f"stopped: {stop} (--seconds)" if is_over else "interrupted")
     return UNDECIDED if is_over else INTERRUPTED

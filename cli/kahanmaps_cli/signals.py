@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 INTERRUPTED = 130  # the exit status
+_REPEAT_SECONDS = 1.0  # of CPU time
 
 
 def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
@@ -27,12 +28,28 @@ def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
     return previous
 
 
+def raise_interrupt(signum: int, frame: Any) -> None:
+    """Raise KeyboardInterrupt, and again after each second of CPU time until `end_interrupts` is called.
+
+    Libraries lose exceptions: Python turns one raised while a class is being created into RuntimeError, which an
+    `except Exception` around an import (matplotlib's of its three-dimensional axes) takes for a missing library.
+    """
+    signal.signal(signal.SIGVTALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_VIRTUAL, _REPEAT_SECONDS, _REPEAT_SECONDS)
+    raise KeyboardInterrupt
+
+
+def end_interrupts() -> None:
+    """Call it where KeyboardInterrupt has arrived."""
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+
+
 @contextmanager
 def interruptible(interrupt: Callable[[], None]) -> Iterator[None]:
     """Call `interrupt`, which requests the work to end, at the first Ctrl-C or SIGTERM; end at once at the second."""
 
     def handler(signum: int, frame: Any) -> None:
-        handle(signum, signal.default_int_handler)
+        handle(signum, raise_interrupt)
         interrupt()
 
     previous = {number: handle(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}

@@ -82,6 +82,30 @@ sys.exit(__main__.main())
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
 
 
+LOST = """
+import os, signal, sys
+from kahanmaps_cli import __main__, main
+
+def command(*_, **__):
+    try:
+        type("A", (), {"f": type("F", (), {"__set_name__": lambda *_: os.kill(os.getpid(), signal.SIGINT)})()})
+    except Exception as error:
+        print(type(error).__name__, flush=True)
+    while True:
+        pass
+
+main.cli.main = command
+sys.exit(__main__.main())
+"""
+
+
+def test_an_interrupt_that_a_library_loses_is_raised_again():
+    done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, timeout=100, check=False)
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+    # What loses it: since Python 3.12 the error of __set_name__ keeps its class.
+    assert done.stdout == ("RuntimeError\n" if sys.version_info < (3, 12) else "")
+
+
 @pytest.mark.parametrize("megabytes", [100, 250])
 def test_lack_of_memory_is_reported_and_never_ends_with_the_status_of_a_refuted_claim(tmp_path, megabytes):
     # OpenBLAS ends the process with 1 where it finds no memory; at 100 MB numpy itself cannot be loaded.

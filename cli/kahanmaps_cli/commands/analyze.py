@@ -14,7 +14,7 @@ from kahanmaps_cli.runs.search import symbols_and_eps
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
 from kahanmaps_cli.screen.terminal import formula, on_terminal, print_raw, print_stdout
-from kahanmaps_cli.signals import INTERRUPTED
+from kahanmaps_cli.signals import INTERRUPTED, end_interrupts
 
 
 @click.command("analyze")
@@ -62,6 +62,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
         try:
             lib.analyze(file, **arguments, progress=search, on_result=report)
         except KeyboardInterrupt:
+            end_interrupts()
             if report.result is None:
                 raise
             report.result.interrupt("stopped (--seconds)" if search.is_over else "interrupted")
