@@ -3,12 +3,13 @@
 Specified here: the steps are those of fractions solved entry by entry, whichever way the linear systems are solved (the
 thresholds between the ways are put to 0 and to infinity); long numbers of members are found by elimination
 (test_elimination.py); rows of the equation that do not depend on x are taken out, explicit maps are solved by
-substitution on fractions, and the steps stay the same. In a plane with homogeneous coordinates the image is the Kahan
+substitution on fractions, and the steps stay the same. Common factors are left in long integers where they are short,
+and no reader of a point sees them. In a plane with homogeneous coordinates the image is the Kahan
 map of u' = h_v, v' = -h_u for 2 eps (u, v) = (U/W, V/W), whatever eps is.
 """
 
 import pytest
-from flint import fmpq, fmpq_poly
+from flint import fmpq, fmpq_poly, fmpz, fmpz_mat
 from helpers import NAMED_SYSTEMS, points, rationals
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -21,8 +22,8 @@ from kahanmaps.errors import SingularStep
 from kahanmaps.family.random_members import random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
-from kahanmaps.maps.orbits import integer_steps
-from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits import integer_point, integer_steps
+from kahanmaps.maps.orbits.integer_point import IntegerPoint, UnreducedPoint
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])
@@ -65,10 +66,81 @@ def walk(system: QuadraticSystem, eps: str, steps: int) -> list[IntegerPoint]:
 @pytest.mark.parametrize("threshold", [0, 10**9])
 def test_an_orbit_on_integers_is_the_orbit_on_fractions(system, eps, steps, threshold, monkeypatch):
     monkeypatch.setattr(integer_steps, "_ELIMINATION_BITS", threshold)
+    monkeypatch.setattr(integer_steps, "_CRAMER_BITS", threshold)
+    monkeypatch.setattr(integer_point, "_LONG_BITS", threshold // 10**7)
     x = start(system.dim)
     for point in walk(system, eps, steps)[1:]:
         x = rational_step(system, QQ.convert(eps), x)
         assert point.rationals() == x
+
+
+# Common factors are left in long integers where they are short.
+
+
+def long_orbit(name: str, bits: int) -> list[IntegerPoint]:
+    map_over = load(name).map.at("3/11")
+    orbit = [IntegerPoint.from_rationals((fmpq(1, 2), fmpq(-1, 3), fmpq(2, 5), fmpq(1))[: map_over.dim])]
+    while max(number.bit_length() for number in orbit[-1].integers[0]) < bits:
+        orbit.append(map_over.integer_step(orbit[-1]))
+    return orbit
+
+
+@pytest.mark.parametrize(
+    ("name", "keeps", "has_long"),
+    [
+        ("lotka_volterra", 4, False),
+        ("lorenz", 2, False),
+        ("zander_120", 0, True),
+        ("zhukovski_volterra_2", 0, True),
+        ("henon_heiles", 0, True),
+        ("weierstrass", 0, True),
+    ],
+)
+def test_short_factors_are_kept_and_long_ones_divided_out_and_no_reader_sees_them(name, keeps, has_long):
+    orbit = long_orbit(name, 50_000)
+    assert sum(point.keeps_factors for point in orbit) >= keeps
+    assert (orbit[-2].has_long_factors, any(point.keeps_factors for point in orbit)) == (has_long, keeps > 0)
+    for point in orbit:
+        fractions = [fmpq(p, q) for p, q in point.lowest_terms()]
+        assert [(x.p, x.q) for x in fractions] == point.lowest_terms()  # in lowest terms
+        expected = IntegerPoint.from_rationals(fractions)
+        assert point == expected == point
+        assert (point.numerators, point.denominator, point.bits) == (
+            expected.numerators,
+            expected.denominator,
+            expected.bits,
+        )
+    assert orbit[-1] != orbit[-2]
+
+
+@pytest.mark.parametrize(("power", "is_long"), [(1, False), (30, True)])
+@pytest.mark.parametrize("read_first", ["numerators", "lowest_terms", "exceeding"])
+def test_a_factor_that_was_left_in_is_found_when_the_point_is_read(power, is_long, read_first):
+    factor, a, b, W = fmpz(2**127 - 1) ** power, fmpz(3) ** 9000, fmpz(5) ** 6000, fmpz(7) ** 5000
+    previous = IntegerPoint((a, b), W)
+    point = UnreducedPoint([-a * factor, b * factor], -W * factor, previous)
+    assert point.keeps_factors
+    assert point.exceeding(a.bit_length() - 1) == a.bit_length()  # and not the length with the factor
+    assert point == IntegerPoint((a, -b), W) != previous
+    getattr(point, read_first) if read_first == "numerators" else getattr(point, read_first)(
+        *[1][: read_first[0] == "e"]
+    )
+    assert (point.numerators, point.denominator) == ((a, -b), W)
+    assert point.lowest_terms() == [(a, W), (-b, W)]
+    assert point.has_long_factors == is_long
+    assert not is_long or not UnreducedPoint([a, b], W, point).keeps_factors
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@given(data=st.data())
+def test_determinants_give_the_solution_that_flint_finds(n, data):
+    numbers = st.lists(st.integers(-9, 9), min_size=n * (n + 1), max_size=n * (n + 1))
+    entries = data.draw(numbers)
+    matrix, rhs = fmpz_mat(n, n, entries[: n * n]), fmpz_mat(n, 1, entries[n * n :])
+    numerators, denominator = integer_steps.by_determinants(matrix, rhs)
+    assert denominator == matrix.det()
+    if denominator != 0:
+        assert [fmpq(entry, denominator) for entry in numerators] == matrix.solve(rhs).entries()
 
 
 # Rows of the equation that do not depend on x are taken out.

@@ -7,14 +7,38 @@ from functools import cached_property
 
 from flint import fmpq, fmpz
 
+from kahanmaps.algebra.integers import common_part, content
+
 Fraction = tuple[fmpz, fmpz]  # numerator and denominator without a common factor, the latter positive
+
+
+# Below this length common factors are always removed.
+_LONG_BITS = 3000
+# Common factors shorter than this, and than this part of the numbers, are not worth a gcd of the whole numbers ...
+_SHORT_BITS, _SHORT_PART = 64, 64
+# ... unless the numbers have become this many times longer since the last one.
+_LONGER = 8
+_SMALL_PRIMES = fmpz.primorial_ui(fmpz(50)) ** 8
 
 
 class IntegerPoint:
     """The rational point numerators / denominator; the integers have no common factor, the denominator is positive."""
 
+    has_long_factors = False  # whether the integers of a step had a long common factor, on the orbit so far
+    keeps_factors = False  # whether the next step may be taken with common factors left in the integers
+
     def __init__(self, numerators: tuple[fmpz, ...], denominator: fmpz) -> None:
         self.numerators, self.denominator = numerators, denominator
+
+    @property
+    def integers(self) -> tuple[Sequence[fmpz], fmpz]:
+        """Numerators and denominator for the next step; they may have a short common factor."""
+        return self.numerators, self.denominator
+
+    @property
+    def reduced_bits(self) -> int:
+        """The bit length at the last point of the orbit whose integers certainly have no common factor."""
+        return self.bits
 
     @staticmethod
     def from_rationals(point: Sequence[fmpq]) -> IntegerPoint:
@@ -30,12 +54,7 @@ class IntegerPoint:
 
         A common factor of a numerator and W is also one of W and the product of all numerators modulo W.
         """
-        W = self.denominator
-        product = fmpz(1)
-        for entry in self.numerators:
-            product = product * entry % W
-        common = W.gcd(product)
-        return [(entry // g, W // g) for entry in self.numerators for g in [common.gcd(entry % common)]]
+        return _lowest_terms(self.numerators, self.denominator, _common_with_product(self.numerators, self.denominator))
 
     def residues(self, prime: int) -> list[int] | None:
         """Return the coordinates modulo a prime, followed by 1; None if the prime divides the denominator."""
@@ -65,6 +84,96 @@ class IntegerPoint:
 
     def __repr__(self) -> str:
         return f"IntegerPoint({self.numerators}, {self.denominator})"
+
+
+def _common_with_product(numerators: Sequence[fmpz], W: fmpz) -> fmpz:
+    product = fmpz(1)
+    for entry in numerators:
+        product = product * entry % W
+    return W.gcd(product)
+
+
+def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common: fmpz) -> list[Fraction]:
+    return [(entry // g, W // g) for entry in numerators for g in [common.gcd(entry % common)]]
+
+
+class UnreducedPoint(IntegerPoint):
+    """The image of a point, as integers whose common factor is removed only when it matters.
+
+    The gcds of long numbers take most of the time of an orbit that grows exponentially, and usually find a few bits.
+    Here a factor left in the integers costs nothing: its share of their length stays the same from step to step. So
+    the small primes are divided out, and other common factors once the numbers are `_LONGER` times as long, or when
+    the coordinates are read. Where a long common factor is found, all later points of the orbit are reduced.
+    """
+
+    def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous: IntegerPoint) -> None:
+        if denominator < 0:
+            numerators, denominator = [-entry for entry in numerators], -denominator
+        self._previous = previous.has_long_factors, previous.reduced_bits
+        self._integers = numerators, denominator
+        self._common: fmpz | None = None  # a multiple of the common factor
+        bits = self._bits_with_factors
+        self.keeps_factors = _LONG_BITS <= bits < _LONGER * self._previous[1] and not self._previous[0]
+        if self.keeps_factors:
+            self._divide(common_part([denominator, *numerators], _SMALL_PRIMES))
+
+    def _divide(self, factor: fmpz) -> None:
+        numerators, denominator = self._integers
+        if factor != 1:
+            self._integers = [entry // factor for entry in numerators], denominator // factor
+
+    @property
+    def _bits_with_factors(self) -> int:
+        numerators, denominator = self._integers
+        return max(denominator.bit_length(), *(entry.bit_length() for entry in numerators))
+
+    @property
+    def integers(self) -> tuple[Sequence[fmpz], fmpz]:
+        """Numerators and denominator for the next step; they may have a short common factor."""
+        return self._integers if self.keeps_factors else self._reduced
+
+    @cached_property
+    def _reduced(self) -> tuple[tuple[fmpz, ...], fmpz]:
+        numerators, denominator = self._integers
+        factor = content((denominator if self._common is None else self._common, *numerators))
+        bits = self._bits_with_factors
+        self.has_long_factors = self._previous[0] or factor.bit_length() > _SHORT_BITS + bits // _SHORT_PART
+        self._divide(factor)
+        numerators, denominator = self._integers
+        return tuple(numerators), denominator
+
+    @property
+    def numerators(self) -> tuple[fmpz, ...]:  # type: ignore[override]
+        """The coordinates times the least common denominator."""
+        return self._reduced[0]
+
+    @property
+    def denominator(self) -> fmpz:  # type: ignore[override]
+        """The least common denominator of the coordinates."""
+        return self._reduced[1]
+
+    @property
+    def reduced_bits(self) -> int:
+        """The bit length at the last point of the orbit whose integers certainly have no common factor."""
+        return self._previous[1] if self.keeps_factors else self.bits
+
+    def lowest_terms(self) -> list[Fraction]:
+        """Return the reduced numerator and denominator of each coordinate, with a single gcd of large numbers."""
+        numerators, W = self._integers
+        self._common = _common_with_product(numerators, W)
+        return _lowest_terms(numerators, W, self._common)
+
+    def exceeding(self, limit: int) -> int:
+        """Return the bit length if it exceeds the limit, otherwise 0; a gcd is needed near the limit only."""
+        return 0 if self._bits_with_factors <= limit else super().exceeding(limit)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, IntegerPoint):
+            return NotImplemented
+        (numerators, W), (others, V) = self._integers, other.integers
+        return all(x * V == y * W for x, y in zip(numerators, others, strict=True))
+
+    __hash__ = IntegerPoint.__hash__
 
 
 class FractionsPoint(IntegerPoint):

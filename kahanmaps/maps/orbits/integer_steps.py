@@ -15,7 +15,7 @@ from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 from kahanmaps.algebra.integers import content, over_one
 from kahanmaps.maps.orbits.elimination import is_unique_solution, solve_fraction_free
 from kahanmaps.maps.orbits.forward_substitution import forward_substitution
-from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.integer_point import IntegerPoint, UnreducedPoint
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
@@ -24,6 +24,8 @@ Terms = tuple[tuple[int, fmpq], ...]
 _ELIMINATION_BITS = 4000
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 _SMALL_DIMENSION = 3  # eliminating constant rows pays only above this dimension
+_CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is written by determinants
+_CRAMER_BITS = 500
 _TRIALS = 2  # failures of the elimination after which it is not tried again
 
 
@@ -73,16 +75,25 @@ class IntegerSteps:
         if self._substitution:
             return self._substitution.step(point)
         matrix, rhs = self._equation(point)
+        _, W = point.integers
         if self._constant is None:
-            is_long = point.denominator.bit_length() >= _ELIMINATION_BITS
+            if self.dim <= _CRAMER_DIMENSION and matrix[0, 0].bit_length() >= _CRAMER_BITS:
+                numerators, denominator = by_determinants(matrix, rhs)
+                return UnreducedPoint(numerators, denominator, point) if denominator != 0 else None
+            is_long = W.bit_length() >= _ELIMINATION_BITS
             if self._remaining_trials and is_long and self.dim <= _ELIMINATION_DIMENSION:
-                solution = solve_fraction_free(matrix, rhs, point.denominator)
+                solution = solve_fraction_free(matrix, rhs, W)
                 if solution is not None:
                     return solution
                 self._remaining_trials -= 1
             return _solved(matrix, rhs)
-        scale = point.denominator**self._degree
+        scale = W**self._degree
         reduced, reduced_rhs = self._constant.reduce(matrix, rhs, scale)
+        if 0 < reduced.nrows() <= _CRAMER_DIMENSION and reduced[0, 0].bit_length() >= _CRAMER_BITS:
+            numerators, denominator = by_determinants(reduced, reduced_rhs)
+            if denominator == 0:
+                return None
+            return UnreducedPoint(*self._constant.extend(rhs, scale, numerators, denominator), point)
         solution = _solved(reduced, reduced_rhs) if reduced.nrows() else IntegerPoint((), fmpz(1))
         return solution and lowest(*self._constant.extend(rhs, scale, solution.numerators, solution.denominator))
 
@@ -94,7 +105,8 @@ class IntegerSteps:
     def determinant(self, point: IntegerPoint) -> fmpq:
         """Return det M(x)."""
         matrix, _ = self._equation(point)
-        return fmpq(matrix.det(), self._scale * point.denominator ** (self._degree * self.dim))
+        _, W = point.integers
+        return fmpq(matrix.det(), self._scale * W ** (self._degree * self.dim))
 
     def is_image(self, point: IntegerPoint, image: IntegerPoint) -> bool:
         """Return whether `image` is proved to be the image of the point (False may be wrong)."""
@@ -127,7 +139,8 @@ class IntegerSteps:
 
     def _equation(self, point: IntegerPoint) -> tuple[fmpz_mat, fmpz_mat]:
         """Return M(x) and r(x), each row multiplied by a common denominator of its coefficients and a power of W."""
-        n, X = self.dim, [*point.numerators, point.denominator]
+        numerators, W = point.integers
+        n, X = self.dim, [*numerators, W]
         monomials = X if self._degree == 1 else [_monomial(X, exponents) for exponents in self._exponents]
         values = (self._forms * fmpz_mat(len(monomials), 1, monomials)).entries()
         rows = [values[k : k + n + 1] for k in range(0, len(values), n + 1)]
@@ -140,6 +153,25 @@ def _monomial(X: Sequence[Any], exponents: Exponents) -> fmpz:
         if exponent:
             total *= entry**exponent
     return total
+
+
+def by_determinants(matrix: fmpz_mat, rhs: fmpz_mat) -> tuple[list[fmpz], fmpz]:
+    """Return numerators and denominator det(matrix) of the solution of matrix x = rhs, in dimension 1 to 3."""
+    rows, n = [[*row, rhs[i, 0]] for i, row in enumerate(matrix.tolist())], matrix.nrows()
+    if n == 1:
+        return [rows[0][1]], rows[0][0]
+    if n == 2:
+        (a, b, r), (c, d, s) = rows
+        return [r * d - b * s, a * s - r * c], a * d - b * c
+    (a, b, c, r), (d, e, f, s), (g, h, k, t) = rows
+    first, second, third = e * k - f * h, c * h - b * k, b * f - c * e  # minors of the last two columns
+    fourth, fifth, sixth = d * h - e * g, b * g - a * h, a * e - b * d  # minors of the first two columns
+    s_t, r_t, r_s = s * k - f * t, c * t - r * k, r * f - c * s  # minors of the last column and the right side
+    return [
+        r * first + s * second + t * third,
+        a * s_t + d * r_t + g * r_s,
+        r * fourth + s * fifth + t * sixth,
+    ], a * first + d * second + g * third
 
 
 def _solved(matrix: fmpz_mat, rhs: fmpz_mat) -> IntegerPoint | None:

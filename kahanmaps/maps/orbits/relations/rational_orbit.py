@@ -93,9 +93,11 @@ class RationalOrbit:
             before = last[-1]
             last.append(image)
             reached = number
+            # A point that keeps its factors belongs to an orbit that grows fast; its exact length costs a gcd.
             if (
                 search_bits < latest_bits
                 and number > 1
+                and not image.keeps_factors
                 and search_bits <= image.bits < min(latest_bits, _SLOW_GROWTH * before.bits)
             ):
                 try:
