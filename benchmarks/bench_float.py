@@ -2,7 +2,7 @@
 
 `python benchmarks/bench_float.py` prints a table; `measure()` gives its rows. The work is a family member with m = 3
 (dimension 6): one orbit to its end, one with every point delivered, and an ensemble of 100,000 starts, by the normal
-form and by generic elimination. `kernels.c` is compiled here with gcc -O3 -march=native, and gives the limit: the same
+form and by generic elimination; and Euler's top in dimension 3, for which no normal form is used. `kernels.c` is compiled here with gcc -O3 -march=native, and gives the limit: the same
 steps without a test for what may go wrong. Results are compared before times are. Contestants take turns, so that a
 busy machine slows down all of them, and the best time of each counts. The integrators solve another problem, the
 flow: they are what one would use instead.
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from flint import fmpq
 
-from kahanmaps import normal_form, random_member_with_eigenvalues
+from kahanmaps import System, lyapunov, normal_form, random_member_with_eigenvalues
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.floats.planar_blocks import planar_blocks
 from kahanmaps.maps.kernels import has_numba
@@ -31,6 +31,8 @@ EPS = fmpq(1, 10)
 LANES = 100_000
 REPEATS = 5
 ONE, MANY, GENERIC = "one orbit, m = 3", "100,000 starts, m = 3", "100,000 starts, d = 6, elimination"
+TOP_ONE, TOP_MANY = "one orbit, 10,000,000 steps, Euler top", "1,000,000 starts, 100 steps, Euler top"
+EXPONENTS = "Lyapunov spectrum, 200,000 steps, Euler top"
 POINTS, GENERIC_ONE, FLOW = "one orbit, every point in x", "one orbit, d = 6, elimination", "one orbit against the flow"
 
 
@@ -89,6 +91,10 @@ def measure() -> list[dict[str, Any]]:
         table.run()
         _generic(table, library, system, starts)
         table.run()
+        _top(table, library)
+        table.run()
+    _exponents(table)
+    table.run()
     _every_point(table, system, form)
     table.run()
     _flow(table, system, form)
@@ -256,6 +262,87 @@ def _generic(table: Table, library: Any, system: Any, starts: Any) -> None:
         table.add("numba, 1 thread", GENERIC, steps * LANES, by_us("numba", 1, steps))
         table.add("numba, 2 threads", GENERIC, steps * LANES, by_us("numba", 2, steps))
     table.add("numpy", GENERIC, 3 * LANES, by_us("numpy", 1, 3))
+
+
+TOP = {"x": "y*z", "y": "-2*z*x", "z": "x*y"}
+
+
+def _top(table: Table, library: Any) -> None:
+    """A system of dimension 3 that is treated like any other."""
+    count, steps, long, size = 1_000_000, 100, 10_000_000, ctypes.c_size_t
+    top, e = System(TOP), ctypes.c_double(0.1)
+    starts = np.random.default_rng(7).uniform(-1, 1, (count, 3))
+    checked = FloatEnsemble(top, EPS, starts, kernel="numpy")
+    checked.advance(10)
+    expected = checked.x
+
+    def many_by_c() -> float:
+        v = np.ascontiguousarray(starts.T)
+        library.top_many(_pointer(v), size(count), e, size(10))
+        _agree(v.T, expected, "C, Euler top")
+        return _timed(lambda: library.top_many(_pointer(v), size(count), e, size(steps)))
+
+    def one_by_c() -> float:
+        v = starts[0].copy()
+        return _timed(lambda: library.top_one(_pointer(v), e, size(long)))
+
+    def by_us(starts: Any, kernel: str, steps: int) -> Callable[[], float]:
+        def run() -> float:
+            ensemble = FloatEnsemble(top, EPS, starts, kernel=kernel, threads=1)
+            ensemble.advance(10)
+            _agree(ensemble.x, expected[: len(starts)], kernel)
+            return _timed(lambda: ensemble.advance(steps))
+
+        return run
+
+    def by_numpy() -> float:
+        x, y, z = _top_by_numpy(starts, 10)
+        _agree(np.stack([x, y, z], axis=1), expected, "numpy by hand")
+        return _timed(lambda: _top_by_numpy(starts, steps // 10))
+
+    if library is None:
+        table.skip("C", TOP_ONE, "no gcc")
+    else:
+        table.add("C", TOP_ONE, long, one_by_c, "the limit")
+        table.add("C SIMD", TOP_MANY, count * steps, many_by_c, "the limit")
+    if has_numba():
+        table.add("numba", TOP_ONE, long, by_us(starts[:1], "numba", long))
+        table.add("numba, 1 thread", TOP_MANY, count * steps, by_us(starts, "numba", steps))
+    table.add("numpy", TOP_MANY, count * steps // 10, by_us(starts, "numpy", steps // 10))
+    table.add("numpy by hand, 4096 starts at a time", TOP_MANY, count * steps // 10, by_numpy, "without any test")
+
+
+def _top_by_numpy(starts: Any, steps: int) -> list[Any]:
+    images = []
+    for at in range(0, len(starts), 4096):
+        x, y, z = starts[at : at + 4096].T.copy()
+        for _ in range(steps):
+            X, Y, Z = 0.1 * x, 0.1 * y, 0.1 * z
+            a, p, q, r = 1 + 2 * X * X, Z + X * Y, Y - 2 * X * Z, X + Y * Z
+            w = 1 / (a + 2 * Z * p - Y * q)
+            x, y, z = (
+                (a * x + p * y + q * z) * w,
+                ((1 - Y * Y) * y - 2 * p * x - 2 * r * z) * w,
+                (q * x + r * y + (1 + 2 * Z * Z) * z) * w,
+            )
+        images.append((x, y, z))
+    return [np.concatenate(parts) for parts in zip(*images, strict=True)]
+
+
+def _exponents(table: Table) -> None:
+    start, steps = np.array([1.0, 0.5, 0.25]), 200_000
+
+    def by_numpy() -> None:
+        x, frame, logs, one = start, np.eye(3), np.zeros(3), np.eye(3)
+        for _ in range(steps // 20):
+            before = 0.1 * np.array([[0, x[2], x[1]], [-2 * x[2], 0, -2 * x[0]], [x[1], x[0], 0]])
+            x = np.linalg.solve(one - before, x)
+            after = 0.1 * np.array([[0, x[2], x[1]], [-2 * x[2], 0, -2 * x[0]], [x[1], x[0], 0]])
+            frame, R = np.linalg.qr(np.linalg.solve(one - before, (one + after) @ frame))
+            logs += np.log(np.abs(np.diag(R)))
+
+    table.add("numpy by hand", EXPONENTS, steps // 20, lambda: _timed(by_numpy))
+    table.add("kahanmaps", EXPONENTS, steps, lambda: _timed(lambda: lyapunov(System(TOP), start, eps=EPS, steps=steps)))
 
 
 def _flow(table: Table, system: Any, form: Any) -> None:

@@ -135,3 +135,34 @@ void generic_many(double *z, size_t n, const double *tensor, size_t steps)
             for (int l = 0; l < L; l++) z[j * n + at + l] = x[j][l];
     }
 }
+
+/* Euler's top x' = yz, y' = -2zx, z' = xy by Cramer's rule. */
+static inline void top(double e, double *px, double *py, double *pz)
+{
+    double x = *px, y = *py, z = *pz, X = e * x, Y = e * y, Z = e * z;
+    /* M = [1 -Z -Y; 2Z 1 2X; -Y -X 1], the columns of its adjugate, and M x~ = x */
+    double a = 1 + 2 * X * X, b = -2 * (Z + X * Y), c = Y - 2 * X * Z;
+    double w = 1 / (a - Z * b - Y * c);
+    *px = (a * x + (Z + X * Y) * y + (Y - 2 * X * Z) * z) * w;
+    *py = (b * x + (1 - Y * Y) * y - 2 * (X + Y * Z) * z) * w;
+    *pz = (c * x + (X + Y * Z) * y + (1 + 2 * Z * Z) * z) * w;
+}
+
+void top_one(double *v, double e, size_t steps)
+{
+    double x = v[0], y = v[1], z = v[2];
+    for (size_t t = 0; t < steps; t++)
+        top(e, &x, &y, &z);
+    v[0] = x, v[1] = y, v[2] = z;
+}
+
+void top_many(double *v, size_t n, double e, size_t steps)
+{
+    for (size_t at = 0; at < n; at += W) {
+        size_t width = n - at < W ? n - at : W;
+        double *restrict x = v + at, *restrict y = x + n, *restrict z = y + n;
+        for (size_t t = 0; t < steps; t++)
+            for (size_t i = 0; i < width; i++)
+                top(e, x + i, y + i, z + i);
+    }
+}
