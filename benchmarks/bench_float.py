@@ -2,10 +2,10 @@
 
 `python benchmarks/bench_float.py` prints a table; `measure()` gives its rows. The work is a family member with m = 3
 (dimension 6): one orbit to its end, one with every point delivered, and an ensemble of 100,000 starts, by the normal
-form and by generic elimination; and Euler's top in dimension 3, for which no normal form is used. `kernels.c` is compiled here with gcc -O3 -march=native, and gives the limit: the same
-steps without a test for what may go wrong. Results are compared before times are. Contestants take turns, so that a
-busy machine slows down all of them, and the best time of each counts. The integrators solve another problem, the
-flow: they are what one would use instead.
+form and by generic elimination; and Euler's top in dimension 3, for which no normal form is used. `kernels.c` is
+compiled here with gcc -O3 -march=native, and gives the limit: the same steps without a test for what may go wrong.
+Results are compared before times are. Contestants take turns, so that a busy machine slows down all of them, and the
+best time of each counts. The integrators solve another problem, the flow: they are what one would use instead.
 """
 
 from __future__ import annotations
