@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import combinations
 from typing import Any
 
@@ -13,6 +14,7 @@ from kahanmaps.algebra.fields import integer
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.certificates.chains import commuting, periodic
 from kahanmaps.certificates.combinations import (
+    AffineSymmetry,
     affine_symmetry,
     bilinear_integral,
     changed_function,
@@ -38,7 +40,7 @@ from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invarian
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.laboratory import separated
+from kahanmaps.laboratory.laboratory import Separated, separated
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
@@ -82,8 +84,8 @@ def certificate(
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
             (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for
-            positive entropy of a map of the plane, for gp. None for all that
-            need no search, or for the following alone if these are given.
+            positive entropy of a map of the plane, for gp and sympy. None for all that need no search, or for the
+            following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         density: phi, as `check_measure` takes it.
         tensor: a Poisson tensor, as `check_poisson` takes it.
@@ -110,7 +112,7 @@ def certificate(
     """
     file = as_file(system)
     formulas, data = _prepared(file, checker)
-    proved: list[Claim] = []
+    planes, proved = _Planes(file, data), list[Claim]()
     if commute is not None:
         if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
             raise InputError("a certificate that two maps commute cannot be combined with other claims")
@@ -120,28 +122,32 @@ def certificate(
             raise InputError(f"found period = {period}, expected a positive integer")
         proved.append(periodic(data, integer(period, "period")))
     if integrals is not None:
-        proved += [conserved_function(data, name, f) for name, f in claimed_functions(file, integrals).items()]
+        for name, f in claimed_functions(file, integrals).items():
+            proved += planes.claims(conserved_function, name, f)
     if density is not None:
         proved.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
     if tensor is not None:
         matrix = claimed_tensor(file, tensor)
         assert matrix is not None
         proved.append(invariant_tensor(data, "P", matrix.rows))
-    known = dict(_known_claims(formulas, data))
+    known = dict(_known_claims(formulas, planes))
     searches = {name: search for name, search in _SEARCHES.items() if name not in known}
     is_required = claims is not None
     if claims is None:
         claims = [] if proved and not everything else [*known, *(searches if everything else ())]
-        claims = [
-            name for name in claims if name not in (UNPROVED, ENTROPY) and (name != "symmetry" or file.is_quadratic)
-        ]
+        unwanted = {UNPROVED} | (set() if file.is_quadratic else {"symmetry"})
+        unwanted |= set() if everything and checker != "rocq" and not formulas.integrals else {ENTROPY}
+        claims = [name for name in claims if name not in unwanted]
     skipped = []
     for name in claims:
         if name not in known and name not in searches:
             expected = ", ".join([*known, *searches])
             raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected one of {expected}")
         try:
-            proved += known[name]() if name in known else _claims_of(searches[name](file), data)
+            new = known[name]() if name in known else _claims_of(searches[name](file), data, planes)
+            if is_required and not new:
+                raise InputError(f"the search for {name!r} proves nothing about {file.name}: no certificate is written")
+            proved += [claim for claim in new if all(claim is not other for other in proved)]
         except FalseClaim:
             raise
         except InputError as error:  # of all claims those that are short enough
@@ -167,7 +173,8 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
     >>> known_claims(load("euler_top"), "integrals")
     ['F1', 'F2']
     """
-    names = [name for name, _ in _known_claims(*_prepared(file, "gp"))]
+    formulas, data = _prepared(file, "gp")
+    names = [name for name, _ in _known_claims(formulas, _Planes(file, data))]
     special = {"measure": {VOLUME}, "poisson": {TENSOR, UNPROVED}}
     if check in special:
         return [name for name in names if name in special[check]]
@@ -253,15 +260,15 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim
     return claims
 
 
-def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
+def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
     """What the file claims, or theorems give: by name the functions that find the identities."""
-    H, file = formulas.H, formulas.file
+    H, file, data = formulas.H, formulas.file, planes.data
 
     def one(find: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
         return lambda: [find(data, *arguments)]
 
     for name, function in formulas.integrals.items():
-        yield name, partial(_integral, file, data, name, function)
+        yield name, partial(planes.claims, conserved_function, name, function)
     if H is not None:
         yield "modified_hamiltonian", one(modified_hamiltonian, "modified_hamiltonian", H)
     for name, form in formulas.forms.items():
@@ -278,28 +285,43 @@ def _known_claims(formulas: Formulas, data: MapData) -> Iterator[tuple[str, Call
         yield name, lambda: [invariant_tensor(data, name, _hamiltonian_tensor(formulas))]
 
 
-def _integral(file: SystemFile, data: MapData, name: str, function: RationalFunction) -> list[Claim]:
-    """The claims that a function is conserved: for a member of the family in its plane, if it depends on one only."""
-    separate = separated(file.system) if file.member is not None else None
-    if separate is None:
-        return [conserved_function(data, name, function)]
-    in_planes = data.with_rows(as_map(separate.system).rows)
-    moved = separate.function(function)
-    plane = restricted(in_planes, moved)
-    if plane is in_planes:
-        return [conserved_function(data, name, function)]
-    conserved = conserved_function(plane, f"{name}_in_its_plane", moved)
-    T, zero = separate.T, [fmpq(0)] * file.dim
-    way = affine_symmetry(in_planes, f"coordinates_of_{name}", T, zero, target=data)
-    return [way, changed_function(way, name, function, conserved), conserved]
+@dataclass(frozen=True)
+class _Planes:
+    """Proofs about a function of one plane of a member of the commuting family, in coordinates z with x = T z."""
+
+    file: SystemFile
+    data: MapData
+
+    @cached_property
+    def separate(self) -> tuple[Separated, AffineSymmetry] | None:
+        """The system in these coordinates and the claim that T takes its map to the given one, if they are shorter."""
+        file, n = self.file, self.data.dim
+        has_symbols = len(self.data.names) > n + 1
+        separate = None if file.member is None or has_symbols else separated(file.system)
+        if separate is None:
+            return None
+        in_planes = self.data.with_rows(as_map(separate.system).rows)
+        return separate, affine_symmetry(in_planes, "coordinates", separate.T, [fmpq(0)] * n, target=self.data)
+
+    def claims(self, prove: Callable[..., Claim], name: str, function: RationalFunction) -> list[Claim]:
+        """What `prove` finds about the function, in its plane if it depends on one plane only."""
+        if self.separate is not None:
+            separate, way = self.separate
+            moved = separate.function(function)
+            plane = restricted(way.data, moved)
+            if plane is not way.data:
+                proof = prove(plane, f"{name}_in_its_plane", moved)
+                return [way, changed_function(way, name, function, moved, plane.names), proof]
+        return [prove(self.data, name, function)]
 
 
-def _claims_of(result: Any, data: MapData) -> list[Claim]:
+def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> list[Claim]:
     """What the result of a search proves about the map."""
     proved = Certainty.PROVED
     if isinstance(result, IntegralSearch):
+        planes = planes or _Planes(result.file, data)
         found = [integral for integral in result.integrals if integral.verdict is proved]
-        return [conserved_function(data, integral.name, integral.function) for integral in found]
+        return [claim for I in found for claim in planes.claims(conserved_function, I.name, I.function)]
     if isinstance(result, DensitySearch):
         densities = [density for density in result.shown if density.verdict is proved]  # the others are multiples
         return [invariant_volume(data, f"{VOLUME}_{k}", phi.function) for k, phi in enumerate(densities, 1)]
@@ -307,10 +329,12 @@ def _claims_of(result: Any, data: MapData) -> list[Claim]:
         tensors = [tensor for tensor in result.tensors if tensor.verdict is proved and tensor.jacobi is proved]
         return [invariant_tensor(data, tensor.name, tensor.tensor.rows) for tensor in tensors]
     if isinstance(result, DarbouxSearch):
+        planes = planes or _Planes(result.file, data)
         polynomials = [P for space in result.spaces if space.verdict is proved for P in space.polynomials]
         # The cofactor of a factor of det M has that factor in its denominator: it is no polynomial over D^k.
         polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
-        return [darboux_polynomial(data, f"D{k}", P) for k, P in enumerate(polynomials, 1)]
+        functions = [(f"D{k}", _polynomial(P)) for k, P in enumerate(polynomials, 1)]
+        return [claim for name, P in functions for claim in planes.claims(darboux_polynomial, name, P)]
     assert isinstance(result, Symmetries)
     symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
     return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]

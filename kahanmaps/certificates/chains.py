@@ -7,14 +7,19 @@ M_g(y) w = r_g(y) and M_f(z) w = r_f(z): then w is both Phi_g(y) and Phi_f(z). N
 
 from __future__ import annotations
 
+import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from flint import fmpq_mpoly
+from flint import fmpq_mpoly, nmod, nmod_mat
 
+from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.polynomials import common_denominator, ring
 from kahanmaps.certificates.identities import MAX_PRODUCTS, MAX_TERMS, EquationClaim, FalseClaim, MapData
 from kahanmaps.errors import InputError
+
+MAX_PERIOD = 1000
+_PRIME = 2**61 - 1
 
 
 @dataclass(frozen=True)
@@ -65,10 +70,15 @@ def commuting(name: str, f: MapData, g: MapData) -> Chain:
 
     Raises:
         FalseClaim: if they do not.
-        InputError: if the identities have too many terms.
+        InputError: if one of them is the identity, as for the zero field, or if the identities have too many terms.
     """
     x = _identity(f)
     y, z = apply(f, x), apply(g, x)
+    if x in (y, z):
+        raise InputError(
+            f"{name}: one of the maps is the identity, as for the zero field, and commutes with every map: "
+            "no certificate is written"
+        )
     w = apply(g, y)
     if w != apply(f, z):
         raise FalseClaim(f"{name}: the maps do not commute: no certificate can be written")
@@ -79,9 +89,16 @@ def periodic(f: MapData, period: int) -> Chain:
     """The identities that prove that an iterate of the map is the identity.
 
     Raises:
-        FalseClaim: if it is not.
-        InputError: if the identities have too many terms.
+        FalseClaim: if it is not: a random point modulo a prime is refuted first, before anything is multiplied out.
+        InputError: for a period above 1000, or if the identities have too many terms.
     """
+    if period > MAX_PERIOD:
+        raise InputError(f"found period = {period}, expected at most {MAX_PERIOD} for a certificate")
+    if (moved := _moved_point(f, period)) is not None:
+        raise FalseClaim(
+            f"iterate {period} is not the identity, as it moves a point modulo 2^61 - 1: {moved}; "
+            "no certificate can be written"
+        )
     values = [_identity(f)]
     for _ in range(period):
         values.append(apply(f, values[-1]))
@@ -89,6 +106,26 @@ def periodic(f: MapData, period: int) -> Chain:
         raise FalseClaim(f"iterate {period} is not the identity: no certificate can be written")
     arrows = tuple(("f", k, (k + 1) % period) for k in range(period))
     return Chain(f"period {period}", f, {"f": f}, arrows, tuple(values), (0, period))
+
+
+def _moved_point(f: MapData, period: int) -> str | None:
+    """A random point modulo the prime that the iterate moves, or None.
+
+    The rows of the equation are over Z, so that x~ modulo the prime is the image of x modulo the prime where det M is
+    not 0 there: an iterate that is the identity moves no such point.
+    """
+    n, rng = f.dim, random.Random(f"period {derive_seed(0, period, f.rows)}")
+    values = [rng.randrange(_PRIME) for _ in f.names]
+    x = values[:n]
+    for _ in range(period):
+        rows = [[int(entry(*x, *values[n:]).p) for entry in row] for row in f.rows]
+        M, r = nmod_mat([row[:-1] for row in rows], _PRIME), nmod_mat([row[-1:] for row in rows], _PRIME)
+        if M.det() == nmod(0, _PRIME):
+            return None  # the orbit ends here: the identities decide
+        x = [int(entry) for entry in M.solve(r).entries()]
+    if x == values[:n]:
+        return None
+    return ", ".join(f"{name} = {value}" for name, value in zip(f.names, values, strict=True))
 
 
 def apply(data: MapData, point: RationalPoint) -> RationalPoint:

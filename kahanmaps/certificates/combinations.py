@@ -23,7 +23,7 @@ from math import lcm
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, ring
-from kahanmaps.certificates.identities import ConservedFunction, EquationClaim, FalseClaim, MapData, coprime
+from kahanmaps.certificates.identities import EquationClaim, FalseClaim, MapData, coprime
 
 Row = tuple[fmpq_mpoly, ...]
 
@@ -160,14 +160,16 @@ def affine_symmetry(
 
 
 def changed_function(
-    way: AffineSymmetry, name: str, function: RationalFunction, moved: ConservedFunction
+    way: AffineSymmetry, name: str, function: RationalFunction, moved: RationalFunction, letters: tuple[str, ...]
 ) -> ChangedFunction:
-    """The identity that the function of x is the other one of z, x = T z. Raises FalseClaim if it is not."""
-    data = way.data
-    context = ring(data.names)
-    letters = dict(zip(data.names, context.gens(), strict=True))
-    small = [letters[letter] for letter in moved.data.names]
-    p, q = (P.compose(*small, ctx=context) for P in (moved.numerator, moved.denominator))
+    """The identity that the function of x is the other one, `moved`, of z, x = T z, which has only these letters.
+
+    Raises:
+        FalseClaim: if it is not.
+    """
+    data, context = way.data, ring(way.data.names)
+    gens = dict(zip(data.names, context.gens(), strict=True))
+    p, q = (P.compose(*(gens[letter] for letter in letters), ctx=context) for P in coprime(moved, letters))
     P, Q = coprime(function, data.names)
     images = [entry / way.divisor for entry in way.image] + [*context.gens()[data.dim :]]
     if P.compose(*images, ctx=context) * q != p * Q.compose(*images, ctx=context):

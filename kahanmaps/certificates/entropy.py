@@ -104,11 +104,10 @@ def _forms(data: MapData) -> list[fmpq_mpoly]:
 
 
 def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:
-    """The forms over Z without their common factor, and that factor, which may have a rational coefficient."""
+    """The forms over Z without their primitive common factor, which leaves them over Z, and that factor."""
     common = reduce(fmpq_mpoly.gcd, forms)
-    parts = [form / common for form in forms]
-    multiple = reduce(lambda a, b: a * b / a.gcd(b), map(common_denominator, parts))
-    return tuple(part * multiple for part in parts), common / multiple
+    common *= common_denominator(common)
+    return tuple(form / common for form in forms), common
 
 
 def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly]) -> list[nmod_poly]:

@@ -267,14 +267,14 @@ def conserved_function(data: MapData, name: str, function: RationalFunction) -> 
     return ConservedFunction(name, data, P, Q, k, cofactors[0])
 
 
-def darboux_polynomial(data: MapData, name: str, polynomial: fmpq_mpoly) -> DarbouxPolynomial:
-    """The identity that proves that the function is a Darboux polynomial of the map.
+def darboux_polynomial(data: MapData, name: str, function: RationalFunction) -> DarbouxPolynomial:
+    """The identity that proves that the function, a polynomial, is a Darboux polynomial of the map.
 
     Raises:
         FalseClaim: if it is none.
         InputError: if the identity has too many terms.
     """
-    P, _ = coprime(RationalFunction(polynomial, polynomial**0), data.names)
+    P, _ = coprime(function, data.names)
     k = degree_in(P, data.dim)
     if k == 0:
         raise InputError(f"{name} is a constant, expected a polynomial of positive degree: no certificate is written")

@@ -555,31 +555,71 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
-    theorems = list[str]()
-    proofs: dict[type[Claim], tuple[Any, str]] = {
-        ConservedFunction: (_Script.conserved, "conserved"),
-        DarbouxPolynomial: (_Script.darboux, "darboux"),
-        InvariantVolume: (_Script.invariant, "invariant"),
-        InvariantTensor: (_Script.poisson, "poisson"),
-        OrbitIntegral: (_Script.along_orbit, "conserved"),
-        AffineSymmetry: (_Script.symmetric, "symmetry"),
-        Chain: (_Script.chain, "everywhere"),
-        ChangedFunction: (_Script.changed, "coordinates"),
-    }
+    groups: dict[tuple[int, ...], list[Claim]] = {}  # by map: its equation and Cramer's rule are stated once
     for k, claim in enumerate(claims, 1):
-        if type(claim) not in proofs:
-            raise InputError(f"{claim.name} is certified for gp only: ask for --for gp")
-        prove, ending = proofs[type(claim)]
-        name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
-        theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
-        script = _Script(claim.data)
-        lines += [f"Module Claim{k}.", "Section Map."]
-        lines += script.constants if isinstance(claim, EquationClaim) else [*script.map(claim.is_at_image), ""]
-        proof = prove(script, claim, theorem)
-        theorems += [f"Claim{k}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
-        lines += [*proof, "End Map.", f"End Claim{k}.", ""]
+        if type(claim) not in _PROOFS:
+            raise InputError(f"{claim.name} is certified for gp and sympy only, not for rocq: ask for --for gp")
+        own = k if isinstance(claim, Chain) else 0
+        groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), own), []).append(claim)
+    theorems = list[str]()
+    for m, group in enumerate(groups.values(), 1):
+        script = _Script(group[0].data)
+        lines += [f"Module Map{m}.", "Section Map."]
+        if isinstance(group[0], EquationClaim):
+            lines += script.constants
+        else:
+            lines += [*script.map(any(claim.is_at_image for claim in group)), ""]
+        known: dict[str, str] = {}
+        for k, claim in enumerate(group, 1):
+            prove, ending = _PROOFS[type(claim)]
+            name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
+            theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
+            proof = _not_yet_known(prove(script, claim, theorem), known, f"_{k}")
+            theorems += [f"Map{m}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
+            lines += [*proof, ""]
+        lines += ["End Map.", f"End Map{m}.", ""]
     lines += [f"Definition theorems := ({', '.join(theorems)}).", "Print Assumptions theorems."]
     return "\n".join(lines) + "\n"
+
+
+_PROOFS: dict[type[Claim], tuple[Any, str]] = {
+    ConservedFunction: (_Script.conserved, "conserved"),
+    DarbouxPolynomial: (_Script.darboux, "darboux"),
+    InvariantVolume: (_Script.invariant, "invariant"),
+    InvariantTensor: (_Script.poisson, "poisson"),
+    OrbitIntegral: (_Script.along_orbit, "conserved"),
+    AffineSymmetry: (_Script.symmetric, "symmetry"),
+    Chain: (_Script.chain, "everywhere"),
+    ChangedFunction: (_Script.changed, "coordinates"),
+}
+
+
+def _not_yet_known(lines: Sequence[str], known: dict[str, str], ending: str) -> list[str]:
+    """The statements that are not `known` by name; those with the name of another one get the ending.
+
+    A statement uses earlier ones only, so that a new name is known before it is used.
+    """
+    statements, renamed = list[str](), dict[str, str]()
+    for line in lines:
+        if re.match(r"\(\*|(Definition|Lemma|Theorem|Variables|Hypothesis) ", line) and not (
+            statements and statements[-1].startswith("(*") and "\n" not in statements[-1]
+        ):
+            statements.append(line)
+        else:
+            statements[-1] += f"\n{line}"
+    result = list[str]()
+    for statement in statements:
+        for old, new in renamed.items():
+            statement = re.sub(rf"\b{old}\b", new, statement)
+        name = re.sub(r"^\(\*.*\*\)\n", "", statement).split()[1]
+        if known.get(name) == statement:
+            continue
+        if name in known:
+            renamed[name] = name + ending
+            name, statement = name + ending, re.sub(rf"\b{name}\b", name + ending, statement)
+        known[name] = statement
+        result += statement.split("\n")
+    return result
 
 
 def entries(letter: str, n: int) -> list[list[str]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import singledispatchmethod
 
 from flint import fmpq_mpoly
@@ -28,7 +29,6 @@ from kahanmaps.certificates.identities import (
     letters_of,
 )
 from kahanmaps.certificates.rocq import polynomial_text
-from kahanmaps.errors import InputError
 
 _PARI = """\
 default(recover, 0);  \\\\ an error ends gp with a status that is not 0
@@ -58,13 +58,20 @@ image(G, k, letters) = {  \\\\ D^k G, with N/D for the letters, in which G has a
   sum(j = 0, k, D^(k-j)*substvec(polcoef(H, j, tt), letters, N));
 }""",
     "images": "images(A, k, letters) = matrix(#A, #A, i, j, image(A[i,j], k, letters));",
+    "line_degree": """\
+line_degree(F, steps, p, residue, start, slope) = {  \\\\ of the image of start + t*slope modulo p, at eps = residue
+  my(G = put(F, [eps], [Mod(residue, p)]), curve = (start + t*slope)*Mod(1, p), common);
+  for(k = 1, steps, curve = put(G, point, curve); common = gcd(gcd(curve[1], curve[2]), curve[3]);
+    curve = apply(P -> P \\ common, curve));  \\\\ an error if all three are 0
+  vecmax(apply(P -> poldegree(P, t), curve));
+}""",
 }
 _PYTHON = """\
 import sys
 from itertools import permutations
 from math import prod
 
-from sympy import QQ
+from sympy import GF, QQ, isprime
 from sympy.polys.rings import ring
 
 R, {letters} = ring("{names}", QQ)
@@ -141,6 +148,23 @@ def image(G, k, letters):  # D^k G, with N/D for the letters, in which G has a d
     "images": """\
 def images(A, k, letters):
     return [[image(a, k, letters) for a in row] for row in A]""",
+    "line_degree": """\
+def line_degree(F, steps, p, residue, start, slope):  # of the image of start + t*slope modulo p, at eps = residue
+    field, places = GF(p), [R.gens.index(letter) for letter in (*point, eps)]
+    t = ring("t", field)[1]
+    curve = [a + b * t for a, b in zip(start, slope)]
+    for _ in range(steps):
+        values = []
+        for G in F:
+            total = 0 * t
+            for exponents, coefficient in G.terms():
+                *powers, k = (exponents[place] for place in places)
+                scalar = field(int(coefficient)) * field(residue) ** k
+                total += prod((X**e for X, e in zip(curve, powers)), start=t**0) * scalar
+            values.append(total)
+        common = values[0].gcd(values[1]).gcd(values[2])
+        curve = [X.exquo(common) for X in values]  # an error if all three are 0
+    return max(X.degree() for X in curve)""",
 }
 _SAYS: dict[type[Claim], str] = {
     ConservedFunction: "P/Q is an integral",
@@ -379,8 +403,7 @@ class _Script:
         self.check(f"{label}: P(T z) q(z) = p(z) Q(T z)", "put(P, old, T)*q == p*put(Q, old, T)")
 
     def _affine(self, claim: AffineSymmetry | ChangedFunction) -> None:
-        part = f"1/{claim.divisor}" if self.to is GP else f"QQ(1, {claim.divisor})"
-        self.define("T", f"scale({part}, {self.vector(claim.image)})")
+        self.define("T", f"scale({self.number(Fraction(1, claim.divisor))}, {self.vector(claim.image)})")
 
     @prove.register
     def symmetry(self, claim: AffineSymmetry, label: str) -> None:
@@ -397,43 +420,44 @@ class _Script:
     @prove.register
     def entropy(self, claim: PositiveEntropy, label: str) -> None:
         """The forms of F_1, ..., F_n, the image of a line modulo a prime, and the inequality."""
-        if self.to is not GP:
-            raise InputError("positive entropy is certified for gp only: ask for --for gp")
-        comment, names = self.to.comment, self.data.names
+        comment = self.to.comment
         n, x, y = len(claim.forms), *(self.letters[name] for name in self.data.variables)
-        eps, degree = self.letters[names[-1]], claim.degree
         self.lines += [
             f"{comment}Assumed, a theorem on birational maps f of the plane (docs/mathematics.md): with D_n = deg f^n",
             f"{comment}and the dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2n - 1)/(D_n - 1).",
-            f"{comment}Here f over Q(eps) is birational, D_{n} <= {degree} and D_{2 * n} >= {claim.line_degree}.",
+            f"{comment}Here f over Q(eps) is birational, D_{n} <= {claim.degree} and D_{2 * n} >= {claim.line_degree}.",
         ]
         self.define("point", f"[{x}, {y}, h]")
         self.define("B", self.vector(claim.inverse))
         for k, (forms, factor) in enumerate(zip(claim.forms, claim.factors, strict=True), 1):
             self.define(f"F{k}", self.vector(forms))
-            self.define(f"c{k}", f"({self.text(factor)})")
-            degree_k = max(sum(e) - sum(e[2:-1]) for e in (list(map(int, m)) for m in forms[0].monoms()))
-            self.check(f"F{k} is homogeneous of degree {degree_k}", f"put(F{k}, point, tt*point) == tt^{degree_k}*F{k}")
+            self.polynomial(f"c{k}", factor)
+            degree = max(sum(e) - sum(e[2:-1]) for e in (list(map(int, m)) for m in forms[0].monoms()))
+            homogeneous = f"put(F{k}, point, scale(h, point)) == scale(h^{degree}, F{k})"
+            self.check(f"F{k} is homogeneous of degree {degree}", homogeneous)
             if k == 1:
-                self.check("c1 F1 = (N : D) at h = 1, not 0", "c1 != 0 && put(c1*F1, [h], [1]) == concat(N, [D])")
+                says, value = "c1 F1 = (N : D) at h = 1, not 0", "put(scale(c1, F1), [h], [h^0]) == concat(N, [D])"
             else:
-                self.check(f"F1(F{k - 1}) = c{k} F{k}, not 0", f"c{k} != 0 && put(F1, point, F{k - 1}) == c{k}*F{k}")
+                says = f"F1(F{k - 1}) = c{k} F{k}, not 0"
+                value = f"put(F1, point, F{k - 1}) == scale(c{k}, F{k})"
+            self.check(says, f"c{k} != 0 && {value}")
         self.define("G", "put(B, point, F1)")
-        self.check("f is birational: B(F1) = point", f"G[3] != 0 && G[1]*h == G[3]*{x} && G[2]*h == G[3]*{y}")
+        third = "G[3]" if self.to is GP else "G[2]"
+        self.check("f is birational: B(F1) = point", f"{third} != 0 && scale(h, G) == scale({third}, point)")
         self.check("the modulus is prime", f"isprime({PRIME})")
-        self.define("curve", f"[{LINE[0][0]} + {LINE[0][1]}*t, {LINE[1][0]} + {LINE[1][1]}*t, 1]*Mod(1, {PRIME})")
-        self.define("image", f"put(F1, [{eps}], [Mod({EPS}, {PRIME})])")
-        self.lines += [
-            f"{{for(k = 1, {2 * n}, curve = put(image, point, curve); common = gcd(gcd(curve[1], curve[2]), curve[3]);",
-            "  curve = apply(P -> P \\ common, curve));}  \\\\ an error if all three are 0",
-        ]
+        start, slope = ([a for a, _ in LINE], [b for _, b in LINE])
         says = f"the image of a line under {2 * n} steps modulo a prime has degree {claim.line_degree}"
-        self.check(says, f"vecmax(apply(P -> poldegree(P, t), curve)) == {claim.line_degree}")
-        lower = f"{claim.lower.numerator}/{claim.lower.denominator}"
-        self.check(
-            f"the dynamical degree is more than {lower} > 1",
-            f"{lower} > 1 && ({lower})^{n} + ({lower})^-{n} + 2 < ({claim.line_degree} - 1)/({degree} - 1)",
-        )
+        line = f"line_degree(F1, {2 * n}, {PRIME}, {EPS}, {start}, {slope})"
+        self.check(says, f"{line} == {claim.line_degree}")
+        self.define("low", self.number(claim.lower))
+        bound = self.number(Fraction(claim.line_degree - 1, claim.degree - 1))
+        says = f"the dynamical degree is more than {claim.lower} > 1"
+        self.check(says, f"low > 1 && low^{n} + 1/low^{n} + 2 < {bound}")
+
+    def number(self, value: Fraction) -> str:
+        """A rational number."""
+        text = f"{value.numerator}, {value.denominator}"
+        return text.replace(", ", "/") if self.to is GP else f"QQ({text})"
 
     def fraction(self, claim: ConservedFunction | InvariantVolume | OrbitIntegral) -> None:
         """The numerator P and the denominator Q."""
@@ -458,11 +482,9 @@ def script_certificate(to: Language, claims: Sequence[Claim], header: Sequence[s
         script.claim(claim)
     used = set(re.findall(r"\w+", "\n".join(script.lines)))
     used |= {other for name in used for other in _NEEDS.get(name, ())}
-    names = [
-        letter
-        for name, letter in script.letters.items()
-        if name != homogenizing(data.names) and (has_three_points or name[:-1] not in data.new)
-    ]
+    unused = set() if any(isinstance(claim, PositiveEntropy) for claim in claims) else {homogenizing(data.names)}
+    unused |= set() if has_three_points else {f"{name}2" for name in data.new}
+    names = [letter for name, letter in script.letters.items() if name not in unused]
     top = [f"{to.comment}{line}" for line in (*header, f"Check: {to.run}")]
     top.append(to.start.format(letters=", ".join(names), names=",".join(names)) if to is PYTHON else to.start)
     for name, text in to.tools.items():
