@@ -11,7 +11,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from flint import fmpq
+from flint import fmpq, fmpq_mat
 from helpers import refuses, together
 
 import kahanmaps as km
@@ -102,6 +102,51 @@ def test_a_field_and_its_jacobian_are_exact_or_arrays():
     assert fish.jacobian(POINTS[0]).shape == (2, 2)
 
 
+FORMS = ([1, 2], (1, 2), np.array([1, 2]), fmpq_mat([[1], [2]]), "1,2", "(1 4/2)", {"p": 2, "q": 1})
+
+
+@pytest.mark.parametrize("point", FORMS, ids=repr)
+def test_every_function_takes_a_point_in_every_form(point):
+    homogeneous = "q' = 3*p^2; p' = -3*q^2"
+    fish, phi = km.System(FISH), km.map(FISH, "1/10")
+    for f in (fish.f, fish.jacobian, fish.system.f, phi, phi.point, phi.jacobian, phi.inverse_step, (phi @ phi).step):
+        assert f(point) == f([1, 2]) != f([2, 1])
+    for f in (
+        lambda x: km.orbit(FISH, x, "1/10", 3).x.tolist(),
+        lambda x: phi.orbit(x, 3).x.tolist(),
+        lambda x: km.ensemble(FISH, x, "1/10", 3).x.tolist(),
+        lambda x: km.lyapunov(FISH, x, "1/10", 9).exponents.tolist(),
+        lambda x: km.heights(FISH, "1/10", starts=x, steps=9).orbits[0].growth.to_json(),
+        lambda x: km.geometry(homogeneous, x, "1/10").text,
+        lambda x: str(km.period(homogeneous, x, "1/10").planes),
+        lambda x: [line.get_ydata().tolist() for line in km.portrait(FISH, x, "1/10", 9).lines],
+    ):
+        assert f(point) == f([1, 2]) != f([2, "1/3"])
+
+
+def test_wrong_points_are_refused_in_words():
+    phi, walk = km.map(FISH, "1/10"), km.orbit(FISH, [1, 2], "1/10", 3)
+    for point, words in [
+        ("1,2,3", "found a point with 3 coordinates, expected 2: q, p"),
+        ({"q": 1, "x": 2}, "found the coordinates q, x, expected q, p"),
+        (walk, r"found 4 points, expected one: type \[f\(x\) for x in points\]"),
+        ([[1, 2], [3, 4]], r"km.ensemble\(system, x0, eps, steps\)"),
+        (5, "found the point 5, expected a sequence of 2 numbers"),
+    ]:
+        refuses(words, phi.step, point)
+        refuses(words, km.orbit, FISH, point, "1/10", 3)
+    refuses("found a point and p=, expected", phi, [1, 2], p=2)
+    refuses("found the symbols a", km.QuadraticSystem((km.parse_polynomial("a*x", ["x", "a"]),), ("a",)).f, [1])
+
+
+def test_a_point_of_an_orbit_is_a_sequence_of_its_coordinates():
+    walk, phi = km.orbit(FISH, [1, 2], "1/10", 3), km.map(FISH, "1/10")
+    q, p = walk[1]
+    assert (q, p) == walk[1].x == phi(walk[0])
+    assert len(walk[1]) == 2
+    assert walk[1][-1] == p
+
+
 def test_parameters_are_substituted_and_systems_are_keys():
     fish = km.System("q' = p; p' = a*q^2 - q", a="1/2")
     assert fish.subs(a=3) == fish.with_parameters({"a": 3}) == km.System("q' = p; p' = a*q^2 - q", a=3) != fish
@@ -184,6 +229,28 @@ def test_integrals_are_called_iterated_and_converted():
     assert [str(value.subs(at)) for value in image.values()] == km.orbit("weierstrass", [1, 2], "1/10", 1)[1].text
     double = (km.map("weierstrass", "1/10") ** 2).to_sympy()
     assert [str(value.subs(at)) for value in double.values()] == km.orbit("weierstrass", [1, 2], "1/10", 2)[2].text
+
+
+def test_a_function_is_called_with_its_arguments_in_any_form():
+    I = km.find_integrals(FISH)[0]
+    value = I([1, 2], "1/10")
+    assert value not in (I([1, 2], "1/9"), I([2, 1], "1/10"), None)
+    for arguments, named in [
+        ((1, 2, "1/10"), {}),
+        (("1,2", "1/10"), {}),
+        (([1, 2],), {"eps": "1/10"}),
+        (([1, 2],), {"h": "1/5"}),
+        (({"p": 2, "q": 1}, "1/10"), {}),
+        ((), {"q": 1, "p": 2, "time_step": Fraction(1, 5)}),
+    ]:
+        assert I(*arguments, **named) == I.function(*arguments, **named) == value
+    walk = km.orbit(FISH, [1, 2], "1/10", 3)
+    assert set(I(walk, "1/10")) == {value} != set(I(walk, "1/9"))
+    assert np.allclose(I(walk.x.astype(float), h=0.2), float(value))
+    assert np.isclose(I([1.0, 2.0], h=0.2), float(value))
+    refuses(r'found 2 values, expected 3: q, p, eps, for example I\(x, eps="1/10"\)', I, [1, 2])
+    refuses("found 1 values, q=, a=, expected 3: q, p, eps", I, 2, q=1, a=3)
+    refuses("found 4 values", I, [1, 2, 3], "1/10")
 
 
 def test_the_verdict_of_an_analysis_in_a_word():

@@ -101,19 +101,22 @@ class Map(LatexDisplay):
         """Return the name of the matrix M(x) of the map, or of its inverse."""
         return "M'(x)" if backward else "M(x)"
 
-    def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        """Convert values to a point over the field. Raises InputError for a wrong length or inexact numbers."""
+    def point(self, values: Any) -> tuple[Any, ...]:
+        """Convert a sequence, {variable: value} or text "1,2" to a point over the field.
+
+        Raises InputError for a wrong length or inexact numbers.
+        """
         return coordinates(values, self.field, self.variables, self.dim)
 
-    def __call__(self, *point: Any) -> Any:
-        """Return the image of a point, given as phi((1, 2)), phi(1, 2) or phi({"x": 1, "y": 2}).
+    def __call__(self, *point: Any, **named: Any) -> Any:
+        """Return the image of a point: phi((1, 2)), phi(1, 2), phi("1,2"), phi({"x": 1, "y": 2}) or phi(x=1, y=2).
 
         An array of floats, of shape (dim,) or (points, dim), has an array of floats as image, with NaN where the map is
         not defined. Calling without arguments returns the map itself, so `phi.inverse()` works.
         """
-        if not point:
+        if not point and not named:
             return self
-        x = point_of(point, self.variables)
+        x = point_of(point, named)
         if is_float_array(x):
             return import_module("kahanmaps.maps.floats.steps").images_of(self, x)
         return self.step(x)

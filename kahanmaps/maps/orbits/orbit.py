@@ -12,11 +12,10 @@ from itertools import islice
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, overload
 
-from flint import arb, fmpq, fmpq_mat, fmpz_mat
+from flint import arb, fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
-from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.printing import json_float
 from kahanmaps.atomic_files import open_append
 from kahanmaps.display_protocols import HtmlDisplay, data_frame
@@ -37,7 +36,7 @@ from kahanmaps.maps.orbits.iteration import (
 )
 from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
-from kahanmaps.maps.values import is_float_value, point_by_names
+from kahanmaps.maps.values import as_point, is_float_value
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.version import __version__
 
@@ -124,9 +123,10 @@ def orbit(
     is_float = Arithmetic.of(arithmetic).kind == "float"
     if start is None:
         raise InputError("found the initial point None, expected x0=[...], a sequence of exact numbers")
+    system = system if isinstance(system, Map) else as_map(system)
+    start = as_point(start, system.variables)
     if not is_float:
-        named = start.values() if isinstance(start, Mapping) else start if hasattr(start, "__len__") else ()
-        for x in filter(is_float_value, (*named, eps, time_step, h)):
+        for x in filter(is_float_value, (*start, eps, time_step, h)):
             try:
                 rational(x)
             except InexactNumber as error:
@@ -138,14 +138,6 @@ def orbit(
     if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
-    if isinstance(start, str):
-        start = parse_point(start)
-    if isinstance(start, fmpq_mat | fmpz_mat):
-        start = start.entries()
-    if isinstance(start, Mapping):
-        start = point_by_names(start, (system if isinstance(system, Map) else as_map(system)).variables)
-    if not hasattr(start, "__len__"):
-        raise InputError(f"found the initial point {start!r}, expected a sequence of numbers")
     if is_float:  # floats are accepted, and converted exactly
         start = [float(x) if hasattr(x, "dtype") and x.dtype.kind == "f" else x for x in start]
         for x in start:
@@ -162,7 +154,7 @@ def orbit(
     )
     if isinstance(system, Map):
         return _orbit_at_one_eps(request, field)
-    map_ = as_map(system)
+    map_ = system
     if eps is None and map_.has_eps:
         raise InputError('found no eps, expected an exact number, eps="1/10" or h="1/5": the map depends on eps')
     if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
