@@ -147,7 +147,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         what = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, KahanFamily):
             what = f"stands for a {self.map.title}"
-        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps")
+        hint = "; of a Kahan map give the system x' = f(x)" if self.kind in ("bilinear", "map", "composition") else ""
+        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps{hint}")
 
     @property
     def rhs(self) -> tuple[fmpq_mpoly, ...]:

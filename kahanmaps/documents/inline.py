@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.expressions import formula_text, number, roots_named, sides_of_equations
 from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.map_files import map_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.implicit import Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -101,9 +102,9 @@ def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any
 
 
 def as_file(value: Any) -> SystemFile:
-    """Convert a value to a file: a file, a system, a catalogue name, a path, or equations as `System` takes them.
+    """Convert a value to a file: a file, system, map, catalogue name or path, or equations as `System` takes them.
 
-    Raises InputError for anything else.
+    A map at one eps is one that does not depend on eps. Raises InputError for anything else.
     """
     if isinstance(value, SystemFile):
         return value
@@ -123,7 +124,7 @@ def as_file(value: Any) -> SystemFile:
         return System(value)
     if isinstance(value, str | Path):
         return load(value)
-    if isinstance(value, Map):
-        raise InputError(f"found {value!r}, a map at one eps, expected what it was made of, and eps=")
+    if isinstance(value, Map | MapFamily):
+        return map_file(value)
     kind = type(value).__name__
     raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")
