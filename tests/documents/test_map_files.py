@@ -12,7 +12,9 @@ from kahanmaps.maps.kahan import as_map
 FISH = "q' = p; p' = q^2 - q"
 LYNESS = km.explicit_map(["x", "y"], ["y", "(1 + y)/x"])
 SHEAR = km.explicit_map(["q", "p"], ["q + eps*p^2", "p"], ["q - eps*p^2", "p"])
-BILINEAR = [km.parse_polynomial(text, ["x", "y", "X", "Y", "eps"]) for text in ("X - x - eps*(x*Y + y*X)", "Y - y - eps")]
+BILINEAR = [
+    km.parse_polynomial(text, ["x", "y", "X", "Y", "eps"]) for text in ("X - x - eps*(x*Y + y*X)", "Y - y - eps")
+]
 
 
 def kahan(system=FISH):
