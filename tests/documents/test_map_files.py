@@ -60,6 +60,7 @@ def test_searches_checks_and_certificates_take_a_map_at_one_eps():
     assert km.check_integrals(phi**2, found).holds
     assert km.analyze(phi, effort=0).integrable is True
     assert km.find_density(phi)[0].verdict == "proved"
+    assert km.degrees(km.map("harmonic", "1/10") ** 2).proof.reason == "the map is linear on projective space"
     assert km.check_commute(phi, phi @ phi).holds
     assert km.check_commute(phi, km.map("q' = q; p' = p", "1/10")).holds is False
     assert "~" in km.certificate(LYNESS, "sympy", integrals="(x + 1)*(y + 1)*(x + y + 1)/(x*y)")
