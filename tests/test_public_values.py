@@ -231,6 +231,69 @@ def test_integrals_are_called_iterated_and_converted():
     assert [str(value.subs(at)) for value in double.values()] == km.orbit("weierstrass", [1, 2], "1/10", 2)[2].text
 
 
+def test_a_slice_of_an_orbit_has_its_coordinates_and_times():
+    walk = km.orbit(FISH, [1, 2], "1/10", 4)
+    part = pickle.loads(pickle.dumps(walk[1:4:2]))
+    assert [point.step for point in part] == [1, 3]
+    assert part.x.tolist() == walk.x[[1, 3]].tolist() == [list(point) for point in part]
+    assert part.t.tolist() == [fmpq(1, 5), fmpq(3, 5)]
+    assert km.orbit(FISH, [1, 2], "1/10", 4, exact=False)[:2].x.dtype == float
+
+
+def test_a_system_is_made_from_a_hamiltonian_or_in_the_manner_of_other_libraries():
+    sympy = pytest.importorskip("sympy")
+    q, p = sympy.symbols("q p")
+    fish = km.System(hamiltonian="p^2/2 + q^2/2 - q^3/3", variables="q,p")
+    assert fish.rhs == km.System(FISH).rhs == km.System.from_sympy([p, q**2 - q], (q, p)).rhs
+    assert fish == km.System(hamiltonian=p**2 / 2 + q**2 / 2 - q**3 / sympy.Integer(3), variables=[q, p])
+    assert fish.hamiltonian is not None
+    assert km.System(hamiltonian="a*q*p", variables="q,p", a=3).f([1, 2]) == (3, -6)
+    for arguments, words in [
+        ({}, 'hamiltonian="p\\^2/2'),
+        ({"equations": FISH, "hamiltonian": "q*p"}, "expected either equations"),
+        ({"hamiltonian": "q*p"}, "expected positions and momenta"),
+        ({"hamiltonian": "q^4", "variables": "q,p"}, "degree 4, expected at most 3"),
+        ({"equations": lambda x: x}, "found a function, expected equations.*km.System"),
+    ]:
+        refuses(words, km.System, **arguments)
+
+
+def test_an_explicit_map_is_made_from_a_dictionary_called_and_composed():
+    sympy = pytest.importorskip("sympy")
+    x, y = sympy.symbols("x y")
+    lyness = km.explicit_map({"x": "y", "y": "(1 + y)/x"})
+    for same in (km.explicit_map(["x", "y"], ["y", "(1 + y)/x"]), km.explicit_map({x: y, y: (1 + y) / x})):
+        assert same.subject == lyness.subject
+    assert lyness([1, 2]) == lyness(x=1, y=2) == (2, 3)
+    assert (lyness**5)([1, 2]) == (lyness**0)([1, 2]) == (lyness @ lyness**-1)([1, 2]) == (1, 2) != (lyness**4)([1, 2])
+    inverse = km.explicit_map({x: y, y: (1 + y) / x}, inverse={y: x, x: (1 + x) / y})
+    assert inverse.at(1).inverse([2, 3]) == (1, 2)
+    refuses("found no eps", km.System(FISH).map, [1, 2])
+    refuses("expected one of them", km.explicit_map, {"x": "y"}, ["x"])
+    refuses("found no functions, expected image=", km.explicit_map, ["x"])
+    refuses("floating-point number 0.5", km.explicit_map, {x: 0.5 * x})
+    with pytest.raises(TypeError):
+        lyness @ 3
+
+
+def test_methods_and_plots_name_their_arguments():
+    walk = km.orbit(FISH, [1, 2], "1/10", 4)
+    for call, words in [
+        (lambda: walk.plot(ax=1), r"km.plot.orbit has no argument ax=.*it has trajectory, x, y"),
+        (
+            lambda: km.System(FISH).plot(eps="1/10", figsize=3),
+            "km.portrait has no argument figsize=.*axes are returned",
+        ),
+        (lambda: km.plot.drift("euler_top", dt=1), "h= is the time step"),
+        (lambda: km.certificate(FISH), 'checker= is "sympy", "gp" or "rocq"'),
+        (lambda: km.fixed_points(FISH, eps=1), "leave it out"),
+        (lambda: km.check_integrals(FISH, integral="q"), "extra= is the claim"),
+        (lambda: km.orbit(FISH, [1, 2], "1/10", 4, kernel="cuda"), "found the kernel 'cuda', expected numpy or numba"),
+        (lambda: km.catalogue()[:3], "found slice.*expected a name"),
+    ]:
+        refuses(words, call)
+
+
 def test_a_function_is_called_with_its_arguments_in_any_form():
     I = km.find_integrals(FISH)[0]
     value = I([1, 2], "1/10")

@@ -125,7 +125,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
         """Draw a portrait and return its axes; the arguments are those of `km.portrait` after the system."""
-        return import_module("kahanmaps.plots.plot").plot_orbits(self, *arguments, **options)
+        return import_module("kahanmaps.plots.plot").plot.portrait(self, *arguments, **options)
 
     @property
     def claim_names(self) -> tuple[str, ...]:

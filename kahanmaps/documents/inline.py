@@ -44,13 +44,21 @@ def inline_file(
     return "\n".join(lines)
 
 
-def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = None, **parameters: Any) -> SystemFile:
-    """Create a system x' = f(x) of degree at most 2 from its equations.
+def System(
+    equations: str | Mapping[Any, Any] | Sequence[Any] | None = None,
+    variables: Any = None,
+    *,
+    hamiltonian: Any = None,
+    **parameters: Any,
+) -> SystemFile:
+    """Create a system x' = f(x) of degree at most 2 from its equations, or from a Hamiltonian of degree at most 3.
 
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
             of SymPy, or a list of its equations Eq(x(t).diff(t), ...).
-        variables: for a list of right-hand sides, their names in this order; otherwise also a dict of parameters.
+        variables: for a list of right-hand sides, their names in this order; otherwise also a dict of parameters. For a
+            Hamiltonian the positions, then the momenta in the same order.
+        hamiltonian: H, instead of equations: q' = dH/dp, p' = -dH/dq.
         parameters: the values of other names, a=2 or parameters={"a": 2}, exact numbers, among them algebraic numbers
             of SymPy.
 
@@ -62,18 +70,29 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
 
     >>> System("x' = 2*x*y - a; y' = -x^2 - y^2 - x", a="1/2").system.rhs
     (2*x*y - 1/2, -x^2 - y^2 - x)
+    >>> System(hamiltonian="p^2/2 + q^2/2 - q^3/3", variables="q,p").system.rhs
+    (p, q^2 - q)
     """
     if isinstance(variables, Mapping):
         variables, parameters = None, {**{str(key): value for key, value in variables.items()}, **parameters}
     for name in ("parameters", "params"):
         if isinstance(parameters.get(name), Mapping):
             parameters |= {str(key): value for key, value in parameters.pop(name).items()}
+    if (equations is None) == (hamiltonian is None):
+        example = "km.System(\"q' = p; p' = q^2 - q\")"
+        raise InputError(f'expected either equations, {example}, or hamiltonian="p^2/2 + q^3/3", variables="q,p"')
+    if hamiltonian is not None:
+        if variables is None:
+            raise InputError('found a Hamiltonian without variables, expected positions and momenta, variables="q,p"')
+        equations = [hamiltonian]
     if not isinstance(equations, str | Mapping):
         try:
             equations = list(equations)
         except TypeError as error:
             kind = type(equations).__name__
-            raise InputError(f"found a {kind}, expected equations, as text, a dictionary or a list") from error
+            raise InputError(
+                f"found a {kind}, expected equations, as text, a dictionary or a list: km.System(\"x' = y; y' = x^2\")"
+            ) from error
         equations = sides_of_equations(equations) or equations
     if isinstance(equations, Mapping):
         variables, equations = list(equations), list(equations.values())
@@ -89,7 +108,19 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
         variables = variables.replace(",", " ").split()
     names = None if variables is None else ",".join(map(str, variables))
     values = {name: formula_text(number(value)) for name, value in parameters.items()}
+    if hamiltonian is not None:
+        return parse_system(inline_file(names, values, "hamiltonian", {"H": rhs[0], "J": "standard"}), "inline")
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
+
+
+for _form in (
+    "text",
+    "string",
+    "dict",
+    "sympy",
+    "equations",
+):  # as in other libraries: System.from_sympy
+    setattr(System, f"from_{_form}", System)
 
 
 def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:

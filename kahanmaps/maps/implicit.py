@@ -416,6 +416,26 @@ class MapFamily(LatexDisplay, ABC):
         `values` are the values of the symbols, elements of the field.
         """
 
+    def __call__(self, *point: Any, **named: Any) -> Any:
+        """Return the image of a point under a map that does not depend on eps, as `Map.__call__` does."""
+        if self.has_eps or self.symbols:
+            raise InputError('found no eps, expected an exact number: map.at("1/10")(x)')
+        return self.at(1)(*point, **named)
+
+    def __matmul__(self, other: MapFamily) -> MapFamily:
+        """Return the composition: first `other`, then this map, at the same eps."""
+        if not isinstance(other, MapFamily):
+            return NotImplemented
+        composed: MapFamily = import_module("kahanmaps.maps.composed").composed_map(other, self)
+        return composed
+
+    def __pow__(self, power: int) -> MapFamily:
+        """Return the composition of the map with itself, of its inverse if negative, the identity for 0."""
+        power = integer(power, "the power")
+        powers = [(self, power)] if power else [(self, 1), (self, -1)]
+        composed: MapFamily = import_module("kahanmaps.maps.composed").composed_map(*powers)
+        return composed
+
     rows: Rows  # of (M | -r), polynomials in the `names`
 
     @property

@@ -11,6 +11,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import NoNormalForm
+from kahanmaps.function_calls import public_function
 from kahanmaps.hints import AttributeHints
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
@@ -146,7 +147,11 @@ class Plot(AttributeHints):
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
         """Draw a portrait, as `km.portrait` does."""
-        return plot_orbits(given, *others, **options)
+        return public_function(plot_orbits, "portrait")(given, *others, **options)  # type: ignore[no-any-return]
+
+
+for _name in ("degrees", "heights", "scan", "drift", "commute", "invariant_curves", "rotation", "orbit"):
+    setattr(Plot, _name, public_function(getattr(Plot, _name), f"plot.{_name}"))
 
 
 def _axes(figure: Any) -> Axes:

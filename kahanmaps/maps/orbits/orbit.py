@@ -25,6 +25,7 @@ from kahanmaps.maps.convention import either, eps_record, resolve_eps
 from kahanmaps.maps.convention import time_step as time_step_at
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
+from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
 from kahanmaps.maps.orbits.iteration import (
     DEFAULT_MAX_DIGITS,
@@ -146,6 +147,8 @@ def orbit(
         start = [fmpq(*x.as_integer_ratio()) if isinstance(x, float) else x for x in start]
     if not isinstance(at, Iterable | None):
         raise InputError(f"found at = {at!r}, expected a sequence of steps, at=[{at}]")
+    if kernel is not None:
+        choose_kernel(kernel, is_long=False)
     requested_steps = None if at is None else frozenset(integer(step, "a step of at") for step in at)
     last_step = max(requested_steps, default=0) if requested_steps is not None else (steps or 0)
     require_steps(last_step)
@@ -280,11 +283,13 @@ class Trajectory(HtmlDisplay):
     @overload
     def __getitem__(self, index: int) -> OrbitPoint: ...
     @overload
-    def __getitem__(self, index: slice) -> list[OrbitPoint]: ...
+    def __getitem__(self, index: slice) -> OrbitPoints: ...
     @overload
     def __getitem__(self, index: str) -> Any: ...
     def __getitem__(self, index: int | slice | str) -> Any:
         """Return a point, a list of points, or by the name of a variable the array of its values."""
+        if isinstance(index, slice):
+            return OrbitPoints(self, index)
         if not isinstance(index, str):
             return self.points[index]
         if index not in self.variables:
@@ -330,9 +335,9 @@ class Trajectory(HtmlDisplay):
         data = {name: ("step", table[:, k]) for k, name in enumerate(self.variables)}
         return xarray.Dataset(data, coords={"step": steps, "t": ("step", times)})
 
-    def plot(self, x: int = 0, y: int = 1) -> Any:
-        """Draw two of the coordinates and return the axes."""
-        return import_module("kahanmaps.plots.plot").plot.orbit(self, x, y)
+    def plot(self, *arguments: Any, **options: Any) -> Any:
+        """Draw two of the coordinates, by default x = 0 and y = 1, and return the axes."""
+        return import_module("kahanmaps.plots.plot").plot.orbit(self, *arguments, **options)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row for each point: its step, the coordinates and the values of the integrals (None at poles).
@@ -522,6 +527,24 @@ class Trajectory(HtmlDisplay):
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+class OrbitPoints(list[OrbitPoint]):
+    """A slice of an orbit: a list of points with the arrays `x` and `t` of the orbit."""
+
+    def __init__(self, orbit: Trajectory, index: slice) -> None:
+        super().__init__(orbit.points[index])
+        self._orbit, self._index = orbit, index
+
+    @property
+    def x(self) -> Any:
+        """The coordinates, as `Trajectory.x`."""
+        return self._orbit.x[self._index]
+
+    @property
+    def t(self) -> Any:
+        """The times, as `Trajectory.t`."""
+        return self._orbit.t[self._index]
 
 
 class UnknownVariable(InputError, KeyError):
