@@ -101,7 +101,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
         try:
             return parse_constant(text[start:end], limits=limits)
         except ExpressionError as error:
-            raise ExpressionError(error.message, text, start + error.column) from None
+            raise ExpressionError(error.message, text, start + (error.column or 0)) from None
     match = _NUMBER.fullmatch(text, start, end)
     if match is None or not (match[2] or match[4] or match[5]):
         prefix = _START_OF_NUMBER.match(text, start, end)

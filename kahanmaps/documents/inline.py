@@ -81,10 +81,9 @@ def System(
     if (equations is None) == (hamiltonian is None):
         example = "km.System(\"q' = p; p' = q^2 - q\")"
         raise InputError(f'expected either equations, {example}, or hamiltonian="p^2/2 + q^3/3", variables="q,p"')
-    if hamiltonian is not None:
-        if variables is None:
-            raise InputError('found a Hamiltonian without variables, expected positions and momenta, variables="q,p"')
-        equations = [hamiltonian]
+    if hamiltonian is not None and variables is None:
+        raise InputError('found a Hamiltonian without variables, expected positions and momenta, variables="q,p"')
+    equations = [hamiltonian] if equations is None else equations
     if not isinstance(equations, str | Mapping):
         try:
             equations = list(equations)

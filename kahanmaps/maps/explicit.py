@@ -45,10 +45,9 @@ def explicit_map(
     if isinstance(variables, Mapping):
         if image is not None:
             raise InputError("found {variable: function} and image=, expected one of them")
-        variables, image = list(variables), list(variables.values())
+        image, variables = list(variables.values()), list(variables)
     names = tuple(map(str, variables))
-    if isinstance(inverse, Mapping):
-        inverse = as_point(inverse, names)
+    inverse = as_point(inverse, names) if isinstance(inverse, Mapping) else inverse
     if image is None:
         raise InputError('found no functions, expected image=: explicit_map(["x", "y"], ["y", "(y + 1)/x"])')
     for functions in (image, inverse or image):

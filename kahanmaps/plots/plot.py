@@ -134,8 +134,8 @@ class Plot(AttributeHints):
         normal_form = file.normal_form
         if isinstance(normal_form, NoNormalForm):
             raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
-        ends = (as_point(point, file.variables) for point in (first, last))
-        return _axes(plot_rotation(normal_form, rational(eps), *ends, Style(), points=points))
+        first, last = as_point(first, file.variables), as_point(last, file.variables)
+        return _axes(plot_rotation(normal_form, rational(eps), first, last, Style(), points=points))
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""

@@ -303,7 +303,7 @@ class _Search:
     def _report(self) -> None:
         """Hand over a copy of the solutions so far."""
         result = self.result
-        lists = {"solutions": [*result.solutions], "families": [*result.families]}
+        lists: dict[str, Any] = {"solutions": [*result.solutions], "families": [*result.families]}
         self.on_result(replace(result, **lists, undecided=[*result.undecided, UNFINISHED]))
 
     def _solve(self, part: SolutionComponent, level: int) -> None:
