@@ -40,6 +40,22 @@ _ARGUMENT_HINTS = {
     "to": "language= is the language, for example 'pari'",
     "seed": "settings=km.Settings(seed=3)",
     **dict.fromkeys(("verbose", "quiet"), "progress=print shows the progress"),
+    **dict.fromkeys(("integral", "claim", "formula", "density", "tensor"), "extra= is the claim"),
+    **dict.fromkeys(("rtol", "atol", "tol"), "h= is the time step, which does not change along an orbit"),
+    **dict.fromkeys(("eps", "h", "time_step"), "leave it out: the answer is for every eps"),
+    **dict.fromkeys(("ax", "figsize"), "a new picture is drawn, and its axes are returned: ax = km.plot(...)"),
+    **dict.fromkeys(
+        ("out", "path", "filename", "savefig"),
+        'km.plot(...).figure.savefig("a.pdf"), orbit.write("a.csv") and system.save("a.toml") write files',
+    ),
+    "over": 'km.scan(system, over="a") varies a parameter',
+}
+_MISSING_HINTS = {  # what to type for a required argument
+    "checker": 'checker= is "sympy", "gp" or "rocq"',
+    "other": "km.check_commute(system, other)",
+    "language": 'km.convert(system, "latex")',
+    "over": 'km.scan(system, over="a")',
+    "max_degree": "max_degree= is the largest degree to be searched",
 }
 
 
@@ -114,14 +130,15 @@ class CallableModule(ModuleType):
 def _wrong_call(
     name: str, signature: inspect.Signature, kwargs: dict[str, Any], takes_options: bool, error: TypeError
 ) -> str:
-    known = [argument for argument in signature.parameters if argument != "options"]
+    known = [argument for argument in signature.parameters if argument not in ("self", "options")]
     for argument in () if takes_options else kwargs:
         if argument not in known:
             word = _ARGUMENT_HINTS.get(argument, "")
-            applies = word.startswith(("km.", "with ")) or word.partition("=")[0] in known
+            applies = not word.partition("=")[0].isidentifier() or word.partition("=")[0] in known
             hint = f": {word}" if applies else suggestion(argument, known)
             return f"km.{name} has no argument {argument}={hint}; it has {', '.join(known)}"
-    return f"km.{name}: {error}; its arguments are {', '.join(known)}"
+    missing = _MISSING_HINTS.get(str(error).rpartition(": ")[2].strip("'"), "")
+    return f"km.{name}: {error}; its arguments are {', '.join(known)}{missing and f': {missing}'}"
 
 
 def _require_kind(name: str, value: Any, annotation: str) -> None:

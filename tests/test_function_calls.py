@@ -55,6 +55,18 @@ def test_an_interrupt_at_a_prompt_leaves_the_integrals_found_so_far(prompt):
     assert "interrupted" in found.reason
 
 
+def test_an_interrupt_at_a_prompt_leaves_the_commuting_systems_found_so_far(prompt):
+    system = "x' = x^2; y' = y^2"
+    found, all_of_them = km.find_commuting(system, progress=interrupt_at("solution 2")), km.find_commuting(system)
+    assert found.families == all_of_them.families != []
+    assert len(found.solutions) == 1 < len(all_of_them.solutions)
+    assert "interrupted" in found.undecided[-1]
+    assert str(found.verdict) == "undecided" != str(all_of_them.verdict)
+    over_root = km.System({"x": "a*x^2", "y": "y^2"}, a="sqrt(2)")
+    found = km.find_commuting(over_root, progress=interrupt_at("solution 3"))
+    assert [g.rhs for g in found.solutions] == [g.rhs for g in km.find_commuting(over_root).solutions[:2]]
+
+
 def test_an_interrupt_is_an_interrupt_in_scripts_and_where_nothing_was_found(prompt, monkeypatch):
     with pytest.raises(KeyboardInterrupt) as stop:
         km.find_density("lorenz", progress=interrupt_at(""))

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from flint import fmpq
+from flint import fmpq, fmpq_mat
 from helpers import refuses, together
 
 import kahanmaps as km
@@ -102,6 +102,51 @@ def test_a_field_and_its_jacobian_are_exact_or_arrays():
     assert fish.jacobian(POINTS[0]).shape == (2, 2)
 
 
+FORMS = ([1, 2], (1, 2), np.array([1, 2]), fmpq_mat([[1], [2]]), "1,2", "(1 4/2)", {"p": 2, "q": 1})
+
+
+@pytest.mark.parametrize("point", FORMS, ids=repr)
+def test_every_function_takes_a_point_in_every_form(point):
+    homogeneous = "q' = 3*p^2; p' = -3*q^2"
+    fish, phi = km.System(FISH), km.map(FISH, "1/10")
+    for f in (fish.f, fish.jacobian, fish.system.f, phi, phi.point, phi.jacobian, phi.inverse_step, (phi @ phi).step):
+        assert f(point) == f([1, 2]) != f([2, 1])
+    for f in (
+        lambda x: km.orbit(FISH, x, "1/10", 3).x.tolist(),
+        lambda x: phi.orbit(x, 3).x.tolist(),
+        lambda x: km.ensemble(FISH, x, "1/10", 3).x.tolist(),
+        lambda x: km.lyapunov(FISH, x, "1/10", 9).exponents.tolist(),
+        lambda x: km.heights(FISH, "1/10", starts=x, steps=9).orbits[0].growth.to_json(),
+        lambda x: km.geometry(homogeneous, x, "1/10").text,
+        lambda x: str(km.period(homogeneous, x, "1/10").planes),
+        lambda x: [line.get_ydata().tolist() for line in km.portrait(FISH, x, "1/10", 9).lines],
+    ):
+        assert f(point) == f([1, 2]) != f([2, "1/3"])
+
+
+def test_wrong_points_are_refused_in_words():
+    phi, walk = km.map(FISH, "1/10"), km.orbit(FISH, [1, 2], "1/10", 3)
+    for point, words in [
+        ("1,2,3", "found a point with 3 coordinates, expected 2: q, p"),
+        ({"q": 1, "x": 2}, "found the coordinates q, x, expected q, p"),
+        (walk, r"found 4 points, expected one: type \[f\(x\) for x in points\]"),
+        ([[1, 2], [3, 4]], r"km.ensemble\(system, x0, eps, steps\)"),
+        (5, "found the point 5, expected a sequence of 2 numbers"),
+    ]:
+        refuses(words, phi.step, point)
+        refuses(words, km.orbit, FISH, point, "1/10", 3)
+    refuses("found a point and p=, expected", phi, [1, 2], p=2)
+    refuses("found the symbols a", km.QuadraticSystem((km.parse_polynomial("a*x", ["x", "a"]),), ("a",)).f, [1])
+
+
+def test_a_point_of_an_orbit_is_a_sequence_of_its_coordinates():
+    walk, phi = km.orbit(FISH, [1, 2], "1/10", 3), km.map(FISH, "1/10")
+    q, p = walk[1]
+    assert (q, p) == walk[1].x == phi(walk[0])
+    assert len(walk[1]) == 2
+    assert walk[1][-1] == p
+
+
 def test_parameters_are_substituted_and_systems_are_keys():
     fish = km.System("q' = p; p' = a*q^2 - q", a="1/2")
     assert fish.subs(a=3) == fish.with_parameters({"a": 3}) == km.System("q' = p; p' = a*q^2 - q", a=3) != fish
@@ -184,6 +229,91 @@ def test_integrals_are_called_iterated_and_converted():
     assert [str(value.subs(at)) for value in image.values()] == km.orbit("weierstrass", [1, 2], "1/10", 1)[1].text
     double = (km.map("weierstrass", "1/10") ** 2).to_sympy()
     assert [str(value.subs(at)) for value in double.values()] == km.orbit("weierstrass", [1, 2], "1/10", 2)[2].text
+
+
+def test_a_slice_of_an_orbit_has_its_coordinates_and_times():
+    walk = km.orbit(FISH, [1, 2], "1/10", 4)
+    part = pickle.loads(pickle.dumps(walk[1:4:2]))
+    assert [point.step for point in part] == [1, 3]
+    assert part.x.tolist() == walk.x[[1, 3]].tolist() == [list(point) for point in part]
+    assert part.t.tolist() == [fmpq(1, 5), fmpq(3, 5)]
+    assert km.orbit(FISH, [1, 2], "1/10", 4, exact=False)[:2].x.dtype == float
+
+
+def test_a_system_is_made_from_a_hamiltonian_or_in_the_manner_of_other_libraries():
+    sympy = pytest.importorskip("sympy")
+    q, p = sympy.symbols("q p")
+    fish = km.System(hamiltonian="p^2/2 + q^2/2 - q^3/3", variables="q,p")
+    assert fish.rhs == km.System(FISH).rhs == km.System.from_sympy([p, q**2 - q], (q, p)).rhs
+    assert fish == km.System(hamiltonian=p**2 / 2 + q**2 / 2 - q**3 / sympy.Integer(3), variables=[q, p])
+    assert fish.hamiltonian is not None
+    assert km.System(hamiltonian="a*q*p", variables="q,p", a=3).f([1, 2]) == (3, -6)
+    for arguments, words in [
+        ({}, 'hamiltonian="p\\^2/2'),
+        ({"equations": FISH, "hamiltonian": "q*p"}, "expected either equations"),
+        ({"hamiltonian": "q*p"}, "expected positions and momenta"),
+        ({"hamiltonian": "q^4", "variables": "q,p"}, "degree 4, expected at most 3"),
+        ({"equations": lambda x: x}, "found a function, expected equations.*km.System"),
+    ]:
+        refuses(words, km.System, **arguments)
+
+
+def test_an_explicit_map_is_made_from_a_dictionary_called_and_composed():
+    sympy = pytest.importorskip("sympy")
+    x, y = sympy.symbols("x y")
+    lyness = km.explicit_map({"x": "y", "y": "(1 + y)/x"})
+    for same in (km.explicit_map(["x", "y"], ["y", "(1 + y)/x"]), km.explicit_map({x: y, y: (1 + y) / x})):
+        assert same.subject == lyness.subject
+    assert lyness([1, 2]) == lyness(x=1, y=2) == (2, 3)
+    assert (lyness**5)([1, 2]) == (lyness**0)([1, 2]) == (lyness @ lyness**-1)([1, 2]) == (1, 2) != (lyness**4)([1, 2])
+    inverse = km.explicit_map({x: y, y: (1 + y) / x}, inverse={y: x, x: (1 + x) / y})
+    assert inverse.at(1).inverse([2, 3]) == (1, 2)
+    refuses("found no eps", km.System(FISH).map, [1, 2])
+    refuses("expected one of them", km.explicit_map, {"x": "y"}, ["x"])
+    refuses("found no functions, expected image=", km.explicit_map, ["x"])
+    refuses("floating-point number 0.5", km.explicit_map, {x: 0.5 * x})
+    with pytest.raises(TypeError):
+        lyness @ 3
+
+
+def test_methods_and_plots_name_their_arguments():
+    walk = km.orbit(FISH, [1, 2], "1/10", 4)
+    for call, words in [
+        (lambda: walk.plot(ax=1), r"km.plot.orbit has no argument ax=.*it has trajectory, x, y"),
+        (
+            lambda: km.System(FISH).plot(eps="1/10", figsize=3),
+            "km.portrait has no argument figsize=.*axes are returned",
+        ),
+        (lambda: km.plot.drift("euler_top", dt=1), "h= is the time step"),
+        (lambda: km.certificate(FISH), 'checker= is "sympy", "gp" or "rocq"'),
+        (lambda: km.fixed_points(FISH, eps=1), "leave it out"),
+        (lambda: km.check_integrals(FISH, integral="q"), "extra= is the claim"),
+        (lambda: km.orbit(FISH, [1, 2], "1/10", 4, kernel="cuda"), "found the kernel 'cuda', expected numpy or numba"),
+        (lambda: km.catalogue()[:3], "found slice.*expected a name"),
+    ]:
+        refuses(words, call)
+
+
+def test_a_function_is_called_with_its_arguments_in_any_form():
+    I = km.find_integrals(FISH)[0]
+    value = I([1, 2], "1/10")
+    assert value not in (I([1, 2], "1/9"), I([2, 1], "1/10"), None)
+    for arguments, named in [
+        ((1, 2, "1/10"), {}),
+        (("1,2", "1/10"), {}),
+        (([1, 2],), {"eps": "1/10"}),
+        (([1, 2],), {"h": "1/5"}),
+        (({"p": 2, "q": 1}, "1/10"), {}),
+        ((), {"q": 1, "p": 2, "time_step": Fraction(1, 5)}),
+    ]:
+        assert I(*arguments, **named) == I.function(*arguments, **named) == value
+    walk = km.orbit(FISH, [1, 2], "1/10", 3)
+    assert set(I(walk, "1/10")) == {value} != set(I(walk, "1/9"))
+    assert np.allclose(I(walk.x.astype(float), h=0.2), float(value))
+    assert np.isclose(I([1.0, 2.0], h=0.2), float(value))
+    refuses(r'found 2 values, expected 3: q, p, eps, for example I\(x, eps="1/10"\)', I, [1, 2])
+    refuses("found 1 values, q=, a=, expected 3: q, p, eps", I, 2, q=1, a=3)
+    refuses("found 4 values", I, [1, 2, 3], "1/10")
 
 
 def test_the_verdict_of_an_analysis_in_a_word():

@@ -305,6 +305,11 @@ class FunctionMatrix(EntryMatrix):
                 *numerator, last = _minors(self.field, [[*row[:n], row[j]] for row in rows])
                 if self.field.vanishes(last):
                     raise ZeroDivisionError("singular matrix in solve()")
+                if last.is_constant():  # or its digits would double with each step of an affine map
+                    numerator, last = (
+                        [entry / last.leading_coefficient() for entry in numerator],
+                        self.field.one.numerator,
+                    )
                 for i, entry in zip(block, numerator, strict=True):
                     solution[i].append(Function(self.field, entry * -sign, last * sign))
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])

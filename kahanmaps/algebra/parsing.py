@@ -1,6 +1,6 @@
 """Numbers, points, polynomials and rational functions from text.
 
-    number      -3, 1/2, 0.1 (which is 1/10), .5, 1e-3
+    number      -3, 1/2, 0.1 (which is 1/10), .5, 1e-3, 1/10^6
     point       1/2,-1/3,0
     expression  + - * / ^ ** ( ) with names and numbers, for instance (x^2 + y^2)/(1 - eps^2*z^2)
 
@@ -49,6 +49,8 @@ NO_CONSTANTS: Mapping[str, fmpq] = MappingProxyType({})
 
 BLANKS = " \t\r\n"
 _NUMBER = re.compile(r"([+-]?)(?:([0-9]+)/([0-9]+)|([0-9]+)?(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]+))?)")
+# 10^-6, 1/10**6, 2^10/3^4: the parser of expressions bounds the exponents and the digits.
+_POWER = re.compile(r"(?=[^*^]*[*^])[+-]?[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?(?:/[0-9]+(?:(?:\^|\*\*)[+-]?[0-9]+)?)?")
 _START_OF_NUMBER = re.compile(
     r"[+-]?(?:[0-9]+(?:/[0-9]*|\.?[0-9]*(?:[eE][+-]?[0-9]*)?)|\.(?:[0-9]+(?:[eE][+-]?[0-9]*)?)?)?"
 )
@@ -95,6 +97,11 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
     if end - start > digits + 20:
         given = f"found a number of {end - start} characters"
         raise ExpressionError(f"{given}, expected at most {digits} digits", text, start)
+    if _POWER.fullmatch(text, start, end):
+        try:
+            return parse_constant(text[start:end], limits=limits)
+        except ExpressionError as error:
+            raise ExpressionError(error.message, text, start + (error.column or 0)) from None
     match = _NUMBER.fullmatch(text, start, end)
     if match is None or not (match[2] or match[4] or match[5]):
         prefix = _START_OF_NUMBER.match(text, start, end)
@@ -140,10 +147,10 @@ def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
 def parse_number(text: str, *, limits: ExpressionLimits = LIMITS) -> fmpq:
     """Parse a rational number: an integer, p/q or a finite decimal, perhaps with blanks around it.
 
-    Raises `ExpressionError` for anything else, and for numbers beyond the limits.
+    In p/q both may be powers, as in 1/10^6. Raises `ExpressionError` for anything else and beyond the limits.
 
-    >>> parse_number("0.1"), parse_number(" -6/4 "), parse_number("1e-3")
-    (1/10, -3/2, 1/1000)
+    >>> parse_number("0.1"), parse_number(" -6/4 "), parse_number("1e-3"), parse_number("1/10^3")
+    (1/10, -3/2, 1/1000, 1/1000)
     >>> parse_number("1_000")
     Traceback (most recent call last):
     kahanmaps.errors.ExpressionError: found '1_000', expected an integer, p/q or a decimal such as 0.1

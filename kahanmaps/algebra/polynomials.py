@@ -332,13 +332,14 @@ class RationalFunction(LatexDisplay):
     def __repr__(self) -> str:
         return f"RationalFunction({shorten(str(self), 100)})"
 
-    def __call__(self, *point: Any) -> Any:
+    def __call__(self, *point: Any, **named: Any) -> Any:
         """Return the value at a point: exact numbers, or rounded where a coordinate is a float; None at a pole.
 
-        The arguments are the values of `names` in this order, those of the variables also as one sequence: I(x, eps).
-        An array of floats of shape (points, dimension) gives the array of the values, with NaN at poles.
+        The arguments are the values of `names` in this order, those of the variables also as one point, I(x, eps) or
+        I("1,2", eps), and all of them also by name: I(x, eps="1/10"), I(x, h="1/5"), I({"x": 1, "y": 2}, eps).
+        Several points, such as an orbit, give the array of the values, for an array of floats with NaN at poles.
         """
-        return import_module("kahanmaps.maps.values").function_value(self, point)
+        return import_module("kahanmaps.maps.values").function_value(self, point, named)
 
     def value(self, field: Any, point: Sequence[Any]) -> Any:
         """Return the value at `point` over `field`, or None where the denominator vanishes."""

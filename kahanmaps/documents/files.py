@@ -34,7 +34,7 @@ from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.kahan import KahanFamily
-from kahanmaps.maps.values import values_at
+from kahanmaps.maps.values import point_of, values_at
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -93,20 +93,20 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     dimension = dim
 
-    def f(self, *point: Any) -> Any:
-        """Return the right-hand sides at a point: f(x), f({"x": 1, "y": 2}) or f(1, 2).
+    def f(self, *point: Any, **named: Any) -> Any:
+        """Return the right-hand sides at a point: f(x), f({"x": 1, "y": 2}), f("1,2"), f(1, 2) or f(x=1, y=2).
 
         They are exact for exact numbers, and an array for an array of floats of shape (dim,) or (points, dim). Raises
         InputError for a map without a vector field.
         """
-        return values_at(self.rhs, self.variables, point)
+        return self.system.f(*point, **named)
 
-    def jacobian(self, *point: Any) -> Any:
+    def jacobian(self, *point: Any, **named: Any) -> Any:
         """Return the Jacobi matrix f'(x) at a point, as `f` takes it; without a point, its entries as polynomials."""
         rows = self.system.jacobian(self.variables)
-        if not point:
+        if not point and not named:
             return rows
-        entries = values_at([entry for row in rows for entry in row], self.variables, point)
+        entries = values_at([entry for row in rows for entry in row], self.variables, point_of(point, named))
         if isinstance(entries, tuple):
             return fmpq_mat(self.dim, self.dim, entries)
         return entries.reshape(*entries.shape[:-1], self.dim, self.dim)
@@ -125,7 +125,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     def plot(self, *arguments: Any, **options: Any) -> Any:
         """Draw a portrait and return its axes; the arguments are those of `km.portrait` after the system."""
-        return import_module("kahanmaps.plots.plot").plot_orbits(self, *arguments, **options)
+        return import_module("kahanmaps.plots.plot").plot.portrait(self, *arguments, **options)
 
     @property
     def claim_names(self) -> tuple[str, ...]:
@@ -147,7 +147,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         what = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, KahanFamily):
             what = f"stands for a {self.map.title}"
-        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps")
+        hint = "; of a Kahan map give the system x' = f(x)" if self.kind in ("bilinear", "map", "composition") else ""
+        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps{hint}")
 
     @property
     def rhs(self) -> tuple[fmpq_mpoly, ...]:

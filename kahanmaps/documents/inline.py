@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.expressions import formula_text, number, roots_named, sides_of_equations
 from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.map_files import map_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.maps.convention import resolve_eps
-from kahanmaps.maps.implicit import Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -43,13 +44,21 @@ def inline_file(
     return "\n".join(lines)
 
 
-def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = None, **parameters: Any) -> SystemFile:
-    """Create a system x' = f(x) of degree at most 2 from its equations.
+def System(
+    equations: str | Mapping[Any, Any] | Sequence[Any] | None = None,
+    variables: Any = None,
+    *,
+    hamiltonian: Any = None,
+    **parameters: Any,
+) -> SystemFile:
+    """Create a system x' = f(x) of degree at most 2 from its equations, or from a Hamiltonian of degree at most 3.
 
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
             of SymPy, or a list of its equations Eq(x(t).diff(t), ...).
-        variables: for a list of right-hand sides, their names in this order; otherwise also a dict of parameters.
+        variables: for a list of right-hand sides, their names in this order; otherwise also a dict of parameters. For a
+            Hamiltonian the positions, then the momenta in the same order.
+        hamiltonian: H, instead of equations: q' = dH/dp, p' = -dH/dq.
         parameters: the values of other names, a=2 or parameters={"a": 2}, exact numbers, among them algebraic numbers
             of SymPy.
 
@@ -61,18 +70,28 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
 
     >>> System("x' = 2*x*y - a; y' = -x^2 - y^2 - x", a="1/2").system.rhs
     (2*x*y - 1/2, -x^2 - y^2 - x)
+    >>> System(hamiltonian="p^2/2 + q^2/2 - q^3/3", variables="q,p").system.rhs
+    (p, q^2 - q)
     """
     if isinstance(variables, Mapping):
         variables, parameters = None, {**{str(key): value for key, value in variables.items()}, **parameters}
     for name in ("parameters", "params"):
         if isinstance(parameters.get(name), Mapping):
             parameters |= {str(key): value for key, value in parameters.pop(name).items()}
+    if (equations is None) == (hamiltonian is None):
+        example = "km.System(\"q' = p; p' = q^2 - q\")"
+        raise InputError(f'expected either equations, {example}, or hamiltonian="p^2/2 + q^3/3", variables="q,p"')
+    if hamiltonian is not None and variables is None:
+        raise InputError('found a Hamiltonian without variables, expected positions and momenta, variables="q,p"')
+    equations = [hamiltonian] if equations is None else equations
     if not isinstance(equations, str | Mapping):
         try:
             equations = list(equations)
         except TypeError as error:
             kind = type(equations).__name__
-            raise InputError(f"found a {kind}, expected equations, as text, a dictionary or a list") from error
+            raise InputError(
+                f"found a {kind}, expected equations, as text, a dictionary or a list: km.System(\"x' = y; y' = x^2\")"
+            ) from error
         equations = sides_of_equations(equations) or equations
     if isinstance(equations, Mapping):
         variables, equations = list(equations), list(equations.values())
@@ -88,7 +107,19 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
         variables = variables.replace(",", " ").split()
     names = None if variables is None else ",".join(map(str, variables))
     values = {name: formula_text(number(value)) for name, value in parameters.items()}
+    if hamiltonian is not None:
+        return parse_system(inline_file(names, values, "hamiltonian", {"H": rhs[0], "J": "standard"}), "inline")
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
+
+
+for _form in (
+    "text",
+    "string",
+    "dict",
+    "sympy",
+    "equations",
+):  # as in other libraries: System.from_sympy
+    setattr(System, f"from_{_form}", System)
 
 
 def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:
@@ -101,9 +132,9 @@ def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any
 
 
 def as_file(value: Any) -> SystemFile:
-    """Convert a value to a file: a file, a system, a catalogue name, a path, or equations as `System` takes them.
+    """Convert a value to a file: a file, system, map, catalogue name or path, or equations as `System` takes them.
 
-    Raises InputError for anything else.
+    A map at one eps is one that does not depend on eps. Raises InputError for anything else.
     """
     if isinstance(value, SystemFile):
         return value
@@ -123,7 +154,7 @@ def as_file(value: Any) -> SystemFile:
         return System(value)
     if isinstance(value, str | Path):
         return load(value)
-    if isinstance(value, Map):
-        raise InputError(f"found {value!r}, a map at one eps, expected what it was made of, and eps=")
+    if isinstance(value, Map | MapFamily):
+        return map_file(value)
     kind = type(value).__name__
     raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")

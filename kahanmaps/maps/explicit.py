@@ -5,7 +5,9 @@ As an equation M is the diagonal of the denominators Q_i and r the column of the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from typing import Any
 
 from flint import fmpq_mpoly
 
@@ -13,20 +15,22 @@ from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import InputError, counted
 from kahanmaps.maps.implicit import ImplicitMap
+from kahanmaps.maps.values import as_point
 
 TITLE = "explicit map"
 
 
 def explicit_map(
-    variables: Sequence[str],
-    image: Sequence[RationalFunction | str],
-    inverse: Sequence[RationalFunction | str] | None = None,
+    variables: Sequence[str] | Mapping[Any, Any],
+    image: Sequence[Any] | None = None,
+    inverse: Sequence[Any] | Mapping[Any, Any] | None = None,
 ) -> ImplicitMap:
     """The map x -> (P_1/Q_1, ..., P_n/Q_n).
 
     Args:
-        variables: the names of the n coordinates.
-        image: n rational functions of the variables, then symbols, if there are any, and eps; or texts.
+        variables: the names of the n coordinates; or {variable: function}, instead of `image`.
+        image: n rational functions of the variables, then symbols, if there are any, and eps; or texts, or expressions
+            of SymPy.
         inverse: the same for the inverse map, where it is known. That it is the inverse is not tested here.
 
     Returns:
@@ -35,12 +39,17 @@ def explicit_map(
     Raises:
         InputError: for another number of functions than of variables, or other names in them.
 
-    >>> from kahanmaps.algebra.parsing import parse_rational_function
-    >>> lyness = [parse_rational_function(text, ["x", "y", "eps"]) for text in ("y", "(y + 2)/x")]
-    >>> explicit_map(["x", "y"], lyness).at(1).step([1, 3])
-    (3, 5)
+    >>> explicit_map(["x", "y"], ["y", "(y + 2)/x"])([1, 3]), explicit_map({"x": "y", "y": "(y + 2)/x"})([1, 3])
+    ((3, 5), (3, 5))
     """
-    names = tuple(variables)
+    if isinstance(variables, Mapping):
+        if image is not None:
+            raise InputError("found {variable: function} and image=, expected one of them")
+        image, variables = list(variables.values()), list(variables)
+    names = tuple(map(str, variables))
+    inverse = as_point(inverse, names) if isinstance(inverse, Mapping) else inverse
+    if image is None:
+        raise InputError('found no functions, expected image=: explicit_map(["x", "y"], ["y", "(y + 1)/x"])')
     for functions in (image, inverse or image):
         if len(functions) != len(names):
             raise InputError(
@@ -49,9 +58,11 @@ def explicit_map(
     return ImplicitMap(names, _rows(names, image), TITLE, backward=None if inverse is None else _rows(names, inverse))
 
 
-def _rows(names: tuple[str, ...], given: Sequence[RationalFunction | str]) -> tuple[tuple[fmpq_mpoly, ...], ...]:
-    n = len(given)
-    functions = [parse_rational_function(f, (*names, "eps")) if isinstance(f, str) else f for f in given]
+def _rows(names: tuple[str, ...], given: Sequence[Any]) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+    n, text_of = len(given), import_module("kahanmaps.documents.expressions").formula_text  # from a higher layer
+    functions = [
+        f if isinstance(f, RationalFunction) else parse_rational_function(text_of(f), (*names, "eps")) for f in given
+    ]
     return tuple(
         (*(f.denominator if i == j else f.denominator * 0 for j in range(n)), -f.numerator)
         for i, f in enumerate(functions)

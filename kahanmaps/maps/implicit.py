@@ -101,19 +101,22 @@ class Map(LatexDisplay):
         """Return the name of the matrix M(x) of the map, or of its inverse."""
         return "M'(x)" if backward else "M(x)"
 
-    def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        """Convert values to a point over the field. Raises InputError for a wrong length or inexact numbers."""
+    def point(self, values: Any) -> tuple[Any, ...]:
+        """Convert a sequence, {variable: value} or text "1,2" to a point over the field.
+
+        Raises InputError for a wrong length or inexact numbers.
+        """
         return coordinates(values, self.field, self.variables, self.dim)
 
-    def __call__(self, *point: Any) -> Any:
-        """Return the image of a point, given as phi((1, 2)), phi(1, 2) or phi({"x": 1, "y": 2}).
+    def __call__(self, *point: Any, **named: Any) -> Any:
+        """Return the image of a point: phi((1, 2)), phi(1, 2), phi("1,2"), phi({"x": 1, "y": 2}) or phi(x=1, y=2).
 
         An array of floats, of shape (dim,) or (points, dim), has an array of floats as image, with NaN where the map is
         not defined. Calling without arguments returns the map itself, so `phi.inverse()` works.
         """
-        if not point:
+        if not point and not named:
             return self
-        x = point_of(point, self.variables)
+        x = point_of(point, named)
         if is_float_array(x):
             return import_module("kahanmaps.maps.floats.steps").images_of(self, x)
         return self.step(x)
@@ -412,6 +415,26 @@ class MapFamily(LatexDisplay, ABC):
 
         `values` are the values of the symbols, elements of the field.
         """
+
+    def __call__(self, *point: Any, **named: Any) -> Any:
+        """Return the image of a point under a map that does not depend on eps, as `Map.__call__` does."""
+        if self.has_eps or self.symbols:
+            raise InputError('found no eps, expected an exact number: map.at("1/10")(x)')
+        return self.at(1)(*point, **named)
+
+    def __matmul__(self, other: MapFamily) -> MapFamily:
+        """Return the composition: first `other`, then this map, at the same eps."""
+        if not isinstance(other, MapFamily):
+            return NotImplemented
+        composed: MapFamily = import_module("kahanmaps.maps.composed").composed_map(other, self)
+        return composed
+
+    def __pow__(self, power: int) -> MapFamily:
+        """Return the composition of the map with itself, of its inverse if negative, the identity for 0."""
+        power = integer(power, "the power")
+        powers = [(self, power)] if power else [(self, 1), (self, -1)]
+        composed: MapFamily = import_module("kahanmaps.maps.composed").composed_map(*powers)
+        return composed
 
     rows: Rows  # of (M | -r), polynomials in the `names`
 

@@ -27,7 +27,7 @@ from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.convention import time_step as time_step_at
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import ElementaryMap, MapFamily, nonzero_eps
+from kahanmaps.maps.implicit import ElementaryMap, Map, MapFamily, nonzero_eps
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver, as_system
 
@@ -44,7 +44,7 @@ class HasMap(Protocol):
 
 # The arguments of `as_map`.
 SystemLike: TypeAlias = (
-    "str | Path | Mapping[Any, Any] | Sequence[Any] | HasMap | QuadraticSystem | MapFamily | CubicHamiltonian "
+    "str | Path | Mapping[Any, Any] | Sequence[Any] | HasMap | QuadraticSystem | MapFamily | Map | CubicHamiltonian "
     "| FamilyMember | AssociatedSystem"
 )
 
@@ -225,8 +225,9 @@ class KahanFamily(MapFamily):
 def as_map(value: SystemLike) -> MapFamily:
     """Convert a value to a map; a system stands for its Kahan map.
 
-    The value is a map, a system, a system file, a member of the family, a catalogue name, a path, or equations: text, a
-    dictionary {variable: expression}, or a list of equations of SymPy.
+    The value is a map (one at a fixed eps is a map that does not depend on eps), a system, a system file, a member of
+    the family, a catalogue name, a path, or equations: text, a dictionary {variable: expression}, or a list of
+    equations of SymPy.
     Raises InputError for anything else.
     """
     if isinstance(value, QuadraticSystem):

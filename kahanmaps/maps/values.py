@@ -1,15 +1,18 @@
-"""Values at points as users write them: exact numbers in a sequence or by variable, or arrays of floats."""
+"""Values at points as users write them: exact numbers in a sequence, by variable or as text, or arrays of floats."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq_mat, fmpq_mpoly, fmpz_mat
 
 from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.errors import InexactNumber, InputError, counted
+
+_MATRICES = (fmpq_mat, fmpz_mat)  # columns or rows of coordinates
 
 
 def is_float_value(value: Any) -> bool:
@@ -22,28 +25,82 @@ def is_float_array(value: Any) -> bool:
     return is_float_value(value) and getattr(value, "ndim", 0) > 0
 
 
-def point_of(arguments: Sequence[Any], variables: Sequence[str]) -> Any:
-    """Return the point in the arguments of a call, f(x), f({"x": 1}) or f(1, 2), as a sequence in this order."""
+def as_point(value: Any, variables: Sequence[str]) -> Any:
+    """Return the coordinates of a point in order: from a sequence, an array, {variable: value}, or text such as "1,2".
+
+    The caller converts the coordinates. Raises InputError for other names, for several points, and for anything else.
+
+    >>> as_point("1/2, 3", ["x", "y"]), as_point({"y": 3, "x": "1/2"}, ["x", "y"])
+    ((1/2, 3), ['1/2', 3])
+    """
+    if isinstance(value, str):
+        return parse_point(value)
+    if isinstance(value, Mapping):
+        named = {str(name): coordinate for name, coordinate in value.items()}
+        if set(named) != set(variables):
+            raise InputError(f"found the coordinates {', '.join(named)}, expected {', '.join(variables)}")
+        return [named[name] for name in variables]
+    if isinstance(value, _MATRICES):
+        return value.entries()
+    if not hasattr(value, "__len__"):
+        raise InputError(f"found the point {value!r}, expected a sequence of {len(variables) or 'its'} numbers")
+    if is_several(value):
+        raise InputError(
+            f"found {counted(len(value), 'point')}, expected one: type [f(x) for x in points]; "
+            "km.ensemble(system, x0, eps, steps) computes many orbits"
+        )
+    return value
+
+
+def is_several(value: Any) -> bool:
+    """Whether the value is a sequence of points: an array with two axes, or a sequence of sequences."""
+    if isinstance(value, str | Mapping | fmpq_mat | fmpz_mat) or not hasattr(value, "__len__"):
+        return False
+    return len(value) > 0 and all(
+        "," in entry if isinstance(entry, str) else hasattr(entry, "__len__") and getattr(entry, "ndim", 1) > 0
+        for entry in value
+    )
+
+
+def as_points(value: Any, variables: Sequence[str]) -> list[Any]:
+    """Return one point or several as a list of points, each as `as_point` does."""
+    return [as_point(point, variables) for point in (value if is_several(value) else [value])]
+
+
+def start_rows(starts: Any, variables: Sequence[str]) -> Any:
+    """Return one initial point or several, each as `as_point` takes it, as the rows of an array of doubles.
+
+    >>> start_rows(["1/2", 0], ["x", "y"]), start_rows([{"y": 2.5, "x": 1}], ["x", "y"])
+    (array([[0.5, 0. ]]), array([[1. , 2.5]]))
+    """
+    import numpy as np
+
+    from kahanmaps.maps.floats.float_conversion import to_floats
+
+    if is_float_array(starts):
+        return np.array(np.atleast_2d(starts), dtype=np.float64)
+    points = as_points(starts, variables)
+    if len({len(point) for point in points}) != 1:
+        raise InputError("found initial points of different lengths, expected the same number of coordinates in each")
+    return np.array([to_floats(point) for point in points])
+
+
+def point_of(arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
+    """Return the point in the arguments of a call: f(x), f({"x": 1, "y": 2}), f("1,2"), f(1, 2) or f(x=1, y=2)."""
     if len(arguments) == 2 and hasattr(arguments[1], "__len__") and not isinstance(arguments[1], str):
         raise InputError("found two arguments, expected the point alone: nothing here depends on the time t")
-    point = arguments[0] if len(arguments) == 1 and hasattr(arguments[0], "__len__") else arguments
-    return point_by_names(point, variables) if isinstance(point, Mapping) else point
-
-
-def point_by_names(values: Mapping[Any, Any], variables: Sequence[str]) -> list[Any]:
-    """Return the coordinates of a point that is given by variable. Raises InputError for other names."""
-    named = {str(name): value for name, value in values.items()}
-    if set(named) != set(variables):
-        raise InputError(f"found the coordinates {', '.join(named)}, expected {', '.join(variables)}")
-    return [named[name] for name in variables]
+    if named:
+        if arguments:
+            raise InputError(f"found a point and {', '.join(named)}=, expected f(x) or f({', '.join(named)}=...)")
+        return named
+    is_point = len(arguments) == 1 and (hasattr(arguments[0], "__len__") or isinstance(arguments[0], _MATRICES))
+    return arguments[0] if is_point else arguments
 
 
 def coordinates(values: Any, field: Field, variables: Sequence[str], dim: int) -> tuple[Any, ...]:
-    """Convert a sequence to a point over the field. Raises InputError for a wrong length or inexact numbers."""
-    if isinstance(values, str):
-        raise InputError(f"found the text {values[:60]!r}, expected a sequence: parse_point reads points from text")
-    if not hasattr(values, "__len__"):
-        raise InputError(f"found {values!r}, expected a sequence of {dim} exact numbers")
+    """Convert what `as_point` takes to a point over the field; raise InputError for a wrong length and floats."""
+    if not isinstance(values, tuple):
+        values = as_point(values, variables)
     if len(values) != dim:
         named = f": {', '.join(variables)}" if variables else ""
         raise InputError(f"found a point with {counted(len(values), 'coordinate')}, expected {dim}{named}")
@@ -54,20 +111,32 @@ def coordinates(values: Any, field: Field, variables: Sequence[str], dim: int) -
         raise InexactNumber(f"{error}; {hint}") from None
 
 
-def function_value(function: RationalFunction, arguments: Sequence[Any]) -> Any:
+def function_value(function: RationalFunction, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
     """Return the value of a rational function at a point, as `RationalFunction.__call__` does."""
-    if arguments and getattr(arguments[0], "ndim", 1) == 2:
+    if arguments and is_several(arguments[0]):
         import numpy as np
 
-        return np.array([function_value(function, (row, *arguments[1:])) for row in arguments[0]], dtype=np.float64)
-    names, values = function.names, list[Any]()
+        values = [function_value(function, (row, *arguments[1:]), named) for row in arguments[0]]
+        return np.array(values, dtype=np.float64 if any(map(is_float_value, values)) else object)
+    names, given, values = function.names, dict(named), list[Any]()
+    for name in {"h", "time_step"} & {*named} - {*names}:  # 2 eps
+        h = given.pop(name)
+        given["eps"] = h / 2 if is_float_value(h) else QQ.convert(h) / 2
     for entry in arguments:
-        values.extend(entry if hasattr(entry, "__len__") and not isinstance(entry, str) else [entry])
+        if isinstance(entry, Mapping):
+            given.update({str(name): value for name, value in entry.items()})
+        else:
+            values.extend(as_point(entry, ()) if hasattr(entry, "__len__") else [entry])
+    rest = [name for name in names if name not in given]
     unused = {*function.numerator.unused_gens()}.intersection(function.denominator.unused_gens())
-    if len(values) == len(names) - 1 and names[-1] == "eps" and "eps" in unused:
+    if len(values) == len(rest) - 1 and rest[-1] == "eps" and "eps" in unused:
         values.append(0)  # it does not matter
-    if len(values) != len(names):
-        raise InputError(f"found {len(values)} values, expected {len(names)}: {', '.join(names)}")
+    if len(values) != len(rest) or not {*given} <= {*names}:
+        hint = ', for example I(x, eps="1/10")' if len(values) == len(rest) - 1 and rest[-1] == "eps" else ""
+        found = ", ".join([f"{len(values)} values", *(f"{name}=" for name in given)])
+        raise InputError(f"found {found}, expected {len(names)}: {', '.join(names)}{hint}")
+    given.update(zip(rest, values, strict=True))
+    values = [given[name] for name in names]
     if any(map(is_float_value, values)):
         from kahanmaps.maps.floats.float_conversion import FLOATS, double
 
@@ -75,9 +144,8 @@ def function_value(function: RationalFunction, arguments: Sequence[Any]) -> Any:
     return function.value(QQ, [QQ.convert(x) for x in values])
 
 
-def values_at(polynomials: Sequence[fmpq_mpoly], variables: Sequence[str], arguments: Sequence[Any]) -> Any:
+def values_at(polynomials: Sequence[fmpq_mpoly], variables: Sequence[str], point: Any) -> Any:
     """Return the values of polynomials at a point: a tuple of exact numbers, or an array for an array of floats."""
-    point = point_of(arguments, variables)
     if not is_float_array(point):
         x = coordinates(point, QQ, variables, len(variables))
         return tuple(evaluate(polynomial, QQ, x) for polynomial in polynomials)

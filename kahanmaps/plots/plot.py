@@ -11,14 +11,15 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
 from kahanmaps.family.system_normal_form import NoNormalForm
+from kahanmaps.function_calls import public_function
 from kahanmaps.hints import AttributeHints
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.scan.result import Scan
 from kahanmaps.maps.convention import either, resolve_eps
-from kahanmaps.maps.floats.float_conversion import start_rows
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.orbit import Trajectory
+from kahanmaps.maps.values import as_point, as_points, start_rows
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.plots.portraits.portrait import portrait_of
@@ -102,7 +103,7 @@ class Plot(AttributeHints):
         value, point, count = rational(value), either(start=start, x0=x0), either(steps=steps, n=n)
         if point is None:
             point = small_start(file.system, value)
-        point = [exact(float(x)) if isinstance(x, float) else x for x in point]
+        point = [exact(float(x)) if isinstance(x, float) else x for x in as_point(point, file.variables)]
         functions = known_functions(file, value)
         if not functions:
             raise InputError(f"found no known integral of {file.name}: km.find_integrals(system) searches for some")
@@ -122,16 +123,18 @@ class Plot(AttributeHints):
         from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
         from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 
-        starts = x0 if hasattr(x0[0], "__len__") and not isinstance(x0[0], str) else [x0]
-        return _axes(plot_invariant_curves(find_invariant_curves(as_file(system), starts, eps, n), Style()))
+        file = as_file(system)
+        return _axes(plot_invariant_curves(find_invariant_curves(file, as_points(x0, file.variables), eps, n), Style()))
 
     def rotation(self, system: SystemLike, first: Any, last: Any, *, eps: Any, points: int = 200) -> Axes:
         """Plot the rotation numbers of a system with a normal form along the segment between two initial points."""
         from kahanmaps.plots.rotation import plot_rotation
 
-        normal_form = as_file(system).normal_form
+        file = as_file(system)
+        normal_form = file.normal_form
         if isinstance(normal_form, NoNormalForm):
             raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
+        first, last = as_point(first, file.variables), as_point(last, file.variables)
         return _axes(plot_rotation(normal_form, rational(eps), first, last, Style(), points=points))
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
@@ -144,7 +147,11 @@ class Plot(AttributeHints):
 
     def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
         """Draw a portrait, as `km.portrait` does."""
-        return plot_orbits(given, *others, **options)
+        return public_function(plot_orbits, "portrait")(given, *others, **options)  # type: ignore[no-any-return]
+
+
+for _name in ("degrees", "heights", "scan", "drift", "commute", "invariant_curves", "rotation", "orbit"):
+    setattr(Plot, _name, public_function(getattr(Plot, _name), f"plot.{_name}"))
 
 
 def _axes(figure: Any) -> Axes:
@@ -183,7 +190,7 @@ def plot_orbits(
     value = real_approximation.at(resolve_eps(eps, time_step, h, floats=True)).eps
     if starts is None:
         starts = automatic_starts(real_approximation.system, value, axes)
-    x = start_rows(starts)
+    x = start_rows(starts, real_approximation.variables)
     return _drawn(walked(ensemble_for(real_approximation.map, value, x, steps), steps), axes)
 
 

@@ -151,6 +151,13 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         images = [*context.gens(), *(context.constant(value) for value in values)]
         return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
 
+    def f(self, *point: Any, **named: Any) -> Any:
+        """Return the right-hand sides at a point, as `SystemFile.f` does. Raises InputError if there are symbols."""
+        if self.symbols:
+            raise InputError(f"found the symbols {', '.join(self.symbols)}, expected numbers: system.at(values).f(x)")
+        values: Any = import_module("kahanmaps.maps.values")  # from a higher layer
+        return values.values_at(self.rhs, self.variables, values.point_of(point, named))
+
     def jacobian(self, names: Sequence[str]) -> list[list[fmpq_mpoly]]:
         """Return f'(x) as polynomials in `names`, which contain the variables and the symbols."""
         context = ring(names)

@@ -108,3 +108,17 @@ def test_the_budget_is_spent_before_the_work_is_done():
         power = power * power
     with pytest.raises(BudgetExceeded):
         _ = power * power * power * power
+
+
+def test_the_digits_of_the_iterates_of_an_affine_map_grow_linearly():
+    field = FunctionField(NAMES, budget=10**6, reduces=True)
+    x, matrix = field.column(field.variables), field.matrix(2, 2, [1, fmpq(-1, 10), fmpq(1, 10), 1])
+    right = field.matrix(2, 2, [1, fmpq(1, 10), fmpq(-1, 10), 1])
+    for _ in range(40):
+        x = matrix.solve(right * x)
+    exact = (
+        fmpq_mat([[1, fmpq(-1, 10)], [fmpq(1, 10), 1]]).inv() * fmpq_mat([[1, fmpq(1, 10)], [fmpq(-1, 10), 1]])
+    ) ** 40
+    for entry, row in zip(x.entries(), exact.tolist(), strict=True):
+        assert value(entry, (fmpq(2), fmpq(3))) == 2 * row[0] + 3 * row[1]
+        assert len(str(entry.numerator)) + len(str(entry.denominator)) < 800

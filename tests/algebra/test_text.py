@@ -62,6 +62,9 @@ def error_of(text: str, limits: ExpressionLimits | None = None) -> ExpressionErr
         ("1.50E+2", fmpq(150)),
         ("0e9999", fmpq(0)),
         (" \t1/2\r\n", fmpq(1, 2)),
+        ("1/10^6", fmpq(1, 10**6)),
+        ("-2**3/3^2", fmpq(-8, 9)),
+        ("10^-6", fmpq(1, 10**6)),
     ],
 )
 def test_a_number_in_text_is_exact(text: str, value: fmpq):
@@ -104,7 +107,16 @@ def test_a_point_may_stand_in_brackets_and_have_blanks_for_commas(text: str):
 
 @pytest.mark.parametrize(
     ("text", "entry", "column"),
-    [("1,2,x", 3, 4), ("1,,2", 2, 2), ("1,2,", 3, 4), ("(1,2", 1, 0), ("1 2 x", 3, 4), ("1, 2/0", 2, 5), ("1;2", 1, 1)],
+    [
+        ("1,2,x", 3, 4),
+        ("1,,2", 2, 2),
+        ("1,2,", 3, 4),
+        ("(1,2", 1, 0),
+        ("1 2 x", 3, 4),
+        ("1, 2/0", 2, 5),
+        ("1/3^2, 1/2^9999", 2, 10),
+        ("1;2", 1, 1),
+    ],
 )
 def test_a_mistake_in_a_point_names_entry_and_column(text: str, entry: int, column: int):
     with pytest.raises(ExpressionError, match=f"^entry {entry}: ") as caught:

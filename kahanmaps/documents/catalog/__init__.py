@@ -112,6 +112,8 @@ class Catalogue(Mapping[str, "SystemFile"]):
     """
 
     def __getitem__(self, name: str) -> SystemFile:
+        if not isinstance(name, str):
+            raise UnknownSystem(f"found {name!r}, expected a name: list(km.catalogue())[:3] are the first three")
         if name not in self:
             raise UnknownSystem(str(_unknown(name)))
         return load(name)

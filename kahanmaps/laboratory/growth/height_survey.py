@@ -15,7 +15,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import derive_seed
-from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.printing import attributes, format_point
 from kahanmaps.algebra.work import Budget
 from kahanmaps.display_protocols import PrintableResult
@@ -27,6 +27,7 @@ from kahanmaps.invariants.heights import HeightGrowth, height_growth
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.kahan import SystemLike, as_map
+from kahanmaps.maps.values import as_points, coordinates
 
 DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
 DEFAULT_STARTS = 3
@@ -162,10 +163,8 @@ def height_survey(
     eps = resolve_eps(eps, time_step, h)
     if isinstance(starts, int) and not 1 <= starts <= _MAX_STARTS:
         raise InputError(f"found {starts} starts, expected 1 to {_MAX_STARTS}")
-    if not isinstance(starts, int) and len(starts) == 0:
+    if hasattr(starts, "__len__") and len(starts) == 0:
         raise InputError("found no starts, expected at least one")
-    if not isinstance(starts, int) and not all(hasattr(start, "__len__") for start in starts):
-        starts = [starts]  # a single initial point
     is_stage, budget = isinstance(effort, Budget), budget_for("heights", effort)
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
@@ -173,7 +172,11 @@ def height_survey(
     for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
         map_at_eps = map_.at(value)
         rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")
-        points = [None] * starts if isinstance(starts, int) else [tuple(map(rational, start)) for start in starts]
+        points = (
+            [None] * starts
+            if isinstance(starts, int)
+            else [coordinates(start, QQ, map_.variables, map_.dim) for start in as_points(starts, map_.variables)]
+        )
         for k, start in enumerate(points):
             if orbits and budget.is_spent:
                 return HeightSurvey(tuple(orbits), False, map_.has_eps, field)

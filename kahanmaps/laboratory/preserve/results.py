@@ -23,9 +23,9 @@ class FoundFunction(LatexDisplay, ResultPart):
 
     function: RationalFunction
 
-    def __call__(self, *point: Any) -> Any:
+    def __call__(self, *point: Any, **named: Any) -> Any:
         """Return the value at a point and eps: exact, or rounded where a coordinate is a float; None at a pole."""
-        return self.function(*point)
+        return self.function(*point, **named)
 
 
 @dataclass(frozen=True)

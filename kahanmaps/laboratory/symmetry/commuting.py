@@ -32,7 +32,7 @@ from kahanmaps.algebra.small_systems import (
     solve_system,
     without_contained,
 )
-from kahanmaps.algebra.work import SPENT, Budget
+from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget
 from kahanmaps.checks.claims import Certainty, Finding, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
@@ -186,6 +186,7 @@ def commuting_systems(
     error_bits: int = DEFAULT_ERROR_BITS,
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[CommutingSystems], None] = lambda _: None,
     C: fmpq_mat | None = None,
 ) -> CommutingSystems:
     """Find all rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
@@ -200,6 +201,7 @@ def commuting_systems(
         error_bits: a supported solution is wrong with a probability below 2^-error_bits.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message at each stage.
+        on_result: called with the solutions so far after each, for searches that may be interrupted.
         C: a matrix with C f' = f' C; only g with C g' = g' C are searched.
 
     Returns:
@@ -217,7 +219,7 @@ def commuting_systems(
     system, budget = as_system(system), budget_for("commuting systems", effort)
     if shape is None:
         note = ""
-        options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "progress": progress}
+        options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "progress": progress, "on_result": on_result}
         if system.dim <= QUICK_DIMENSION and not budget.is_spent:
             result = commuting_systems(system, "quadratic", **options, effort=Budget(QUICK_UNITS))
             if result.complete:
@@ -229,7 +231,7 @@ def commuting_systems(
     if shape not in SHAPES:
         raise InputError(f"found the shape {shape!r}, expected {' or '.join(SHAPES)}")
     settings = Settings(seed=derive_seed(seed, system.rhs), error_bits=error_bits, progress=progress)
-    search = _Search(system, settings, budget, C, CommutingSystems(system, shape))
+    search = _Search(system, settings, budget, C, CommutingSystems(system, shape), on_result)
     search.run()
     return search.result
 
@@ -241,6 +243,7 @@ class _Search:
     budget: Budget
     C: fmpq_mat | None
     result: CommutingSystems
+    on_result: Callable[[CommutingSystems], None]
     space: CommutingSpace = field(default_factory=lambda: CommutingSpace((), (), 0))
     points: list[SolutionComponent] = field(default_factory=list)
     families: list[SolutionComponent] = field(default_factory=list)
@@ -295,6 +298,13 @@ class _Search:
                 result.undecided.append(f"one solution: {finding.evidence.summary}")
             else:
                 result.solutions.append(self._field(weights, finding))
+                self._report()
+
+    def _report(self) -> None:
+        """Hand over a copy of the solutions so far."""
+        result = self.result
+        lists: dict[str, Any] = {"solutions": [*result.solutions], "families": [*result.families]}
+        self.on_result(replace(result, **lists, undecided=[*result.undecided, UNFINISHED]))
 
     def _solve(self, part: SolutionComponent, level: int) -> None:
         """Solve the equations of the order that belongs to `level` on a part of the space."""
@@ -369,6 +379,7 @@ class _Search:
         self.result.families.append(
             CommutingFamily(self._field(base, finding), tuple(self._field(d, finding) for d in directions), finding)
         )
+        self._report()
 
     def _field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
         matrix = combination_of(weights, self.space.matrices) if self.space.matrices else None
@@ -385,6 +396,7 @@ def find_commuting(
     error_bits: int = DEFAULT_ERROR_BITS,
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[CommutingSystems], None] = lambda _: None,
 ) -> CommutingSystems:
     """Find all quadratic g whose Kahan map commutes with that of f at the same eps, over Q or the number field of f.
 
@@ -406,7 +418,7 @@ def find_commuting(
     if not isinstance(kahan, KahanFamily) or "eps" in kahan.system.symbols:
         raise InputError(f"found {kahan.kind}, expected a quadratic vector field without eps")
     if not isinstance(given, AlgebraicMap):
-        return commuting_systems(kahan.system, shape, **options)
+        return commuting_systems(kahan.system, shape, **options, on_result=on_result)
     f, chi = kahan.system, given.root.polynomial
     if GENERATOR in f.variables:
         raise InputError(f"found a variable {GENERATOR}, expected another name: this one denotes the algebraic number")
@@ -416,7 +428,6 @@ def find_commuting(
     C = fmpq_mat(f.dim * m, f.dim * m)  # t times a point
     for k, i, j in itertools.product(range(f.dim), range(m), range(m)):
         C[k * m + i, k * m + j] = times_t[i, j]
-    result = commuting_systems(over_algebra(over_t, chi), shape or "linear", **options, C=C)
     *x, a = ring((*f.variables, *f.symbols)).gens()
     at = [x[k // m] if k % m == 0 else 0 * a for k in range(f.dim * m)]
 
@@ -429,16 +440,20 @@ def find_commuting(
     def over_field(g: CommutingField) -> CommutingField:
         return replace(g, system=descend(g.system), B=None)
 
-    return replace(
-        result,
-        system=f,
-        basis=[descend(G) for G in result.basis],
-        dimension=None if result.dimension is None else result.dimension // m,
-        solutions=[over_field(g) for g in result.solutions],
-        families=[
-            replace(family, base=over_field(family.base), directions=tuple(map(over_field, family.directions)))
-            for family in result.families
-        ],
-        irrational=[],  # such solutions are not over the field either, but over its extensions
-        root=str(given.root),
-    )
+    def descended(result: CommutingSystems) -> CommutingSystems:
+        return replace(
+            result,
+            system=f,
+            basis=[descend(G) for G in result.basis],
+            dimension=None if result.dimension is None else result.dimension // m,
+            solutions=[over_field(g) for g in result.solutions],
+            families=[
+                replace(family, base=over_field(family.base), directions=tuple(map(over_field, family.directions)))
+                for family in result.families
+            ],
+            irrational=[],  # such solutions are not over the field either, but over its extensions
+            root=str(given.root),
+        )
+
+    options["on_result"] = lambda result: on_result(descended(result))
+    return descended(commuting_systems(over_algebra(over_t, chi), shape or "linear", **options, C=C))

@@ -38,6 +38,7 @@ from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.kernels import choose_kernel, has_llvm
 from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
+from kahanmaps.maps.values import start_rows
 from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -391,7 +392,10 @@ def ensemble(
     require_steps(steps)
     options: dict[str, Any] = {"backward": backward, "form": form, "kernel": kernel, "threads": threads}
     epsilon = resolve_eps(eps, time_step, h, floats=True)
-    result = FloatEnsemble(as_map(system), epsilon, starts, **options, integrals=integrals, sampled=sampled)
+    map_ = as_map(system)
+    result = FloatEnsemble(
+        map_, epsilon, start_rows(starts, map_.variables), **options, integrals=integrals, sampled=sampled
+    )
     if steps:
         result.advance(steps)
     return result

@@ -12,7 +12,6 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import InputError
 
@@ -42,23 +41,6 @@ def to_floats(values: Sequence[Any]) -> FloatArray:
     array([0.33333333, 2.        ])
     """
     return np.array([double(value) for value in values], dtype=np.float64)
-
-
-def start_rows(starts: Any) -> FloatArray:
-    """Convert one initial point or several to rows of doubles; entries may be numbers of any kind, or text.
-
-    >>> start_rows(["1/2", 0]), start_rows([[1, 2.5]])
-    (array([[0.5, 0. ]]), array([[1. , 2.5]]))
-    """
-    if isinstance(starts, str):
-        starts = parse_point(starts)
-    try:
-        return np.atleast_2d(np.array(starts, dtype=np.float64))
-    except (TypeError, ValueError):
-        rows = starts if all(isinstance(row, list | tuple) for row in starts) else [starts]
-    if len({len(row) for row in rows}) != 1:
-        raise InputError("found initial points of different lengths, expected the same number of coordinates in each")
-    return np.array([to_floats(row) for row in rows])
 
 
 def exact(value: float) -> fmpq:

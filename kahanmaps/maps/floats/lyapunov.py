@@ -28,9 +28,10 @@ from kahanmaps.maps import convention
 from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
-from kahanmaps.maps.floats.float_conversion import FloatArray, start_rows, to_float
+from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
 from kahanmaps.maps.floats.steps import eliminate
 from kahanmaps.maps.kahan import SystemLike, as_map
+from kahanmaps.maps.values import start_rows
 
 MAX_NUMBERS = 20_000_000  # entries of all frames together
 _PORTION = 200_000  # entries of the tangent maps of a portion
@@ -166,8 +167,8 @@ def lyapunov_exponents(
         )
     if steps < 2 or transient < 0:
         raise InputError(f"found steps = {steps} and transient = {transient}, expected at least 2 and at least 0")
-    x = start_rows(starts)
     map_ = as_map(system).real_approximation
+    x = start_rows(starts, map_.variables)
     n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():
         raise InputError(f"found initial points of shape {x.shape}, expected rows of {n} finite numbers, at least one")

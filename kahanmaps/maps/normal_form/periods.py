@@ -34,6 +34,8 @@ from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.splitting import Splitting
+from kahanmaps.maps.values import coordinates
+from kahanmaps.systems.quadratic import as_system
 
 LARGEST_FIELD = 1 << 192  # elements; a period over such a field takes a minute or two
 _MAX_WALK = 1 << 16  # steps taken where no theorem gives the answer
@@ -329,7 +331,8 @@ def normal_form_and_start(system: SystemLike, eps: Any, start: Any) -> tuple[Sys
         raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
     if start is None or eps is None:
         raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
-    return normal_form, eps, start
+    variables = as_system(system).variables
+    return normal_form, eps, coordinates(start, QQ, variables, len(variables))
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:

@@ -67,7 +67,10 @@ class OrbitEnd(ResultPart):
 
 
 class OrbitPoint:
-    """The point after `step` steps; over Q the coordinates are reduced to lowest terms only when `x` is read."""
+    """The point after `step` steps, a sequence of its coordinates `x`.
+
+    Over Q they are reduced to lowest terms only when they are read.
+    """
 
     def __init__(self, step: int, field: Field, value: IntegerPoint | PlanesPoint | tuple[Any, ...]) -> None:
         self.step = step
@@ -78,6 +81,12 @@ class OrbitPoint:
     def x(self) -> tuple[Any, ...]:
         """The coordinates, elements of the field."""
         return self.value if isinstance(self.value, tuple) else self.value.rationals()
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.x[index]
 
     @property
     def text(self) -> list[str]:

@@ -12,11 +12,10 @@ from itertools import islice
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple, overload
 
-from flint import arb, fmpq, fmpq_mat, fmpz_mat
+from flint import arb, fmpq
 
 from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, MAX_BALL_BITS, Field, integer, rational
-from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.printing import json_float
 from kahanmaps.atomic_files import open_append
 from kahanmaps.display_protocols import HtmlDisplay, data_frame
@@ -26,6 +25,7 @@ from kahanmaps.maps.convention import either, eps_record, resolve_eps
 from kahanmaps.maps.convention import time_step as time_step_at
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
+from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.orbits.arithmetic import Arithmetic
 from kahanmaps.maps.orbits.iteration import (
     DEFAULT_MAX_DIGITS,
@@ -37,7 +37,7 @@ from kahanmaps.maps.orbits.iteration import (
 )
 from kahanmaps.maps.orbits.methods import DOUBLING_FROM, Method, choose_method
 from kahanmaps.maps.orbits.writers import FORMATS, OutputFull, Writer, form_of, writer_to
-from kahanmaps.maps.values import is_float_value, point_by_names
+from kahanmaps.maps.values import as_point, is_float_value
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.version import __version__
 
@@ -124,9 +124,10 @@ def orbit(
     is_float = Arithmetic.of(arithmetic).kind == "float"
     if start is None:
         raise InputError("found the initial point None, expected x0=[...], a sequence of exact numbers")
+    system = system if isinstance(system, Map) else as_map(system)
+    start = as_point(start, system.variables)
     if not is_float:
-        named = start.values() if isinstance(start, Mapping) else start if hasattr(start, "__len__") else ()
-        for x in filter(is_float_value, (*named, eps, time_step, h)):
+        for x in filter(is_float_value, (*start, eps, time_step, h)):
             try:
                 rational(x)
             except InexactNumber as error:
@@ -138,14 +139,6 @@ def orbit(
     if integer(every, "every") < 1:
         raise InputError(f"found every = {every!r}, expected a positive integer")
     field, arithmetic = arithmetic, Arithmetic.of(arithmetic)
-    if isinstance(start, str):
-        start = parse_point(start)
-    if isinstance(start, fmpq_mat | fmpz_mat):
-        start = start.entries()
-    if isinstance(start, Mapping):
-        start = point_by_names(start, (system if isinstance(system, Map) else as_map(system)).variables)
-    if not hasattr(start, "__len__"):
-        raise InputError(f"found the initial point {start!r}, expected a sequence of numbers")
     if is_float:  # floats are accepted, and converted exactly
         start = [float(x) if hasattr(x, "dtype") and x.dtype.kind == "f" else x for x in start]
         for x in start:
@@ -154,6 +147,8 @@ def orbit(
         start = [fmpq(*x.as_integer_ratio()) if isinstance(x, float) else x for x in start]
     if not isinstance(at, Iterable | None):
         raise InputError(f"found at = {at!r}, expected a sequence of steps, at=[{at}]")
+    if kernel is not None:
+        choose_kernel(kernel, is_long=False)
     requested_steps = None if at is None else frozenset(integer(step, "a step of at") for step in at)
     last_step = max(requested_steps, default=0) if requested_steps is not None else (steps or 0)
     require_steps(last_step)
@@ -162,7 +157,7 @@ def orbit(
     )
     if isinstance(system, Map):
         return _orbit_at_one_eps(request, field)
-    map_ = as_map(system)
+    map_ = system
     if eps is None and map_.has_eps:
         raise InputError('found no eps, expected an exact number, eps="1/10" or h="1/5": the map depends on eps')
     if isinstance(field, Field) and field != arithmetic.field:  # a number field, complex balls
@@ -288,11 +283,13 @@ class Trajectory(HtmlDisplay):
     @overload
     def __getitem__(self, index: int) -> OrbitPoint: ...
     @overload
-    def __getitem__(self, index: slice) -> list[OrbitPoint]: ...
+    def __getitem__(self, index: slice) -> OrbitPoints: ...
     @overload
     def __getitem__(self, index: str) -> Any: ...
     def __getitem__(self, index: int | slice | str) -> Any:
         """Return a point, a list of points, or by the name of a variable the array of its values."""
+        if isinstance(index, slice):
+            return OrbitPoints(self, index)
         if not isinstance(index, str):
             return self.points[index]
         if index not in self.variables:
@@ -338,9 +335,9 @@ class Trajectory(HtmlDisplay):
         data = {name: ("step", table[:, k]) for k, name in enumerate(self.variables)}
         return xarray.Dataset(data, coords={"step": steps, "t": ("step", times)})
 
-    def plot(self, x: int = 0, y: int = 1) -> Any:
-        """Draw two of the coordinates and return the axes."""
-        return import_module("kahanmaps.plots.plot").plot.orbit(self, x, y)
+    def plot(self, *arguments: Any, **options: Any) -> Any:
+        """Draw two of the coordinates, by default x = 0 and y = 1, and return the axes."""
+        return import_module("kahanmaps.plots.plot").plot.orbit(self, *arguments, **options)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row for each point: its step, the coordinates and the values of the integrals (None at poles).
@@ -530,6 +527,24 @@ class Trajectory(HtmlDisplay):
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+class OrbitPoints(list[OrbitPoint]):
+    """A slice of an orbit: a list of points with the arrays `x` and `t` of the orbit."""
+
+    def __init__(self, orbit: Trajectory, index: slice) -> None:
+        super().__init__(orbit.points[index])
+        self._orbit, self._index = orbit, index
+
+    @property
+    def x(self) -> Any:
+        """The coordinates, as `Trajectory.x`."""
+        return self._orbit.x[self._index]
+
+    @property
+    def t(self) -> Any:
+        """The times, as `Trajectory.t`."""
+        return self._orbit.t[self._index]
 
 
 class UnknownVariable(InputError, KeyError):
