@@ -164,6 +164,7 @@ from .maps.orbits.orbit import orbit as orbit
 from .maps.orbits.writers import form_of as form_of
 from .paper.claims.beyond_table import beyond_table as beyond_table
 from .paper.claims.beyond_table import table as table
+from .paper.registry import SECTION_NAMES as SECTION_NAMES
 from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
 from .plots.curves.invariant_curves import find_invariant_curves as find_invariant_curves
