@@ -161,6 +161,7 @@ from .maps.normal_form.planar_block import PlanarBlock as PlanarBlock
 from .maps.orbits.arithmetic import Arithmetic as Arithmetic
 from .maps.orbits.iteration import OrbitEnd as OrbitEnd
 from .maps.orbits.orbit import orbit as orbit
+from .maps.orbits.relations.orbit_curve import orbit_curve as orbit_curve
 from .maps.orbits.writers import form_of as form_of
 from .paper.claims.beyond_table import beyond_table as beyond_table
 from .paper.claims.beyond_table import table as table
