@@ -208,6 +208,10 @@ from .plots.portraits.windows import fullest_axes as fullest_axes
 from .plots.portraits.windows import require_window as require_window
 from .plots.rotation import plot_rotation as plot_rotation
 from .plots.scan import plot_scan as plot_scan
+from .plots.section import plot_section as plot_section
+from .plots.section import require_hyperplane as require_hyperplane
+from .plots.section import restricted_to as restricted_to
+from .plots.section import section_of as section_of
 from .plots.squares import pair_of_systems as pair_of_systems
 from .plots.squares import pairs_of_member as pairs_of_member
 from .plots.squares import plot_squares as plot_squares

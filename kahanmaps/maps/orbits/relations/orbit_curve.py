@@ -46,7 +46,7 @@ _ACCURACY = 1e-15  # of rotation numbers
 class OrbitCurve(PrintableResult):
     """The curve of an orbit, and the map on it; everything but the balls is exact and proved.
 
-    `iterate` is a number k for which the k-th iterate maps the curve to itself; `curve`, `point` and the numbers are about
+    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers are about
     this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B,
     `height` is the canonical height of that point. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and
     trace = 2 for a parabolic map. `rotation` is the rotation number in (0, 1/2] up to sign; None if kappa is real.
