@@ -110,6 +110,10 @@ class PrecisionLost(KahanmapsError, ArithmeticError):
     """Balls are too wide to decide whether a number is zero: a higher precision is needed."""
 
 
+class UnknownCurve(KahanmapsError):
+    """No curve was found that contains an orbit; whether there is one remains undecided."""
+
+
 def _caret(text: str, column: int, width: int = 72) -> str:
     """Return the part of `text` around `column`, with a caret under the character."""
     start = max(0, column - width // 2)

@@ -161,9 +161,11 @@ from .maps.normal_form.planar_block import PlanarBlock as PlanarBlock
 from .maps.orbits.arithmetic import Arithmetic as Arithmetic
 from .maps.orbits.iteration import OrbitEnd as OrbitEnd
 from .maps.orbits.orbit import orbit as orbit
+from .maps.orbits.relations.orbit_curve import orbit_curve as orbit_curve
 from .maps.orbits.writers import form_of as form_of
 from .paper.claims.beyond_table import beyond_table as beyond_table
 from .paper.claims.beyond_table import table as table
+from .paper.registry import SECTION_NAMES as SECTION_NAMES
 from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
 from .plots.curves.invariant_curves import find_invariant_curves as find_invariant_curves
@@ -206,6 +208,10 @@ from .plots.portraits.windows import fullest_axes as fullest_axes
 from .plots.portraits.windows import require_window as require_window
 from .plots.rotation import plot_rotation as plot_rotation
 from .plots.scan import plot_scan as plot_scan
+from .plots.section import plot_section as plot_section
+from .plots.section import require_hyperplane as require_hyperplane
+from .plots.section import restricted_to as restricted_to
+from .plots.section import section_of as section_of
 from .plots.squares import pair_of_systems as pair_of_systems
 from .plots.squares import pairs_of_member as pairs_of_member
 from .plots.squares import plot_squares as plot_squares

@@ -36,6 +36,7 @@ SOURCES: dict[str, str] = {
         "E. M. McMillan. A problem in the stability of periodic systems. In: Topics in modern physics, a tribute to "
         "E. U. Condon, Colorado Associated University Press, 1971, 219-244"
     ),
+    "salmon-1879": "G. Salmon. A treatise on the higher plane curves. 3rd edition, Hodges and Foster, Dublin, 1879",
     "lyness-1945": "R. C. Lyness. Cycles. Math. Gazette 29 (1945), 231-233",
     "qrt-1988": (
         "G. R. W. Quispel, J. A. G. Roberts, C. J. Thompson. Integrable mappings and soliton equations. "

@@ -7,6 +7,7 @@ from functools import lru_cache
 from math import gcd
 from typing import Any
 
+import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly, fq_default_ctx
 from helpers import quick
@@ -289,3 +290,14 @@ def walked(map_over: Map, start: IntegerPoint, steps: int) -> tuple[list[Any], r
     """The points as orbits have them, and the orbit."""
     orbit = rational_orbit.RationalOrbit(map_over, start)
     return [point for point, _ in zip(orbit, range(steps + 1), strict=False)], orbit
+
+
+def mean_turn(angles, turn):
+    """The rotation number of a sequence of angles modulo `turn`, as Laskar's weighted average of their differences."""
+    differences = np.diff(angles)
+    usual = np.median(differences % turn)
+    differences = (differences - usual + turn / 2) % turn - turn / 2 + usual
+    t = (np.arange(len(differences)) + 0.5) / len(differences)
+    weights = np.exp(-1 / (t * (1 - t)))
+    mean = float((differences * weights).sum() / weights.sum() / turn)
+    return min(mean, 1 - mean)

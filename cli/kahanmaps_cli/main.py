@@ -38,7 +38,7 @@ SECTIONS = {
         "systems": ("systems", "List or show the named systems of the catalogue."),
         "orbit": ("orbit", "Iterate a map: exactly, modulo p, in balls or floats."),
         "period": ("period", "Compute the exact period of an orbit, modulo p or over Q."),
-        "geometry": ("geometry", "Describe the level set of an orbit: j-invariants, rotation numbers."),
+        "geometry": ("geometry", "Describe the curve of an orbit: j-invariants, heights, rotation numbers."),
         "ensemble": ("ensemble", "Iterate many orbits at once, in floating point."),
     },
     "Checks": {name: ("check", check.question) for name, check in CHECKS.items()},

@@ -117,6 +117,20 @@ def Shard() -> ParameterKind:
     return ParameterKind("i/n", read)
 
 
+def Section() -> ParameterKind:
+    """A section of `verify`: its number, or the name of one that the paper does not number."""
+
+    def read(text: str) -> int:
+        name = text.strip()
+        if name in lib.SECTION_NAMES:
+            return lib.SECTION_NAMES[name]
+        if not (name.isascii() and name.isdigit() and len(name) < 10):
+            raise InputError(f"found {quoted(text)}, expected 1 to 9, {' or '.join(lib.SECTION_NAMES)}")
+        return int(name)
+
+    return ParameterKind("section", read)
+
+
 def ShortInteger() -> ParameterKind:
     """An integer of bounded length, which replaces `type=int` in all commands."""
 

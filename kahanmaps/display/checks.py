@@ -134,7 +134,7 @@ def sections_of(findings: Iterable[Finding]) -> dict[str, list[Finding]]:
     by_section: dict[str, list[Finding]] = {}
     for finding in findings:
         number, title = finding.place.get("section"), str(finding.place.get("section_title", ""))
-        name = f"Section {number}. {title}" if number not in (None, 10) else title
+        name = f"Section {number}. {title}" if number in range(1, 10) else title
         by_section.setdefault(name, []).append(finding)
     return by_section
 

@@ -34,6 +34,7 @@ from kahanmaps.maps.normal_form.geometry import LevelGeometry
 from kahanmaps.maps.normal_form.periods import OrbitPeriod, PlanePeriod
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitPoint
 from kahanmaps.maps.orbits.orbit import Trajectory
+from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -288,13 +289,13 @@ def _period_word(period: OrbitPeriod | PlanePeriod) -> str:
 
 
 @text_form.register
-def geometry_text(geometry: LevelGeometry) -> str:
+def geometry_text(geometry: LevelGeometry | OrbitCurve) -> str:
     """Return the curves, translations and rotation numbers in the planes of an orbit."""
     return geometry.text
 
 
 @html_form.register
-def geometry_html(geometry: LevelGeometry) -> str:
+def geometry_html(geometry: LevelGeometry | OrbitCurve) -> str:
     """Return the same as a list."""
     lines = (
         markup.escape(markup.shortened(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")

@@ -234,9 +234,9 @@ VOCABULARY = {
         Option("prime", "prime of modular arithmetic", _read_prime, int),
         integers(
             "sections",
-            "sections of the paper, 1 to 9; 10 is beyond the paper",
-            "integers from 1 to 10",
-            range(1, 11),
+            "sections of the paper, 1 to 9; 10 is beyond the paper, 11 the question of its conclusions",
+            "integers from 1 to 11",
+            range(1, 12),
         ),
         integer("order", "order in eps^2 of the series of the integrals", 1, 20),
         integer("ball_bits", "also compute over complex balls of this number of bits", 32, 100_000),

@@ -121,6 +121,10 @@ class Terms:
             for low in (1, 2)
         }
 
+    def value(self, n: int) -> Any:
+        """Return t(n) itself, for n = 1 to 4."""
+        return self._first[n] * self._terms[n]
+
     def integer(self, n: int) -> Any:
         """Return w(n), for n >= 1."""
         if n not in self._terms:

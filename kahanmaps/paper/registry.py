@@ -39,7 +39,9 @@ SECTIONS: dict[int, tuple[str, str]] = {
     8: ("Invariant Poisson structure", "poisson_structure"),
     9: ("Differential equations for the conserved quantities", "differential_equations"),
     10: ("Beyond the paper", "further_claims"),
+    11: ("The question of the conclusions", "conclusions"),
 }
+SECTION_NAMES = {"beyond": 10, "conclusions": 11}  # of those that are not numbered in the paper
 
 
 class ClaimKind(StrEnum):

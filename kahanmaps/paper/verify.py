@@ -51,6 +51,7 @@ from kahanmaps.paper import specialize
 from kahanmaps.paper.controls import CONTROLS, broken
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import (
+    SECTION_NAMES,
     SECTIONS,
     UNDEFINED,
     Claim,
@@ -100,9 +101,8 @@ class VerifyOptions:
             raise InputError(f"found {self.ball_bits} bits for the balls, expected 32 to 100000")
         for section in self.sections or ():
             if section not in SECTIONS:
-                raise InputError(
-                    f"found the section {section}, expected 1 to {max(SECTIONS)} ({max(SECTIONS)}: beyond)"
-                )
+                names = ", ".join(f"{number}: {name}" for name, number in SECTION_NAMES.items())
+                raise InputError(f"found the section {section}, expected 1 to {max(SECTIONS)} ({names})")
 
 
 def verify(
@@ -534,7 +534,7 @@ class Verifier:
             **({"misprint": claim.misprint} if claim.misprint else {}),
         }
         title = f"{claim.place}: {claim.title}" + (" (misprint)" if claim.misprint else "")
-        source = "" if claim.section == 10 else f"petrera-suris-2016, {claim.place}"
+        source = "" if claim.section in SECTION_NAMES.values() else f"petrera-suris-2016, {claim.place}"
         if claim.label:
             source += f" [{claim.label}]"
         return Finding(title, verdict, evidence, also, witness, claim.formula, source, bool(claim.misprint), place)

@@ -17,10 +17,18 @@ def test_a_system_that_is_not_declared_as_a_member_is_recognized(kahanmaps):
     assert "k^3\t-2187/46225" in outcome.out
 
 
-def test_other_systems_and_wrong_points_are_refused(kahanmaps):
+def test_the_curve_of_an_orbit_of_another_map_is_found(kahanmaps):
+    text = kahanmaps("geometry mcmillan --start 1/3,2/5").out
+    assert "Weierstrass model\ty^2 = x^3 + A x + B, A = -7323, B = 229622\n" in text
+    record = kahanmaps("geometry mcmillan --start 1/3,2/5 --json").json
+    assert (record["genus"], record["A"], record["B"], record["order"]) == (1, "-7323", "229622", None)
+    assert f"j-invariant\t{record['j']}\n" in text
+
+
+def test_orbits_without_a_curve_are_undecided_and_wrong_points_are_refused(kahanmaps):
     outcome = kahanmaps("geometry lorenz --start 1,2,3 --eps 1/10")
-    assert outcome.status == 2
-    assert outcome.err.startswith("Error: the geometry of lorenz cannot be computed: ")
+    assert outcome.status == 3
+    assert outcome.err.startswith("Error: undecided: no curve of genus 0 or 1 was found")
     outcome = kahanmaps("geometry paper_m2 --start 1,2 --eps 1/10")
     assert outcome.status == 2
     assert "found a point with 2 coordinates, expected 4" in outcome.err

@@ -90,7 +90,7 @@ def test_an_option_makes_what_the_library_wants(name, canonical, made):
         ("start", "", "found nothing, expected a point"),
         ("at", "1.5", "found 3/2, expected integers from 0 to 10^18, separated by commas in one text"),
         ("at", 10**18 + 1, "found 1000000000000000001, expected integers from 0 to 10^18"),
-        ("sections", "1,11", "found 11, expected integers from 1 to 10"),
+        ("sections", "1,12", "found 12, expected integers from 1 to 11"),
         ("signs", "1,0", "found 0, expected 1 or -1"),
         ("prime", 4, "4"),
         ("prime", 1, "found 1, expected a prime of at most 192 bits"),

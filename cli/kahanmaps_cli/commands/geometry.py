@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.options import eps_of, eps_options, load_system, output_options, system_options
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import print_stdout
@@ -19,33 +19,40 @@ from kahanmaps_cli.screen.terminal import print_stdout
 @eps_options
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, start: Any, **options: Any) -> int:
-    """Describe the level set of the integrals through a point, for a member of the commuting family.
+    """Describe the level set or curve of an orbit: j-invariants, translations, heights, rotation numbers.
 
     \b
       kahanmaps geometry paper_m3 --start 1,2,3,4,5,6 --eps 1/10
-      kahanmaps geometry nahm_tetrahedral --start 1,2 --eps 1/10
+      kahanmaps geometry euler_top --start 1,2,3 --eps 1/10
+      kahanmaps geometry mcmillan --start 1/3,2/5
       kahanmaps geometry paper_m2 --start 1,2,3,4 --eps 1/7 --json | jq '.planes[0].j'
 
-    The level set is a product of elliptic curves, one in each plane of the normal form, and the map is a translation
-    of it. The planes belong to the roots of chi, where chi(t)^2 = det(t I - A). For each irreducible factor of chi the
-    command prints k^3 of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, the j-invariant, and the order of the translation
-    (finite or infinite, proved); at a rational root also the canonical height of the translation. For each real root it
-    prints the rotation number, in (0, 1/2] and up to sign, with an error bound, and that of the flow at the time step
-    2 eps. A pair of complex roots has two numbers instead: the coordinates of the translation in a reduced basis of the
-    lattice of periods.
+    For a member of the commuting family, and for systems that are recognized as such, the level set of the integrals is
+    a product of elliptic curves, one in each plane of the normal form, and the map is a translation of it. The planes
+    belong to the roots of chi, where chi(t)^2 = det(t I - A). For each irreducible factor of chi the command prints k^3
+    of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, the j-invariant, and the order of the translation (finite or
+    infinite, proved); at a rational root also the canonical height of the translation. For each real root it prints the
+    rotation number, in (0, 1/2] and up to sign, with an error bound, and that of the flow at the time step 2 eps. A
+    pair of complex roots has two numbers instead: the coordinates of the translation in a reduced basis of the lattice
+    of periods.
 
-    The command also recognizes systems of the family that are not declared as such.
+    For any other map the command searches for a curve of genus 1 or 0 that contains the orbit, of any dimension, and
+    proves what it finds. For genus 1 it prints a Weierstrass model, the j-invariant, the translation, its canonical
+    height and its rotation number, for genus 0 the multiplier kappa. If only an iterate maps the curve to itself, the
+    numbers are about this iterate.
 
-    Exit status: 0, or 2 for a usage error or a system without a normal form.
+    Exit status: 0, 2 usage error, 3 if no curve was found.
     """
     file = load_system(system, {**options, "quiet": quiet})
     normal_form = file.normal_form
+    eps = eps_of(file, options)
+    map_over = file.at(eps)
+    map_over.point(start)
+    result: Any
     if isinstance(normal_form, lib.NoNormalForm):
-        reason = normal_form.reason if file.is_quadratic else "it is not the Kahan map of a quadratic system"
-        raise lib.InputError(f"the geometry of {file.name} cannot be computed: {reason}")
-    eps = the_eps(options["eps"], options["time_step"])
-    file.map.at(eps, lib.QQ).point(start)
-    result = lib.geometry_of(normal_form, eps, start)
+        result = lib.orbit_curve(map_over, start)
+    else:
+        result = lib.geometry_of(normal_form, eps, start)
     if as_json:
         record = record_of(
             "geometry", file, "exact", seed=None, **lib.eps_record(eps, file.map), start=lib.plain(start)

@@ -1,4 +1,4 @@
-"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | rotation | commute."""
+"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | rotation | section | commute."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, portrait, rotation, scan
+from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, portrait, rotation, scan, section
 
 
 class PlotCommands(SuggestingGroup):
@@ -40,6 +40,7 @@ for _command in (
     growth.degrees,
     scan.command,
     rotation.command,
+    section.command,
     commute.command,
 ):
     command.add_command(_command)

@@ -12,6 +12,7 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.params import Section
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
 from kahanmaps_cli.screen.outputs import OutputFile, deliver
@@ -46,7 +47,7 @@ _ONLY_FOR = {
 @click.option(
     "--section",
     "sections",
-    type=int,
+    type=Section(),
     multiple=True,
     metavar="N",
     help="With verify: only this section. Repeatable.",

@@ -12,6 +12,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.checks import headline, sections_of, witness_lines
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.commands.family import DRAWN, draw_options, drawn_file
+from kahanmaps_cli.params import Section
 from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
 from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import exit_status, print_report, verdict_style
@@ -62,10 +63,10 @@ _LEGEND = {
 @click.option(
     "--section",
     "sections",
-    type=int,
+    type=Section(),
     metavar="N",
     multiple=True,
-    help="Restrict to this section (1 to 9; 10 is beyond the paper). Repeatable.",
+    help="Restrict to this section (1 to 9, beyond or conclusions). Repeatable.",
 )
 @click.option(
     "--order",
@@ -95,6 +96,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --controls --section 6            # violated hypotheses
       kahanmaps verify --m 2 --json | jq '.claims[0]'
       kahanmaps verify --beyond             # generalizations
+      kahanmaps verify --section conclusions  # geometry of the level sets
 
     The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi; by default m = 3. Claims are
     proved by symbolic expansion or formally, verified exactly, or supported at random points over GF(p) with a bound on
@@ -169,7 +171,7 @@ def markdown(report: lib.Report) -> str:
         if finding.place.get("section") != section:
             section = finding.place.get("section")
             title = finding.place.get("section_title", "Together")
-            lines += ["", f"### {title if section in (None, 10) else f'{section} {title}'}", ""]
+            lines += ["", f"### {f'{section} {title}' if section in range(1, 10) else title}", ""]
             lines += ["| statement | formula | how | verdict |", "|---|---|---|---|"]
         verdict = str(finding.verdict) + (" as printed" if finding.place.get("misprint") else "")
         cells = (

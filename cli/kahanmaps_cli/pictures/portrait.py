@@ -94,7 +94,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     file.map.at(lib.rational(1) if eps is None else eps)  # raises the same errors for a bad eps as other commands
     notes: list[str] = []
     field = lib.field_of(file)
-    starts = _starts(file, field, eps, options)
+    starts = initial_points(file, field, eps, options)
     default = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
     steps = default if options["steps"] is None else options["steps"]
     color = options["color_by"]
@@ -184,7 +184,7 @@ def _require_consistent(options: dict[str, Any]) -> None:
         raise click.UsageError("--levels-at needs --levels F")
 
 
-def _starts(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, options: dict[str, Any]) -> Any:
+def initial_points(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, options: dict[str, Any]) -> Any:
     """Return the requested initial points, or automatic ones around an equilibrium of the field."""
     if options["start"]:
         wrong = next((x for x in options["start"] if len(x) != file.dim), None)

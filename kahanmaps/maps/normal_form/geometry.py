@@ -14,22 +14,23 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from flint import acb, acb_poly, arb, ctx, fmpq, fmpz
+from flint import acb, arb, fmpq
 
+from kahanmaps.algebra.elliptic_curves import canonical_height, negative_roots, rotation_number
 from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display_protocols import PrintableResult
-from kahanmaps.errors import PrecisionLost
+from kahanmaps.errors import InputError, PrecisionLost
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.family.system_normal_form import SystemNormalForm
+from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.convention import either, resolve_eps
-from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.maps.normal_form.level_curves import Jacobian
-from kahanmaps.maps.normal_form.periods import PeriodKind, classify, normal_form_and_start, torsion_order
+from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
 from kahanmaps.maps.normal_form.splitting import Splitting
+from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve, orbit_curve
 
 _ACCURACY = 1e-15  # of rotation numbers
-_HEIGHT_TERMS = 40  # of the series for a height, whose terms decrease like 4^-n
 _LONGEST_HEIGHT = 4000  # bits of gamma for which a height is computed
 
 
@@ -136,29 +137,38 @@ def geometry(
     x0: Sequence[Any] | None = None,
     time_step: Any = None,
     h: Any = None,
-) -> LevelGeometry:
-    """Return the geometry of the level set through `start`, of a system that has a normal form.
+) -> LevelGeometry | OrbitCurve:
+    """Return the geometry of the level set or curve on which the orbit of `start` lies.
 
     Args:
-        system: a member of the commuting family, or a system that is linearly equivalent to one.
+        system: a system, which stands for its Kahan map, or a map.
         start, x0: a point with exact coordinates.
-        eps, time_step, h: half the time step, or the time step; exact and not 0.
+        eps, time_step, h: half the time step, or the time step; exact and not 0. A map without eps needs none.
 
     Returns:
-        A `LevelGeometry`: j-invariants and orders of translations are exact, rotation numbers are balls, heights are
-        floats.
+        For a member of the commuting family, or a system that is linearly equivalent to one, a `LevelGeometry`, the
+        product of the curves in its planes; otherwise an `OrbitCurve`, the curve of genus 1 or 0 that contains the
+        orbit. j-invariants and orders of translations are exact, rotation numbers are balls.
 
     Raises:
-        InputError: if the system has no normal form.
+        InputError: if the start or eps is missing, or the orbit of a map that is no member is finite.
+        UnknownCurve: if no curve was found that contains the orbit.
 
-    Source: docs/mathematics.md, "Geometry of the level sets".
+    Source: docs/mathematics.md, "Geometry of the level sets" and "Orbits on elliptic curves".
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> plane = geometry(QuadraticSystem.from_text(["x", "y"], ["3*y^2", "-3*x^2"]), [1, 2], "1/10").planes[0]
     >>> plane.delta, plane.order, plane.rotations[0].number.str(8, radius=False)
     (-2187/46225, None, '0.17182562')
     """
-    return geometry_of(*normal_form_and_start(system, resolve_eps(eps, time_step, h), either(start=start, x0=x0)))
+    family, start, eps = as_map(system), either(start=start, x0=x0), resolve_eps(eps, time_step, h)
+    if start is None or (eps is None and family.has_eps):
+        raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
+    if isinstance(family, KahanFamily) and not family.system.symbols:
+        normal_form = system_normal_form(system)
+        if isinstance(normal_form, SystemNormalForm):
+            return geometry_of(normal_form, eps, start)
+    return orbit_curve(family.at(fmpq(1) if eps is None else eps, QQ), start)
 
 
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:
@@ -172,7 +182,8 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
         order, reason = torsion_order(gamma)
         height = None
         if isinstance(gamma, fmpq) and max(gamma.height_bits(), 1) <= _LONGEST_HEIGHT:
-            height = 0.0 if order is not None else canonical_height(gamma)
+            curve = Jacobian(gamma)
+            height = 0.0 if order is not None else float(canonical_height(curve, curve.T).mid())
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
         planes.append(PlaneGeometry(name, kind, delta, gamma, j, order, reason, height, rotations))
     heights = [plane.height for plane in planes if plane.kind is not PeriodKind.FIXED]
@@ -251,30 +262,12 @@ def _at(element: Any, root: Any) -> Any:
     return total
 
 
-def _shifts(gamma: Any) -> list[acb]:
-    """Return -e for the three roots e of the cubic of the Jacobian, the real ones first and by increasing -e."""
-    one = gamma * 0 + 1
-    try:
-        roots = acb_poly([64 * gamma * gamma, 48 * gamma, 9 + 3 * gamma, one]).roots(arb(2) ** -(ctx.prec // 2))
-    except ValueError as error:
-        raise PrecisionLost("the roots of the cubic cannot be separated") from error
-    return sorted(
-        (-acb(e) for e in roots), key=lambda e: (not e.imag.contains(0), float(e.real.mid()), float(e.imag.mid()))
-    )
-
-
 def _real_rotation(gamma: arb, disc: arb, h: arb, root: str) -> Rotation:
     """Return the rotation at a real root of chi."""
-    a, b, c = _shifts(gamma)
-    steps, x = 1, arb(0)
-    if not gamma > 0:  # the cubic of the Jacobian has three real roots, and T lies on the oval
-        steps, double = 2, Jacobian(gamma).multiple(2, (arb(0), 8 * gamma))
-        assert double is not None  # psi_2 = 2: no translation has order 2
-        x = double[0]
-    # Carlson's R_F(x - e_1, x - e_2, x - e_3) is the integral of dx/(2Y) from x to infinity.
-    elapsed = acb.elliptic_rf(x + a, x + b, x + c)
-    period = 2 * acb.elliptic_rf(acb(0), b - a, c - a)
-    return Rotation(root, ((elapsed / period).real,), steps, _flow_rotation(disc, h))
+    curve = Jacobian(gamma)
+    # For gamma < 0 the cubic of the Jacobian has three real roots, and T lies on the oval.
+    number, steps = rotation_number(curve, curve.T, has_oval=not gamma > 0)
+    return Rotation(root, (number,), steps, _flow_rotation(disc, h))
 
 
 def _flow_rotation(disc: arb, h: arb) -> arb:
@@ -291,7 +284,8 @@ def _flow_rotation(disc: arb, h: arb) -> arb:
 
 def _complex_rotation(gamma: acb) -> tuple[arb, arb]:
     """Return the coordinates of T in a reduced basis of the periods."""
-    a, b, c = _shifts(gamma)
+    curve = Jacobian(gamma)
+    a, b, c = negative_roots([curve.a6, curve.a4, curve.a2, acb(1)])
     zero = acb(0)
     first, second = (2 * acb.elliptic_rf(zero, *pair) for pair in ((b - a, c - a), (a - b, c - b)))
     while True:  # Gauss
@@ -306,49 +300,3 @@ def _complex_rotation(gamma: acb) -> tuple[arb, arb]:
     area = (first.conjugate() * second).imag
     x, y = (elapsed.conjugate() * second).imag / area, (first.conjugate() * elapsed).imag / area
     return tuple(z - round(float(z.mid())) for z in (x, y))  # type: ignore[return-value]
-
-
-# Heights.
-
-
-def canonical_height(gamma: fmpq) -> float:
-    """Return the canonical height of T over Q, half of that of its x-coordinate; the error is about 1e-12.
-
-    Tate's series: the height of x changes by a bounded amount from P to 2P, of which a real number computed in
-    floating point is the archimedean part and the common factor of both forms of degree 4 the others. These factors
-    divide a resultant R, so that coordinates modulo a power of R determine them.
-    """
-    d = gamma.q
-    a2, a4, a6 = (int(x) for x in ((9 + 3 * gamma) * d**2, 48 * gamma * d**4, 64 * gamma * gamma * d**6))
-    b2, b4, b6, b8 = 4 * a2, 2 * a4, 4 * a6, 4 * a2 * a6 - a4 * a4
-    resultant = abs(fmpz(int(6912 * gamma**3 * (1 - gamma) ** 2 * d**12))) ** 2
-    modulus = resultant ** (_HEIGHT_TERMS + 2)
-
-    def doubled(X: Any, Z: Any) -> tuple[Any, Any]:
-        return (
-            X**4 - b4 * (X * Z) ** 2 - 2 * b6 * X * Z**3 - b8 * Z**4,
-            4 * X**3 * Z + b2 * (X * Z) ** 2 + 2 * b4 * X * Z**3 + b6 * Z**4,
-        )
-
-    X, Z, left, commons = fmpz(0), fmpz(1), modulus, list[fmpz]()
-    for _ in range(_HEIGHT_TERMS):
-        X, Z = doubled(X, Z)
-        common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # of short numbers, as it divides R
-        left //= common
-        X, Z = X // common % left, Z // common % left
-        commons.append(common)
-    for bits in (1 << 9, 1 << 12, 1 << 15):
-        real, sizes = (arb(0), arb(1)), list[arb]()
-        with RR(bits).working():
-            for _ in range(_HEIGHT_TERMS):
-                real = doubled(*real)
-                sizes.append(abs(real[0]).max(abs(real[1])))
-                real = (real[0] / sizes[-1], real[1] / sizes[-1])
-        with RR(128).working():  # the sum converges, only the doublings lose digits
-            total, scale = arb(0), arb(1)
-            for size, common in zip(sizes, commons, strict=True):
-                scale /= 4
-                total += scale * (size.log() - arb(common).log())
-            if total.is_finite() and float(total.rad()) < _ACCURACY:
-                return float((total / 2).mid())
-    raise PrecisionLost("the height needs more than 32768 bits: the level is almost singular")

@@ -11,16 +11,15 @@ from typing import Any
 
 from flint import fmpz, fq_default_ctx
 
+from kahanmaps.algebra.elliptic_curves import AffinePoint, EllipticCurve, by_doublings
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.normal_form.schoof import by_doublings, trace_modulo
-
-AffinePoint = tuple[Any, Any]
+from kahanmaps.maps.normal_form.schoof import trace_modulo
 
 _MAX_DIGIT = 2000
 _RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm, with about 2^17 steps
 
 
-class Jacobian:
+class Jacobian(EllipticCurve):
     """Y^2 = x^3 + a2 x^2 + a4 x + a6, the Jacobian with Y = y + 3x + 8 gamma, and T on it; None is its zero.
 
     a2 = 9 + 3 gamma, a4 = 48 gamma, a6 = 64 gamma^2, T = (0, 8 gamma).
@@ -32,31 +31,8 @@ class Jacobian:
     """
 
     def __init__(self, gamma: Any) -> None:
-        self.a2, self.a4 = 9 + 3 * gamma, 48 * gamma
+        super().__init__(9 + 3 * gamma, 48 * gamma, 64 * gamma * gamma)
         self.T: AffinePoint = (0 * gamma, 8 * gamma)
-
-    @staticmethod
-    def negative(P: AffinePoint | None) -> AffinePoint | None:
-        """Return -P."""
-        return None if P is None else (P[0], -P[1])
-
-    def add(self, P: AffinePoint | None, Q: AffinePoint | None) -> AffinePoint | None:
-        """Return P + Q; None is the point at infinity, the zero of the group."""
-        if P is None or Q is None:
-            return Q if P is None else P
-        if P[0] != Q[0]:
-            slope = (Q[1] - P[1]) / (Q[0] - P[0])
-        elif P[1] == -Q[1]:
-            return None
-        else:
-            slope = ((3 * P[0] + 2 * self.a2) * P[0] + self.a4) / (2 * P[1])
-        x = slope * slope - self.a2 - P[0] - Q[0]
-        return x, slope * (P[0] - x) - P[1]
-
-    def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
-        """n P for n >= 0."""
-        multiple: AffinePoint | None = by_doublings(self.add, None, n, P)
-        return multiple
 
 
 def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
@@ -75,7 +51,7 @@ def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None)
         return order
     if radius > _RADIUS:
         field = fq_default_ctx(q, 1) if context is None else context
-        a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, 64 * gamma * gamma))
+        a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, curve.a6))
         trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
         # The representative of the trace that is closest to 0: then all candidates are near `middle`.
         middle -= trace if 2 * trace <= unit else trace - unit

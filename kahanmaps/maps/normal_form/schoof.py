@@ -8,10 +8,11 @@ modulo f gives a divisor of f, which replaces f. With FLINT's polynomials this i
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from flint import fmpz, fq_default_ctx, fq_default_poly_ctx
+
+from kahanmaps.algebra.elliptic_curves import by_doublings
 
 Poly = Any
 Point = tuple[Poly, Poly] | None
@@ -54,16 +55,6 @@ class _Torsion:
             raise _Divisor((Y - T).gcd(f))
         x_sum = (slope * slope % f * self.c - X - Z) % f
         return x_sum, (slope * (X - x_sum) - Y) % f
-
-
-def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> Any:
-    """Return n P for n >= 0 in the group with this sum and zero."""
-    total = zero
-    for bit in bin(n)[2:]:
-        total = add(total, total)
-        if bit == "1":
-            total = add(total, P)
-    return total
 
 
 def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int) -> tuple[int, int]:

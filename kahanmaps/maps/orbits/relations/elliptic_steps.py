@@ -45,6 +45,16 @@ class EllipticSteps:
             coordinates.W for row in self._places for coordinates in row if isinstance(coordinates, Coordinates)
         )
 
+    @property
+    def stride(self) -> int:
+        """The number of steps of factors that T belongs to."""
+        return len(self._places)
+
+    @property
+    def degree(self) -> int:
+        """The largest degree of a group of coordinates on its curve."""
+        return max(group.degree for row in self._places for group in row if isinstance(group, Coordinates))
+
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, after the previous one was computed or skipped; None if not determined."""
         return self.point(number) if self.skip(number) else None
@@ -98,7 +108,7 @@ class Coordinates:
     """A group of coordinates on one curve: `forms` has a row for each, and a last row for their denominator."""
 
     def __init__(self, degree: int, forms: fmpz_mat, W: Terms, U: Terms, primes: fmpz) -> None:
-        self.W, self._degree, self._U, self._primes = W, degree, U, primes
+        self.W, self.degree, self._U, self._primes = W, degree, U, primes
         self._exponents = exponents(degree)
         # The content of each column is multiplied into the monomial, not into each row: fewer products of long numbers.
         self._common = [reduce(fmpz.gcd, column) or fmpz(1) for column in forms.transpose().tolist()]
@@ -113,7 +123,7 @@ class Coordinates:
         )
         first, second = U.integer(n), U.integer(n + 1) * W.integer(n - 1)
         term, (square, outer) = W.integer(n), W.pair(n)
-        first, second = (first, second * term) if self._degree % 2 else (first * term, second)
+        first, second = (first, second * term) if self.degree % 2 else (first * term, second)
         powers = {(i, j): square**i * outer**j for i, j in {(i, j) for _, i, j in self._exponents}}
         column = [
             weight * (second if k else first) * powers[i, j]

@@ -1,0 +1,200 @@
+"""Elliptic curves Y^2 = x^3 + a2 x^2 + a4 x + a6: group law, and over Q orders, canonical heights and rotation numbers.
+
+Points are pairs (x, Y); None is the zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from flint import acb, acb_poly, arb, ctx, fmpq, fmpz
+
+from kahanmaps.algebra.fields import RR
+from kahanmaps.errors import PrecisionLost
+
+AffinePoint = tuple[Any, Any]
+
+MAX_BITS = 1 << 15  # of the balls in which heights and rotation numbers are computed
+_ACCURACY = 1e-15  # of rotation numbers and heights
+_HEIGHT_TERMS = 40  # of the series for a height, whose terms decrease like 4^-n
+_MAX_TORSION = 12  # the largest order of a rational torsion point (mazur-1977)
+_SMOOTH_BITS = 20  # of primes that are found to reduce the coefficients of a model
+
+
+class EllipticCurve:
+    """The curve Y^2 = x^3 + a2 x^2 + a4 x + a6 over a field.
+
+    >>> E, T = EllipticCurve(fmpq(0), fmpq(0), fmpq(1)), (fmpq(2), fmpq(3))
+    >>> E.add(T, T), E.multiple(6, T), E.order(T)
+    ((0, 1), None, 6)
+    """
+
+    def __init__(self, a2: Any, a4: Any, a6: Any) -> None:
+        self.a2, self.a4, self.a6 = a2, a4, a6
+
+    @staticmethod
+    def negative(P: AffinePoint | None) -> AffinePoint | None:
+        """Return -P."""
+        return None if P is None else (P[0], -P[1])
+
+    def add(self, P: AffinePoint | None, Q: AffinePoint | None) -> AffinePoint | None:
+        """Return P + Q; None is the point at infinity, the zero of the group."""
+        if P is None or Q is None:
+            return Q if P is None else P
+        if P[0] != Q[0]:
+            slope = (Q[1] - P[1]) / (Q[0] - P[0])
+        elif P[1] == -Q[1]:
+            return None
+        else:
+            slope = ((3 * P[0] + 2 * self.a2) * P[0] + self.a4) / (2 * P[1])
+        x = slope * slope - self.a2 - P[0] - Q[0]
+        return x, slope * (P[0] - x) - P[1]
+
+    def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
+        """n P for n >= 0."""
+        multiple: AffinePoint | None = by_doublings(self.add, None, n, P)
+        return multiple
+
+    @property
+    def discriminant(self) -> Any:
+        """The discriminant of the cubic polynomial in x; the curve is singular where it is 0."""
+        a, b, c = self.a2, self.a4, self.a6
+        return (a * a - 4 * b) * b * b + (18 * a * b - 4 * a * a * a - 27 * c) * c
+
+    @property
+    def j(self) -> Any:
+        """The j-invariant."""
+        return 256 * (self.a2 * self.a2 - 3 * self.a4) ** 3 / self.discriminant
+
+    def order(self, P: AffinePoint) -> int | None:
+        """Return the order of a point over Q; None if it is infinite.
+
+        By Mazur's theorem it is infinite if it is larger than 12.
+        """
+        multiple: AffinePoint | None = P
+        for n in range(1, _MAX_TORSION + 1):
+            if multiple is None:
+                return n
+            multiple = self.add(multiple, P)
+        return None
+
+    def short_model(self, P: AffinePoint) -> tuple[EllipticCurve, AffinePoint]:
+        """Return an isomorphic curve Y^2 = x^3 + A x + B over Q with small integers A, B, and the image of a point.
+
+        It is minimal among these, unless the coefficients have common powers of large primes.
+        """
+        third = self.a2 / 3
+        A, B, x, y = self.a4 - self.a2 * third, (2 * third * third - self.a4) * third + self.a6, P[0] + third, P[1]
+        u = A.q.lcm(B.q)
+        A, B, scale = A * u**4, B * u**6, fmpq(u)
+        common = (A.p**3).gcd(B.p**2)
+        for factor, _ in common.factor_smooth(_SMOOTH_BITS) if common else ():
+            while A.p % factor**4 == 0 and B.p % factor**6 == 0:
+                A, B, scale = A / factor**4, B / factor**6, scale / factor
+        return EllipticCurve(fmpq(0), A, B), (x * scale**2, y * scale**3)
+
+
+def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> Any:
+    """Return n P for n >= 0 in the group with this sum and zero."""
+    total = zero
+    for bit in bin(n)[2:]:
+        total = add(total, total)
+        if bit == "1":
+            total = add(total, P)
+    return total
+
+
+def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
+    """Return the canonical height of a point over Q, half of that of its x-coordinate, as a ball.
+
+    Tate's series: the height of x changes by a bounded amount from P to 2P, of which a real number is the archimedean
+    part and the common factor of both forms of degree 4 the others. These factors divide the resultant R of the forms,
+    so that coordinates modulo a power of R determine them. The remainder is bounded by the sizes of the forms and of R.
+
+    Raises PrecisionLost if 32768 bits do not suffice.
+
+    >>> canonical_height(EllipticCurve(fmpq(0), fmpq(-1), fmpq(1)), (fmpq(1), fmpq(1))).str(10, radius=False)
+    '0.02494610450'
+    """
+    d = curve.a2.q.lcm(curve.a4.q).lcm(curve.a6.q)
+    a2, a4, a6 = ((a * d**k).p for a, k in ((curve.a2, 2), (curve.a4, 4), (curve.a6, 6)))
+    b2, b4, b6, b8 = 4 * a2, 2 * a4, 4 * a6, 4 * a2 * a6 - a4 * a4
+    resultant = fmpz((256 * curve.discriminant**2 * d**24).p)
+    modulus = resultant ** (_HEIGHT_TERMS + 2)
+    x = P[0] * d**2
+
+    def doubled(X: Any, Z: Any) -> tuple[Any, Any]:
+        return (
+            X**4 - b4 * (X * Z) ** 2 - 2 * b6 * X * Z**3 - b8 * Z**4,
+            4 * X**3 * Z + b2 * (X * Z) ** 2 + 2 * b4 * X * Z**3 + b6 * Z**4,
+        )
+
+    X, Z, left, commons = x.p, x.q, modulus, list[fmpz]()
+    for _ in range(_HEIGHT_TERMS):
+        X, Z = doubled(X, Z)
+        common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # of short numbers, as it divides R
+        left //= common
+        X, Z = X // common % left, Z // common % left
+        commons.append(common)
+    # log R <= log |forms| + log of the cofactors of R = f F + g G, minors of a matrix with eight rows: they bound the
+    # terms from below. The sums of the coefficients bound them from above.
+    largest = max(abs(c) for c in (fmpz(4), 2 * b4, 2 * b6, b8, b2, b6)) + 1
+    bound = resultant.bit_length() + 8 * (largest.bit_length() + 3)
+    for bits in (1 << 9, 1 << 12, MAX_BITS):
+        sizes = list[arb]()
+        with RR(bits).working():
+            size = max(abs(x.p), x.q)
+            first, real = arb(size), (arb(x.p) / size, arb(x.q) / size)
+            for _ in range(_HEIGHT_TERMS):
+                real = doubled(*real)
+                sizes.append(abs(real[0]).max(abs(real[1])))
+                real = (real[0] / sizes[-1], real[1] / sizes[-1])
+        with RR(128).working():  # the sum converges, only the doublings lose digits
+            total, scale = first.log(), arb(1)
+            for size, common in zip(sizes, commons, strict=True):
+                scale /= 4
+                total += scale * (size.log() - arb(common).log())
+            total += arb(0, scale * bound)
+            if total.is_finite() and float(total.rad()) < _ACCURACY:
+                return total / 2
+    raise PrecisionLost(f"the height needs more than {MAX_BITS} bits: the curve is almost singular")
+
+
+def negative_roots(coefficients: Sequence[Any]) -> list[acb]:
+    """Return -e for the roots e of a cubic polynomial with arb or acb coefficients, constant term first.
+
+    The real ones come first, by increasing -e. Raises PrecisionLost if the roots cannot be separated.
+    """
+    try:
+        roots = acb_poly(coefficients).roots(arb(2) ** -(ctx.prec // 2))
+    except ValueError as error:
+        raise PrecisionLost("the roots of the cubic cannot be separated") from error
+    return sorted(
+        (-acb(e) for e in roots), key=lambda e: (not e.imag.contains(0), float(e.real.mid()), float(e.imag.mid()))
+    )
+
+
+def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tuple[arb, int]:
+    """Return the rotation number of the translation by P on the real curve, in (0, 1/2] up to sign, and 1 or 2.
+
+    For a translation that exchanges two real components it is that of its square, and the second number is 2.
+
+    Args:
+        curve, P: with coefficients and coordinates in arb.
+        has_oval: whether the polynomial has three real roots: a positive discriminant.
+    """
+    shifts = negative_roots([curve.a6, curve.a4, curve.a2, arb(1)])
+    a, b, c = shifts
+    steps, x = 1, P[0]
+    if has_oval and not x + a.real > 0:
+        if not x + a.real < 0:
+            raise PrecisionLost("the component of the translation cannot be decided")
+        double = curve.add(P, P)
+        if double is None:
+            return arb(0), 2
+        steps, x = 2, double[0]
+    # Carlson's R_F(x - e_1, x - e_2, x - e_3) is the integral of dx/(2Y) from x to infinity.
+    elapsed = acb.elliptic_rf(x + a, x + b, x + c)
+    period = 2 * acb.elliptic_rf(acb(0), b - a, c - a)
+    return (elapsed / period).real, steps

@@ -1,0 +1,79 @@
+"""Aronhold's invariants S and T of a ternary cubic, which determine the j-invariant of the plane curve."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.duals import DualField
+from kahanmaps.algebra.fields import Field
+
+Cubic = dict[tuple[int, int, int], Any]
+
+
+def aronhold_invariants(K: Field, cubic: Cubic) -> tuple[Any, Any]:
+    """Return S and T of F = sum of a_ijk X_i X_j X_k, of degrees 4 and 6 in the coefficients.
+
+    The curve F = 0 is singular if and only if T^2 + 64 S^3 = 0, and j = 110592 S^3/(T^2 + 64 S^3).
+
+    Args:
+        K: the field of the coefficients.
+        cubic: a_ijk for 0 <= i <= j <= k <= 2, each one coefficient of the symmetric tensor.
+
+    Source: salmon-1879; with S = m - m^4 and T = 1 - 20 m^3 - 8 m^6 for X^3 + Y^3 + Z^3 + 6 m X Y Z.
+
+    >>> from kahanmaps.algebra.fields import QQ
+    >>> m = fmpq(2)
+    >>> a = {index: fmpq(0) for index in itertools.combinations_with_replacement(range(3), 3)}
+    >>> aronhold_invariants(QQ, {**a, (0, 0, 0): fmpq(1), (1, 1, 1): fmpq(1), (2, 2, 2): fmpq(1), (0, 1, 2): m})
+    (-14, -671)
+    """
+    # S(F + 6 d Hess F) = S + d T for d^2 = 0.
+    dual, six, covariant = DualField(K), K.convert(fmpq(6)), hessian(K, cubic)
+    moved = {index: dual.dual(a, six * covariant[index]) for index, a in cubic.items()}
+    S = _first_invariant(moved, dual.convert(fmpq(2)), dual.convert(fmpq(3)))
+    return S.value, S.slope
+
+
+def _first_invariant(cubic: Cubic, two: Any, three: Any) -> Any:
+    """Salmon's formula for S."""
+    a, b, c, m = cubic[0, 0, 0], cubic[1, 1, 1], cubic[2, 2, 2], cubic[0, 1, 2]
+    a2, a3, b1 = cubic[0, 0, 1], cubic[0, 0, 2], cubic[0, 1, 1]
+    b3, c1, c2 = cubic[1, 1, 2], cubic[0, 2, 2], cubic[1, 2, 2]
+    p, q, r, square = b1 * c1, c2 * a2, a3 * b3, m * m
+    return (
+        a * b * c * m
+        - (b * c * a2 * a3 + c * a * b1 * b3 + a * b * c1 * c2)
+        - m * (a * b3 * c2 + b * c1 * a3 + c * a2 * b1)
+        + (a * b1 * c2 * c2 + a * c1 * b3 * b3 + b * a2 * c1 * c1 + b * c2 * a3 * a3 + c * b3 * a2 * a2)
+        + c * a3 * b1 * b1
+        - square * square
+        + two * square * (p + q + r)
+        - three * m * (a2 * b3 * c1 + a3 * b1 * c2)
+        - (p * p + q * q + r * r)
+        + (q * r + r * p + p * q)
+    )
+
+
+def hessian(K: Field, cubic: Cubic) -> Cubic:
+    """Return the determinant of the matrix of second derivatives, divided by 216, as a cubic."""
+    forms = {(i, j): [cubic[_sorted(i, j, k)] for k in range(3)] for i in range(3) for j in range(3)}
+    total = dict.fromkeys(cubic, K.zero)
+    for p in itertools.permutations(range(3)):
+        even = p in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+        rows = [forms[i, p[i]] for i in range(3)]
+        for k in itertools.product(range(3), repeat=3):
+            term = rows[0][k[0]] * rows[1][k[1]] * rows[2][k[2]]
+            index = _sorted(*k)
+            total[index] = total[index] + term if even else total[index] - term
+    # A monomial X_i X_j X_k stands for as many entries of the symmetric tensor as there are orders of its indices.
+    orders = {index: {1: 1, 2: 3, 3: 6}[len(Counter(index))] for index in total}
+    return {index: value * K.convert(fmpq(1, orders[index])) for index, value in total.items()}
+
+
+def _sorted(i: int, j: int, k: int) -> tuple[int, int, int]:
+    a, b, c = sorted((i, j, k))
+    return a, b, c

@@ -1,0 +1,264 @@
+"""The geometry of an orbit on a curve of genus 1 or 0: Weierstrass model, translation, height, rotation number.
+
+The search for elliptic curves along an orbit (elliptic_orbit.py) ends with a proof that the points are P + n T on an
+elliptic curve, and with the first terms W(1) = 1, ..., W(4) of the sequence of the multiples of T. They determine the
+curve and T: on y^2 + a1 x y + a3 y = x^3 + a2 x^2 with T = (0, 0) the division polynomials at T are
+
+    psi_2 = a3,      psi_3 = a2 a3^2,      psi_4 = a3^4 (a1 a2 - a3)                            (ward-1948).
+
+If this cubic is singular, or the orbit lies on a rational normal curve, the map acts on a projective line. There it
+multiplies a coordinate by the multiplier kappa, or adds a constant. Source: docs/mathematics.md, "Orbits on elliptic
+curves".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import arb, fmpq, fmpq_mat
+
+from kahanmaps.algebra.elliptic_curves import (
+    MAX_BITS,
+    AffinePoint,
+    EllipticCurve,
+    canonical_height,
+    rotation_number,
+)
+from kahanmaps.algebra.fields import QQ, RR
+from kahanmaps.algebra.matrices import nullspace, rank
+from kahanmaps.algebra.printing import format_number
+from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve
+from kahanmaps.maps.implicit import Map
+from kahanmaps.maps.orbits.integer_point import IntegerPoint
+from kahanmaps.maps.orbits.relations.elliptic_orbit import elliptic_steps
+from kahanmaps.maps.orbits.relations.elliptic_steps import EllipticSteps
+
+_BITS = 10_000  # of coefficients that are searched for
+_PERIODS = 24  # up to this period an orbit is recognized as periodic: twice the largest order of a torsion point
+_ACCURACY = 1e-15  # of rotation numbers
+
+
+@dataclass(frozen=True)
+class OrbitCurve(PrintableResult):
+    """The curve of an orbit, and the map on it; everything but the balls is exact and proved.
+
+    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers are about
+    this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B,
+    `height` is the canonical height of that point. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and
+    trace = 2 for a parabolic map. `rotation` is the rotation number in (0, 1/2] up to sign; None if kappa is real.
+    `steps` is 2 if that iterate exchanges two real components: then `rotation` is about its square.
+    `height_constant` is the C of height ~ C n^2 for the coordinates of the n-th iterate of the map, in bits.
+    """
+
+    genus: int
+    iterate: int
+    curve: EllipticCurve | None = None
+    point: AffinePoint | None = None
+    order: int | None = None
+    height: arb | None = None
+    rotation: arb | None = None
+    steps: int = 1
+    trace: fmpq | None = None
+    height_constant: float | None = None
+
+    @property
+    def j(self) -> fmpq | None:
+        """The j-invariant."""
+        return None if self.curve is None else self.curve.j
+
+    @property
+    def text(self) -> str:
+        which = "" if self.iterate == 1 else f", iterate {self.iterate} of the map"
+        lines = [f"curve of the orbit\tgenus {self.genus} (proved){which}"]
+        if self.curve is not None and self.point is not None and self.height is not None:
+            order = "infinite order" if self.order is None else f"order {self.order}"
+            lines += [
+                f"  Weierstrass model\ty^2 = x^3 + A x + B, A = {self.curve.a4}, B = {self.curve.a6}",
+                f"  j-invariant\t{format_number(self.curve.j)}",
+                f"  translation\t({', '.join(map(format_number, self.point))}), {order} (proved: multiples up to 12)",
+                f"  canonical height\t{self.height.str(12)}",
+            ]
+        if self.trace is not None:
+            kind = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
+            lines.append(f"  multiplier\t{kind}, infinite order (proved)")
+        if self.rotation is not None:
+            of_second = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
+            lines.append(f"  rotation number\t{self.rotation.str(12)}{of_second}")
+        if self.height_constant is not None:
+            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically")
+        return "\n".join(lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data; exact numbers and balls are text."""
+
+        def exact(x: fmpq | None) -> str | None:
+            return None if x is None else format_number(x)
+
+        return {
+            "genus": self.genus,
+            "iterate": self.iterate,
+            "A": None if self.curve is None else format_number(self.curve.a4),
+            "B": None if self.curve is None else format_number(self.curve.a6),
+            "j": exact(self.j),
+            "point": None if self.point is None else [format_number(x) for x in self.point],
+            "order": self.order,
+            "height": None if self.height is None else self.height.str(15),
+            "trace": exact(self.trace),
+            "rotation": None if self.rotation is None else self.rotation.str(15),
+            "steps": self.steps,
+            "height_constant": self.height_constant,
+        }
+
+
+def orbit_curve(map_over: Map, start: Sequence[Any]) -> OrbitCurve:
+    """Return the geometry of the orbit of a point under a map over Q, if it lies on curves of genus 1 or 0.
+
+    Raises UnknownCurve if no curve was found, InputError if the orbit is finite.
+
+    >>> from kahanmaps.documents.inline import as_file
+    >>> curve = orbit_curve(as_file("mcmillan").map.at(fmpq(1), QQ), [fmpq(1, 3), fmpq(2, 5)])
+    >>> curve.genus, curve.curve.a4, curve.curve.a6, curve.rotation.str(8, radius=False)
+    (1, -7323, 229622, '0.15215519')
+    """
+    point = IntegerPoint.from_rationals(map_over.point(start))
+    steps = elliptic_steps(map_over, point, _BITS)
+    if steps is not None:
+        return _on_elliptic_curve(map_over, steps)
+    result = _on_rational_curve(map_over, point)
+    if result is None:
+        raise UnknownCurve(
+            "undecided: no curve of genus 0 or 1 was found that contains the orbit; the search covers curves on which "
+            "the coordinates have degree at most 8"
+        )
+    return result
+
+
+def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
+    """Return the geometry from the terms of W, and from the degrees of the coordinates."""
+    W = found.multiples
+    H, third, fourth = (W.value(n) for n in (2, 3, 4))
+    a2, a3 = third / H**2, H
+    a1 = (fourth / a3**4 + a3) / a2
+    curve, T = EllipticCurve(a2 + a1 * a1 / 4, a1 * a3 / 2, a3 * a3 / 4), (fmpq(0), a3 / 2)
+    # T belongs to `stride` steps of factors.
+    factors = len(map_over.factors)
+    together = math.lcm(factors, found.stride)
+    iterate, times = together // factors, together // found.stride
+    point = curve.multiple(times, T)
+    assert point is not None  # W(n) is not 0
+    if curve.discriminant == 0:
+        return _on_singular_cubic(curve, point, iterate)
+    curve, point = curve.short_model(point)
+    height = canonical_height(curve, point)
+    rotation, steps = _rotation(curve, point)
+    constant = found.degree * float(height.mid()) / (iterate * iterate * math.log(2))
+    return OrbitCurve(1, iterate, curve, point, curve.order(point), height, rotation, steps, height_constant=constant)
+
+
+def _rotation(curve: EllipticCurve, point: AffinePoint) -> tuple[arb, int]:
+    bits = 128
+    while bits <= MAX_BITS:
+        with RR(bits).working():
+            real = EllipticCurve(*(arb(a) for a in (curve.a2, curve.a4, curve.a6)))
+            try:
+                number, steps = rotation_number(real, (arb(point[0]), arb(point[1])), curve.discriminant > 0)
+            except PrecisionLost:
+                number = None
+            if number is not None and number.is_finite() and float(number.rad()) < _ACCURACY:
+                return number, steps
+        bits *= 4
+    raise PrecisionLost(f"the rotation number needs more than {MAX_BITS} bits: the curve is almost singular")
+
+
+def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -> OrbitCurve:
+    """Return the multiplier of the translation on Y^2 = (x - r)^2 (x - s).
+
+    It multiplies (Y + m (x - r))/(Y - m (x - r)), m^2 = r - s, by its value at the point.
+    """
+    a, b, c = curve.a2, curve.a4, curve.a6
+    square = a * a - 3 * b  # (r - s)^2
+    if square == 0:
+        return _rational(iterate, fmpq(2))
+    r = (9 * c - a * b) / (2 * square)
+    x, y = point
+    m_squared, w = 3 * r + a, x - r  # r - s, as 2 r + s = -a
+    return _rational(iterate, 2 * (y * y + m_squared * w * w) / (y * y - m_squared * w * w))
+
+
+def _on_rational_curve(map_over: Map, start: IntegerPoint) -> OrbitCurve | None:
+    """Return the multiplier of an orbit on a rational normal curve: one of degree d in a space of dimension d.
+
+    Hyperplanes through d - 1 points of the orbit give a coordinate z of the curve, on which the map acts by a matrix.
+    The coordinates are forms of degree d in (z : 1); substituted into the equation of the map they give a form of known
+    degree, which vanishes if it does at more points.
+    """
+    factors, dim = map_over.factors, map_over.dim
+    if len(factors) > 1:  # the points between the factors lie on other curves
+        return None
+    top = max(sum(exponent) for exponent in factors[0].equation.exponents)
+    points: list[IntegerPoint] = [start]
+    while len(points) < max(_PERIODS, top * dim + dim + 2, (dim + 1) ** 2) + dim:
+        image = map_over.integer_step(points[-1])
+        if image is None or image.exceeding(_BITS):  # on a rational curve the length grows linearly
+            return None
+        if image == start:
+            period = len(points)
+            raise InputError(
+                f"the orbit has period {period}, and its points determine no curve: choose another initial point"
+            )
+        points.append(image)
+    rows = [[*(fmpq(x) for x in point.numerators), fmpq(point.denominator)] for point in points]
+    size = dim + 3
+    full = fmpq_mat(size, dim + 1, [x for row in rows[:size] for x in row])
+    degree = rank(QQ, full) - 1
+    if degree < 1:
+        return None
+    chosen: list[int] = []  # coordinates that are independent on the orbit
+    for k in range(dim + 1):
+        columns = [*chosen, k]
+        if rank(QQ, fmpq_mat(size, len(columns), [row[i] for row in rows[:size] for i in columns])) == len(columns):
+            chosen = columns
+    rows = [[row[k] for k in chosen] for row in rows]
+    through = fmpq_mat(degree - 1, degree + 1, [x for row in rows[: degree - 1] for x in row])
+    pencil = nullspace(QQ, through)
+    if len(pencil) != 2:
+        return None
+    values = [[sum(a * x for a, x in zip(form, row, strict=True)) for form in pencil] for row in rows[degree - 1 :]]
+    if any(second == 0 for _, second in values):
+        return None
+    z = [first / second for first, second in values]
+    # (p z + q)/(r z + s) maps each z to the next.
+    equations = [[z[k], fmpq(1), -z[k] * z[k + 1], -z[k + 1]] for k in range(3)]
+    kernel = nullspace(QQ, fmpq_mat(3, 4, [x for row in equations for x in row]))
+    if len(kernel) != 1:
+        return None
+    p, q, r, s = kernel[0]
+    unknowns = (degree + 1) ** 2
+    enough = max(top * degree + degree + 2, unknowns)
+    z, rows = z[:enough], rows[degree - 1 :][:enough]
+    if any(z[k + 1] * (r * z[k] + s) != p * z[k] + q for k in range(len(z) - 1)) or len(set(z)) < enough:
+        return None
+    last, forms = degree, []
+    for value, row in zip(z, rows, strict=True):
+        monomials = [value**k for k in range(degree + 1)]
+        for i in range(last):
+            entry = [fmpq(0)] * unknowns
+            entry[i * (degree + 1) : (i + 1) * (degree + 1)] = [row[last] * x for x in monomials]
+            entry[last * (degree + 1) :] = [-row[i] * x for x in monomials]
+            forms.append(entry)
+    if len(nullspace(QQ, fmpq_mat(len(forms), unknowns, [x for row in forms for x in row]))) != 1:
+        return None
+    return _rational(1, (p + s) ** 2 / (p * s - q * r) - 2)
+
+
+def _rational(iterate: int, trace: fmpq) -> OrbitCurve:
+    """Return the result for a rational curve: kappa = exp(2 pi i rho) if the trace is between -2 and 2."""
+    rotation = None
+    if abs(trace) < 2:
+        with RR(128).working():
+            rotation = (arb(trace) / 2).acos() / (2 * arb.pi())
+    return OrbitCurve(0, iterate, trace=trace, rotation=rotation)

@@ -1,0 +1,229 @@
+"""Poincare sections: where floating-point orbits cross a hyperplane a.x = c, with invariant curves that are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in
+from kahanmaps.errors import InputError
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.floats.float_conversion import FloatArray
+from kahanmaps.plots.curves.level_sets import MAX_LEVELS, level_curves, levels_through
+from kahanmaps.plots.figures import draw_points, drawing, legend_above, new_figure
+from kahanmaps.plots.point_functions import PointFunction
+from kahanmaps.plots.portraits.windows import Window, fullest_axes, window_of
+from kahanmaps.plots.style import COLOR_MAP, COLORS, LINES, Style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+UP, DOWN, BOTH = "up", "down", "both"
+_NODES = 6  # of the interpolation: three points on either side of the hyperplane
+_NEWTON = 12
+_TRUSTED = 0.1  # of a step: by so much at most may interpolation by four points and by six differ
+_ASPECT = 0.75
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """The crossings of orbits with a hyperplane.
+
+    `crossings` contains for each orbit its points on the hyperplane (count, dim), in the order of the orbit; `skipped`
+    counts crossings that were left out, since the steps are too long there for an interpolation.
+    """
+
+    crossings: tuple[FloatArray, ...]
+    skipped: int
+
+    @property
+    def points(self) -> FloatArray:
+        """The crossings of all orbits (count, dim)."""
+        return np.concatenate(self.crossings)
+
+    def widest_axes(self, hyperplane: PointFunction) -> tuple[int, ...]:
+        """Return two variables along which the crossings spread most, without one that is constant on it."""
+        powers = [sum(column) for column in zip(*hyperplane.function.numerator.monoms(), strict=True)]
+        dim = self.points.shape[1]
+        free = [k for k in range(dim) if powers[k] == 0 or sum(powers) > 1]
+        return tuple(free[k] for k in fullest_axes(self.points[:, free], 2))
+
+
+def require_hyperplane(function: PointFunction, dim: int) -> None:
+    """Raise InputError unless a function is a nonconstant affine function of the variables."""
+    polynomial = function.function.numerator
+    if not function.function.denominator.is_one() or degree_in(polynomial, dim) != 1 or polynomial.total_degree() != 1:
+        raise InputError(
+            f"found {function.name}, expected a hyperplane: a linear equation in the variables, such as x1 - x2 = 1"
+        )
+
+
+def section_of(
+    ensemble: FloatEnsemble,
+    hyperplane: PointFunction,
+    steps: int,
+    *,
+    direction: str = UP,
+    progress: Callable[[int], None] | None = None,
+) -> Section:
+    """Return the crossings of a hyperplane by the orbits of an ensemble.
+
+    Args:
+        ensemble: the orbits.
+        hyperplane: an affine function of the variables that is 0 on it.
+        steps: the number of steps of each orbit.
+        direction: "up" for crossings to positive values, "down" to negative ones, or "both".
+        progress: called with the current step.
+
+    Six consecutive points are interpolated by polynomials in the step. Raises InputError for another direction.
+    """
+    if direction not in (UP, DOWN, BOTH):
+        raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")
+    found: list[list[FloatArray]] = [[] for _ in range(ensemble.n)]
+    skipped, last = 0, np.empty((0, ensemble.n, ensemble.system.dim))
+    for portion in ensemble.records(steps, 1, progress=progress):
+        points = np.concatenate([last, portion])
+        last = points[-(_NODES - 1) :]
+        values = hyperplane(points)
+        for k in range(ensemble.n):
+            crossings, left_out = crossings_of(points[:, k], values[:, k], direction)
+            found[k].append(crossings)
+            skipped += left_out
+    return Section(tuple(np.concatenate(pieces) for pieces in found), skipped)
+
+
+def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
+    """Return the interpolated zeros of an affine function along an orbit, and how many were left out.
+
+    Args:
+        points: those of the orbit (count, dim).
+        values: those of the function (count,).
+        direction: "up", "down" or "both".
+
+    A zero needs three points on either side.
+
+    >>> t = 0.3 * np.arange(12)
+    >>> circle = np.stack([np.cos(t), np.sin(t)], axis=1)
+    >>> crossings_of(circle, circle[:, 0], "down")[0].round(6).tolist()
+    [[0.0, 1.0]]
+    """
+    signs = np.sign(values)
+    up, down = (signs[:-1] < 0) & (signs[1:] >= 0), (signs[:-1] > 0) & (signs[1:] <= 0)
+    crossed = {UP: up, DOWN: down, BOTH: up | down}[direction]
+    before = np.flatnonzero(crossed)
+    before = before[(before >= _NODES // 2 - 1) & (before + _NODES // 2 < len(points))]
+    window = before[:, None] + np.arange(1 - _NODES // 2, _NODES // 2 + 1)
+    finite = np.isfinite(values[window]).all(axis=1)
+    before, window = before[finite], window[finite]
+    nearby, heights = points[window], values[window]
+
+    def zero(nodes: slice) -> FloatArray:
+        """The crossings by interpolation at these of the six nodes."""
+        places = np.arange(1 - _NODES // 2, _NODES // 2 + 1, dtype=np.float64)[nodes]
+        polynomials = np.linalg.inv(np.vander(places, increasing=True))  # coefficients from values
+        along = heights[:, nodes] @ polynomials.T
+        powers = np.arange(len(places))
+        low, high = np.zeros(len(along)), np.ones(len(along))
+        t = np.clip(values[before] / (values[before] - values[before + 1]), 0, 1)
+        rising = values[before] < values[before + 1]
+        for _ in range(_NEWTON):  # Newton's method, kept between bounds with a change of sign
+            value = (along * t[:, None] ** powers).sum(axis=1)
+            slope = (along[:, 1:] * powers[1:] * t[:, None] ** powers[:-1]).sum(axis=1)
+            is_below = (value < 0) == rising
+            low, high = np.where(is_below, t, low), np.where(is_below, high, t)
+            step = t - value / slope
+            t = np.where((step >= low) & (step <= high), step, (low + high) / 2)
+        at: FloatArray = np.einsum("nk,kj,njd->nd", t[:, None] ** powers, polynomials, nearby[:, nodes])
+        return at
+
+    with np.errstate(all="ignore"):
+        fine, coarse = zero(slice(None)), zero(slice(1, _NODES - 1))
+        steps = np.linalg.norm(points[before + 1] - points[before], axis=1)
+        trusted = np.linalg.norm(fine - coarse, axis=1) <= _TRUSTED * steps
+        # A function that moves away from 0 on both sides has a pole between them.
+        middle = _NODES // 2
+        approach, departure = np.diff(np.abs(heights), axis=1)[:, [middle - 2, middle]].T
+        trusted &= (approach < 0) | (departure > 0)
+    return fine[trusted], int((~trusted).sum())
+
+
+def restricted_to(function: PointFunction, hyperplane: PointFunction, plane: Sequence[int]) -> PointFunction | None:
+    """Return a function on a hyperplane in terms of two variables; None if it depends on others as well."""
+    affine = hyperplane.function.numerator
+    names = function.function.names
+    context = affine.context()
+    generators = list(context.gens())
+    dim = len(names) - 1
+    for k in (k for k in range(dim) if k not in plane):
+        slope = affine.derivative(k)
+        if not slope.is_zero():
+            generators[k] = generators[k] - affine / slope.leading_coefficient()
+            break
+    sides = (function.function.numerator, function.function.denominator)
+    parts = [part.compose(*generators, ctx=context) for part in sides]
+    if any(int(part.degrees()[k]) > 0 for part in parts for k in range(dim) if k not in plane) or parts[1].is_zero():
+        return None
+    return PointFunction(function.name, RationalFunction.reduced(*parts), function.eps)
+
+
+def plot_section(
+    section: Section,
+    axes: Sequence[PointFunction],
+    style: Style | None = None,
+    *,
+    curves: Sequence[PointFunction] = (),
+    window: Window | None = None,
+    equal: bool = False,
+) -> Figure:
+    """Plot the crossings along two axes, each orbit in its own color, and level curves of integrals.
+
+    Args:
+        section: the crossings.
+        axes: two functions of the point.
+        style: sizes.
+        curves: integrals as `restricted_to` returns them, functions of two variables that are the axes; their levels
+            through the first crossing of each orbit are drawn.
+        window: the part of the plane; None for all crossings.
+        equal: whether both axes have the same unit.
+
+    Raises InputError if there are no crossings.
+    """
+    shown = [np.stack([axis(points) for axis in axes], axis=-1) for points in section.crossings]
+    count = len(section.points)
+    if not count:
+        raise InputError("found no crossing of the hyperplane, expected at least one: use more steps or another plane")
+    window = window or window_of(np.concatenate(shown))
+    style = style or Style()
+    with drawing(style):
+        import matplotlib as mpl
+        from matplotlib.collections import LineCollection
+
+        figure = new_figure(style, _ASPECT)
+        drawn: Any = figure.subplots()
+        handles: dict[str, Any] = {}
+        for k, function in enumerate(curves):
+            levels = levels_through(function, np.concatenate([points[:1] for points in section.crossings]))
+            plane = [axis.variable for axis in axes if axis.variable is not None]
+            dim = len(function.function.names) - 1
+            found = level_curves(function, plane, dim, levels[:MAX_LEVELS], window)
+            pieces = [piece for level in found for piece in level]
+            if pieces:
+                look: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5, "linestyles": LINES[k % len(LINES)]}
+                drawn.add_collection(LineCollection(pieces, zorder=1, **look), autolim=False)
+                (handles[f"levels of {function.name}"],) = drawn.plot(
+                    [], [], color="#999999", linewidth=0.5, linestyle=LINES[k % len(LINES)]
+                )
+        few = len(shown) <= len(COLORS)
+        shades = COLORS if few else mpl.colormaps[COLOR_MAP](np.linspace(0, 0.78, len(shown)))
+        for k, points in enumerate(shown):
+            draw_points(drawn, *points.T, color=shades[k], zorder=2, total=count)
+        for side, axis, limits in zip("xy", axes, window, strict=True):
+            drawn.set(**{f"{side}label": axis.label, f"{side}lim": limits})
+        if equal:
+            drawn.set_aspect("equal", adjustable="box")
+        if handles:
+            legend_above(figure, list(handles.values()), list(handles), style)
+    return figure

@@ -1,0 +1,152 @@
+"""The curve of an orbit: models and heights against PARI, level curves and exact orbits, rotation against floats."""
+
+import math
+import shutil
+import subprocess
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from flint import fmpq
+from planar_helpers import mean_turn
+
+import kahanmaps as km
+from kahanmaps import InputError
+from kahanmaps.algebra.elliptic_curves import EllipticCurve, canonical_height
+from kahanmaps.errors import UnknownCurve
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.orbits.relations.orbit_curve import _on_singular_cubic, orbit_curve
+
+START, SPATIAL = ["1/3", "2/5"], ["1/3", "2/5", "3/7"]
+ORBITS = {
+    "mcmillan": (START, None),
+    "lyness": (START, None),
+    "qrt_symmetric": (START, None),
+    "qrt_asymmetric": (START, None),
+    "weierstrass": (START, "1/10"),
+    "nahm_octahedral": (START, "1/10"),
+    "euler_top": (SPATIAL, "1/10"),
+    "todd": (SPATIAL, None),
+}
+
+
+@pytest.mark.skipif(shutil.which("gp") is None, reason="PARI/GP (gp) is not installed")
+@pytest.mark.parametrize("name", ORBITS)
+def test_j_invariant_and_height_agree_with_pari(name):
+    orbit = km.geometry(name, *ORBITS[name])
+    model, point = f"[{orbit.curve.a4},{orbit.curve.a6}]", f"[{orbit.point[0]},{orbit.point[1]}]"
+    script = f"E=ellinit({model}); print(ellisoncurve(E,{point})); print(E.j); print(ellheight(E,{point})/2)"
+    lines = subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
+    assert lines[0] == "1"
+    assert fmpq(*map(int, (lines[1] + "/1").split("/")[:2])) == orbit.j
+    assert abs(float(lines[2]) - float(orbit.height.mid())) < 1e-12
+    assert float(orbit.height.rad()) < 1e-15
+
+
+def j_of_quartic(a, b, c, d, e):
+    """The j-invariant of v^2 = a t^4 + b t^3 + c t^2 + d t + e by its classical invariants."""
+    I, J = 12 * a * e - 3 * b * d + c * c, 72 * a * c * e + 9 * b * c * d - 27 * (a * d * d + b * b * e) - 2 * c**3
+    return 6912 * I**3 / (4 * I**3 - J * J)
+
+
+@pytest.mark.parametrize("start", [START, ["1/2", "-3"]])
+def test_the_j_invariant_is_that_of_the_biquadratic_level_curve(start):
+    """McMillan's map with a = 1/2 conserves I = x^2 y^2 - x^2 - y^2 + x y: a double cover of the y-line."""
+    x, y = (fmpq(*Fraction(entry).as_integer_ratio()) for entry in start)
+    level = x * x * y * y - x * x - y * y + x * y
+    # (y^2 - 1) x^2 + y x - (y^2 + I): the discriminant is y^2 + 4 (y^2 - 1) (y^2 + I).
+    expected = j_of_quartic(fmpq(4), fmpq(0), 1 + 4 * level - 4, fmpq(0), -4 * level)
+    assert km.geometry("mcmillan", start).j == expected
+    assert km.geometry("mcmillan", ["1/8", "2/5"]).j != expected
+
+
+def test_the_curve_of_a_member_is_its_level_cubic():
+    system = km.load("nahm_tetrahedral")
+    plane = km.geometry(system, [1, 2], "1/10").planes[0]
+    orbit = orbit_curve(system.at("1/10"), [1, 2])
+    assert orbit.j == plane.j
+    assert abs(float(orbit.height.mid()) - plane.height) < 1e-12
+    assert orbit.rotation.overlaps(plane.rotations[0].number)
+    assert orbit.height_constant == pytest.approx(km.geometry(system, [1, 2], "1/10").height_constant, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", [*ORBITS, "hky", "volterra_periodic_4"])
+def test_heights_grow_as_the_canonical_height_says(name):
+    """Of bits(n) = C n^2 + b n + O(1) the linear part cancels in bits(2n) - 2 bits(n)."""
+    start, eps = ORBITS.get(name, ([*SPATIAL, "1/5"], "1/10") if name[0] == "v" else (START, None))
+    constant = km.geometry(name, start, eps).height_constant
+    n = math.ceil(math.sqrt(10_000 / constant))
+    orbit = km.orbit(km.load(name), start, eps or 1, at=[n, 2 * n])
+    points = [step.x for step in orbit]
+    first, second = (max(max(abs(int(x.p)), int(x.q)).bit_length() for x in point) for point in points)
+    measured = (second - 2 * first) / (2 * n * n)
+    assert abs(measured / constant - 1) < 1e-3
+
+
+def float_orbit(name, start, eps, steps):
+    ensemble = FloatEnsemble(km.load(name), eps or 1, np.array([[float(Fraction(x)) for x in start]]))
+    return np.concatenate([portion[:, 0] for portion in ensemble.records(steps, 1)])
+
+
+@pytest.mark.parametrize(
+    ("name", "axes", "center"),
+    [
+        ("mcmillan", (0, 1), (0, 0)),
+        ("lyness", (0, 1), None),
+        ("weierstrass", (0, 1), None),
+        ("euler_top", (1, 2), (0, 0)),
+    ],
+)
+def test_the_rotation_number_is_that_of_a_float_orbit(name, axes, center):
+    start, eps = (["-1/2", "1/10"], "1/10") if name == "weierstrass" else ORBITS[name]
+    start = ["3", "1/7", "1/5"] if name == "euler_top" else start
+    orbit = km.geometry(name, start, eps)
+    points = float_orbit(name, start, eps, 60_000)[:, axes]
+    points = points - (np.mean(points, axis=0) if center is None else center)
+    measured = mean_turn(np.arctan2(points[:, 1], points[:, 0]), 2 * math.pi)
+    assert (orbit.iterate, orbit.steps) == (1, 1)
+    assert abs(measured - float(orbit.rotation)) < 1e-10
+    assert abs(measured - float(km.geometry(name, [*start[:-1], "1/6"], eps).rotation)) > 1e-6
+
+
+def test_a_rational_curve_has_a_multiplier():
+    """Kahan's map of x' = y, y' = -x is the rotation by the angle 2 arctan eps."""
+    orbit = km.geometry("harmonic", [1, 2], "1/10")
+    assert (orbit.genus, orbit.trace) == (0, fmpq(2 * 99, 101))
+    assert float(orbit.rotation) == pytest.approx(math.atan(0.1) / math.pi, abs=1e-15)
+    parabolic = km.geometry(km.System("x' = 1; y' = x"), [1, 2], "1/10")
+    assert (parabolic.genus, parabolic.trace, parabolic.rotation) == (0, 2, None)
+
+
+@pytest.mark.parametrize("t", [fmpq(3), fmpq(2, 5), fmpq(-7, 2)])
+def test_on_a_nodal_cubic_the_translation_is_a_multiplication(t):
+    """On Y^2 = x^2 (x + 1) the point with Y = t x has kappa = (t + 1)/(t - 1)."""
+    x = t * t - 1
+    kappa = (t + 1) / (t - 1)
+    assert _on_singular_cubic(EllipticCurve(fmpq(1), fmpq(0), fmpq(0)), (x, t * x), 1).trace == kappa + 1 / kappa
+    cusp = _on_singular_cubic(EllipticCurve(fmpq(3), fmpq(3), fmpq(1)), (t * t - 1, t**3), 1)
+    assert cusp.trace == 2
+
+
+def test_heights_of_multiples_are_quadratic_and_torsion_has_height_0():
+    E, P = EllipticCurve(fmpq(1, 3), fmpq(-7, 4), fmpq(2)), (fmpq(1, 2), fmpq(0))
+    E = EllipticCurve(E.a2, E.a4, -(P[0] ** 3 + E.a2 * P[0] ** 2 + E.a4 * P[0]) + 1)
+    P = (P[0], fmpq(1))
+    height = canonical_height(E, P)
+    assert (canonical_height(E, E.multiple(5, P)) - 25 * height).contains(0)
+    assert not (canonical_height(E, E.multiple(5, P)) - 24 * height).contains(0)
+    torsion = EllipticCurve(fmpq(0), fmpq(0), fmpq(1)), (fmpq(2), fmpq(3))
+    assert torsion[0].order(torsion[1]) == 6
+    assert canonical_height(*torsion).contains(0)
+
+
+@pytest.mark.parametrize("name", ["lorenz", "zander_120", "henon_heiles"])
+def test_an_orbit_on_no_known_curve_is_undecided(name):
+    system = km.load(name)
+    with pytest.raises(UnknownCurve, match="undecided: no curve"):
+        orbit_curve(system.at("1/10"), [fmpq(k, k + 1) for k in range(1, system.dim + 1)])
+
+
+def test_a_finite_orbit_determines_no_curve():
+    with pytest.raises(InputError, match="the orbit has period 5"):
+        km.geometry(km.load("lyness").subs(a=1), ["1/3", "2/5"])
