@@ -11,37 +11,29 @@ from importlib.util import find_spec
 import numpy as np
 
 import kahanmaps as km
-from kahanmaps.plots.drifts.drift import METHODS, survey_drift
-from kahanmaps.plots.drifts.drift_functions import known_functions
 
 EPS, STEPS = "1/20", 20_000
 
 
-def errors_of(survey, function):
+def errors_of(result, function):
     """The typical error of a function, by method: the median of the maxima over some 200 bins of steps."""
-    return {c.method: float(np.median(c.errors)) for c in survey.curves if c.function == function}
+    return {c.method: float(np.median(c.errors)) for c in result.curves if c.function == function}
 
 
-top = km.load("euler_top")
-functions = known_functions(top, km.QQ.convert(EPS))
-survey = survey_drift(top.system, EPS, [1, "1/2", "1/3"], STEPS, functions, ("generic", "rk4", "midpoint"))
-print(f"{top.name}, {STEPS} steps, relative error of {functions[0].name}:")
-for method, error in errors_of(survey, functions[0].name).items():
+of_top = km.compare("euler_top", [1, "1/2", "1/3"], EPS, STEPS, methods=["kahan", "rk4", "midpoint"])
+first = next(iter(of_top.labels))
+print(f"euler_top, {STEPS} steps, relative error of {first}:")
+for method, error in errors_of(of_top, first).items():
     size = "rounding only" if error < 1e-13 else f"about {error:.0e}"
-    print(f"  {METHODS[method]}: {size}")
+    print(f"  {method}: {size}")
+print("measured orders:", {run.method: round(run.order, 1) for run in of_top.runs})
 
-file = km.load("paper_m2")
-functions = known_functions(file, km.QQ.convert(EPS))
-start, form = ["1/20", "-1/30", 0, "1/40"], km.normal_form(file.member)
-of_member = survey_drift(file.system, EPS, start, STEPS, functions, ("generic", "normal-form"), form=form)
+start = ["1/20", "-1/30", 0, "1/40"]
+of_member = km.compare("paper_m2", start, EPS, STEPS, methods=["kahan", "normal-form"], orders=False)
 for name in ("I1", "I2"):
     error = errors_of(of_member, name)
-    better = error["normal-form"] < error["generic"]
-    print(f"{file.name}, {name}: below 1e-6: {error['generic'] < 1e-6}; in normal form smaller: {better}")
+    better = error["normal-form"] < error["kahan"]
+    print(f"paper_m2, {name}: below 1e-6: {error['kahan'] < 1e-6}; in normal form smaller: {better}")
 
 if find_spec("matplotlib"):
-    from kahanmaps.plots.drifts.drift import plot_drift
-    from kahanmaps.plots.figures import write_picture
-    from kahanmaps.plots.style import Style
-
-    write_picture(plot_drift(survey), "drift.pdf", "pdf", Style())
+    km.plot.compare(of_top).figure.savefig("drift.pdf")

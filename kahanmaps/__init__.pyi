@@ -136,6 +136,8 @@ from .maps.orbits.orbit import orbit as orbit
 from .maps.polarised import polarised_map as polarised_map
 from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
+from .plots.comparison.compare import Comparison as Comparison
+from .plots.comparison.compare import compare as compare
 from .plots.plot import plot as plot
 from .plots.plot import plot_orbits as plot_orbits
 from .reports.report import report as report

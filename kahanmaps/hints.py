@@ -39,7 +39,7 @@ HINTS = {
     **dict.fromkeys(("certify", "prove", "proof", "verify_certificate"), 'km.certificate(system, "sympy")'),
     **dict.fromkeys(("modified_hamiltonian", "modified_integrals"), "km.check_integrals(system), which includes it"),
     **dict.fromkeys(("lyapunov_exponent", "lyapunov_spectrum"), "km.lyapunov(system, x0, eps, steps)"),
-    **dict.fromkeys(("drift", "energy_error", "plot_drift"), "km.plot.drift(system, x0, eps, steps)"),
+    **dict.fromkeys(("drift", "energy_error", "plot_drift", "rk4"), "km.compare(system, x0, eps, steps)"),
     **dict.fromkeys(("plot_orbit", "phase_portrait", "plot_portrait"), "km.portrait(system), or km.orbit(...).plot()"),
     **dict.fromkeys(("list_systems", "examples", "available_systems"), "km.catalogue()"),
     **dict.fromkeys(("singularity_confinement", "confinement"), "km.singularities(system)"),

@@ -244,7 +244,7 @@ km.ensemble("euler_top", [[0.1, 0.2, 0.3], [1, 2, "1/3"]], 0.1, 5, kernel="numpy
 km.lyapunov("lorenz", x0=[1, 1, 1], h=0.01, n=10)
 km.plot("euler_top", x0=[1, 0.5, 0.2], h=0.1, n=20)
 km.plot(km.degrees("euler_top", max_terms=3))
-km.plot.drift("euler_top", x0=[1, 0.5, 0.25], h=0.1, n=100)
+km.compare("euler_top", x0=[1, 0.5, 0.25], h=0.1, n=100, methods=["kahan", "rk4"])
 km.plot.rotation("nahm_tetrahedral", ["1/10", "1/5"], [2, 3], eps="1/10", points=5)
 km.plot.commute("paper_m2", x0=["1/2", "-1/3", 0, 1], eps="1/50")
 km.plot.invariant_curves("paper_m2", x0=["1/2", "-1/3", 0, 1], eps="1/10", n=50)
@@ -361,7 +361,7 @@ REFUSED = [
     ("km.System(FISH).f(0, np.ones(2))", "found two arguments, expected the point alone"),
     ("km.System(FISH)(np.ones(2))", r"system.at\(eps\)\(x\)"),
     ("km.cycles(FISH, prime=101)", 'found None, expected an exact number, e.g. eps="1/10"'),
-    ("km.plot.drift(FISH, x0=[1, 2])", "expected eps= or h="),
+    ("km.compare(FISH, x0=[1, 2])", "expected eps= or h="),
     ("km.load('lyness').kahan('1/10')", "expected a quadratic vector field"),
 ]
 

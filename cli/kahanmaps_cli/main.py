@@ -40,6 +40,7 @@ SECTIONS = {
         "period": ("period", "Compute the exact period of an orbit, modulo p or over Q."),
         "geometry": ("geometry", "Describe the curve of an orbit: j-invariants, heights, rotation numbers."),
         "ensemble": ("ensemble", "Iterate many orbits at once, in floating point."),
+        "compare": ("compare", "Compare Kahan's method with others: drift, errors, orders, work."),
     },
     "Checks": {name: ("check", check.question) for name, check in CHECKS.items()},
     "Laboratory": {
@@ -62,7 +63,7 @@ SECTIONS = {
     },
     "Many experiments": {"batch": ("batch", "Run, resume and summarize thousands of experiments.")},
     "Pictures and pages": {
-        "plot": ("plot", "Draw portraits, invariant curves, drift and growth."),
+        "plot": ("plot", "Draw portraits, invariant curves, comparisons of methods and growth."),
         "report": ("report", "Write an HTML page about a system, member or batch."),
         "certificate": ("certificate", "Write proofs that Coq (Rocq), PARI/GP or SymPy checks."),
         "convert": ("convert", "Convert a system and its map to LaTeX, SymPy, PARI/GP, Maple, ..."),

@@ -5,7 +5,7 @@ figures           an empty figure in a style, its texts and legend; as a file (P
 growth            degrees of iterates, heights of exact orbits
 scan              the plane of two parameters, with what a scan found in it
 squares           do two maps commute, seen from one point
-drifts            how far integrals drift along float orbits
+comparison        Kahan's method and others along float orbits: drift of integrals, errors, orders, work
 portraits         orbits of planar maps and of sections, equilibria, the flow
 curves            invariant curves, and the planes they lie in
 """

@@ -20,6 +20,7 @@ from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.orbit import Trajectory
 from kahanmaps.maps.values import as_point, as_points, start_rows
+from kahanmaps.plots.comparison.compare import Comparison
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import automatic_starts
 from kahanmaps.plots.portraits.portrait import portrait_of
@@ -40,11 +41,12 @@ class Plot(AttributeHints):
         return "plot"  # there is one, `km.plot`
 
     def __call__(self, value: Any, *arguments: Any, **options: Any) -> Axes:
-        """Draw a result of `km.degrees`, `km.heights` or `km.scan`, an orbit, or else the portrait of a system."""
+        """Draw the result of a function listed below, an orbit, or else the portrait of a system."""
         kinds: dict[type, Any] = {
             DegreeGrowth: self.degrees,
             HeightSurvey: self.heights,
             Scan: self.scan,
+            Comparison: self.compare,
             Trajectory: self.orbit,
         }
         axes: Axes = kinds.get(type(value), self.portrait)(value, *arguments, **options)
@@ -71,44 +73,12 @@ class Plot(AttributeHints):
         _require(result, Scan, "a result: km.plot.scan(km.scan(...))")
         return _axes(plot_scan(result, Style()))
 
-    def drift(
-        self,
-        system: SystemLike,
-        start: Any = None,
-        eps: Any = None,
-        steps: int | None = None,
-        *,
-        x0: Any = None,
-        time_step: Any = None,
-        h: Any = None,
-        n: int | None = None,
-        methods: Sequence[str] = ("generic", "rk4", "midpoint"),
-    ) -> Axes:
-        """Plot the errors of the known integrals along float orbits of several methods, as `plot drift` draws them.
+    def compare(self, result: Comparison, *, show: str = "drift", scale: str = "loglog") -> Axes:
+        """Plot the result of `km.compare`: its "drift", the "error" against the time step, or the "work"."""
+        from kahanmaps.plots.comparison.plot_compare import plot_comparison
 
-        Args:
-            system: a quadratic system.
-            start, x0: the initial point, by default a small one; floats are taken exactly.
-            eps: half the time step; `time_step` or `h` is the time step.
-            steps, n: the number of steps, by default 10,000.
-            methods: "generic" (Kahan's), "rk4", "midpoint".
-        """
-        from kahanmaps.maps.floats.float_conversion import exact
-        from kahanmaps.plots.drifts.drift import plot_drift, small_start, survey_drift
-        from kahanmaps.plots.drifts.drift_functions import known_functions
-
-        file, value = as_file(system).real_approximation, resolve_eps(eps, time_step, h, floats=True)
-        if value is None:
-            raise InputError("found no eps, expected eps= or h=, e.g. h=0.1")
-        value, point, count = rational(value), either(start=start, x0=x0), either(steps=steps, n=n)
-        if point is None:
-            point = small_start(file.system, value)
-        point = [exact(float(x)) if isinstance(x, float) else x for x in as_point(point, file.variables)]
-        functions = known_functions(file, value)
-        if not functions:
-            raise InputError(f"found no known integral of {file.name}: km.find_integrals(system) searches for some")
-        survey = survey_drift(file.system, value, point, 10_000 if count is None else count, functions, methods)
-        return _axes(plot_drift(survey))
+        _require(result, Comparison, "a result: km.plot.compare(km.compare(...))")
+        return _axes(plot_comparison(result, show=show, scale=scale))
 
     def commute(self, system: SystemLike, other: SystemLike | None = None, *, x0: Any, eps: Any, n: int = 1) -> Axes:
         """Draw the square x, Phi_f x, Phi_g x with its fourth corners, of two systems or of a member of the family."""
@@ -150,7 +120,7 @@ class Plot(AttributeHints):
         return public_function(plot_orbits, "portrait")(given, *others, **options)  # type: ignore[no-any-return]
 
 
-for _name in ("degrees", "heights", "scan", "drift", "commute", "invariant_curves", "rotation", "orbit"):
+for _name in ("degrees", "heights", "scan", "compare", "commute", "invariant_curves", "rotation", "orbit"):
     setattr(Plot, _name, public_function(getattr(Plot, _name), f"plot.{_name}"))
 
 

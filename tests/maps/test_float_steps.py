@@ -21,7 +21,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.maps.floats import steps
-from kahanmaps.maps.floats.classical import ClassicalOrbit
+from kahanmaps.maps.floats.classical import METHODS, MethodEnsemble, composition, separated
 from kahanmaps.maps.floats.float_conversion import exact
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, to_floats
 from kahanmaps.maps.floats.planar_blocks import planar_blocks
@@ -29,6 +29,7 @@ from kahanmaps.maps.floats.straight_line_program import StepChecks, StraightLine
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 needs_numba = pytest.mark.skipif(not has_numba(), reason="numba is not installed")
@@ -265,15 +266,16 @@ SQUARE = QuadraticSystem.from_text(["x"], ["x^2"])
 
 
 def walk(system, eps, start, steps, method):
-    orbit = ClassicalOrbit(system, eps, start, steps, method)
-    return np.concatenate([x for _, x in orbit.portions()]), orbit.end
+    ensemble = MethodEnsemble(system, eps, [start], method, kernel="numpy")
+    points = np.concatenate([x[:, 0] for x in ensemble.records(steps, 1)])
+    return points[np.isfinite(points).all(axis=1)], ensemble.end(0)
 
 
 def test_a_midpoint_equation_without_solution_ends_the_orbit():
     # y = x + y^2/2 with x = 10 has no real solution.
     x, end = walk(SQUARE, "1/2", [10], 100, "midpoint")
     assert (end.status, end.steps, len(x)) == ("singular", 0, 1)
-    assert "midpoint equation" in end.message
+    assert "equations of midpoint" in end.message
 
 
 def butcher(f, h, x):
@@ -391,3 +393,38 @@ SINGULAR = [["..", "**"], [".*", ".*"], ["**.", "**.", "**."], ["***", "*..", "*
 def test_a_matrix_that_its_zeros_make_singular_is_reported(pattern):
     assert code_of(pattern, careful=True).outputs[-2] is True
     assert code_of(pattern, careful=False).outputs[-1] is False
+
+
+@pytest.mark.parametrize("method", ["yoshida4", "suzuki4", "yoshida6"])
+def test_a_composition_satisfies_the_conditions_of_its_order(method):
+    shares = composition(method)
+    assert sum(shares, fmpq(0)) == 1
+    assert shares == shares[::-1]
+    # A symmetric composition has the order 4 if the cubes add up to 0, the order 6 only if the fifth powers do, too;
+    # the shares are rounded to 80 bits and more.
+    powers = (3, 5) if METHODS[method].order == 6 else (3,)
+    assert all(abs(sum(share**power for share in shares)) < fmpq(1, 2**70) for power in powers)
+    assert abs(sum(share**5 for share in shares)) > fmpq(1, 100) or method == "yoshida6"
+
+
+@pytest.mark.parametrize("method", ["kahan", "midpoint", "gauss4", "stormer-verlet", "yoshida6"])
+def test_symmetric_methods_are_inverted_by_minus_eps_and_euler_is_not(method):
+    system = QuadraticSystem.from_text(["q", "p"], ["p", "-q - q^2"])
+    halves = (frozenset({0}), frozenset({1}))
+    for name, is_symmetric in ((method, True), ("euler", False), ("symplectic-euler", False)):
+        forth = MethodEnsemble(system, "1/20", [["1/3", "1/4"]], name, halves=halves, kernel="numpy")
+        forth.advance(10)
+        back = MethodEnsemble(system, "-1/20", forth.x, name, halves=halves, kernel="numpy")
+        back.advance(10)
+        assert (abs(back.x - [1 / 3, 1 / 4]).max() < 1e-13) == is_symmetric
+
+
+def test_positions_and_momenta_are_found_in_any_order_and_scale_and_reasons_are_given():
+    def of(H, J=None, names=("q", "p")):
+        hamiltonian = CubicHamiltonian(parse_polynomial(H, names), J or standard_structure(2))
+        return separated(hamiltonian.system, hamiltonian)
+
+    assert of("p^2/2 + q^3") == (frozenset({0}), frozenset({1}))
+    assert of("p^2/2 + q^3", fmpq_mat([[0, 3], [-3, 0]]), ("p", "q")) == (frozenset({0}), frozenset({1}))
+    assert of("p*q + q^3") == "H is not of the form T(p) + V(q): p would be a position and a momentum"
+    assert "no Hamiltonian form" in separated(SQUARE, None)

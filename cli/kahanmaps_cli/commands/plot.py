@@ -1,4 +1,4 @@
-"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | rotation | section | commute."""
+"""kahanmaps plot portrait | invariant-curves | compare | heights | degrees | scan | rotation | section | commute."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import commute, drift, growth, invariant_curves, portrait, rotation, scan, section
+from kahanmaps_cli.pictures import commute, compare, growth, invariant_curves, portrait, rotation, scan, section
 
 
 class PlotCommands(SuggestingGroup):
@@ -15,6 +15,7 @@ class PlotCommands(SuggestingGroup):
 
     removed: ClassVar = {
         "batch": "kahanmaps batch export writes tables for pandas and matplotlib",
+        "drift": "kahanmaps plot compare draws the drift of more methods, errors against the step, and work",
         "recipe": "exiftool, or any program that shows metadata, prints the command of a picture (its description)",
     }
 
@@ -35,7 +36,7 @@ def command() -> None:
 for _command in (
     portrait.command,
     invariant_curves.command,
-    drift.command,
+    compare.command,
     growth.heights,
     growth.degrees,
     scan.command,

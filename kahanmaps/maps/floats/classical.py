@@ -1,109 +1,350 @@
-"""Classical one-step methods in floating point, for comparison: explicit RK4 and implicit midpoint.
+"""One-step methods for quadratic vector fields in floating point, to be compared with Kahan's; time step h = 2 eps.
 
-Both use the time step h = 2 eps. The midpoint equation y = x + (h/2) f(y), x~ = x + h f(y), is solved by Newton's
-method from y = x until the corrections are round-off; the orbit ends if Newton's method does not converge.
+The step of each method is a straight-line program (straight_line_program.py), so that it runs as the Kahan map does: as
+numpy code, or compiled. The equations of implicit methods are quadratic; they are solved by Newton's method from the
+step of Kahan's method: an iteration with correction d leaves exactly the residual h a_ij Q(d, d), so that the program
+knows when it has converged to rounding. The fast step takes a few iterations; where they do not suffice, the careful
+step takes more of them, and where it does not converge either, the orbit ends.
+Sources: hairer-lubich-wanner-2006 for the methods, their orders and the coefficients of compositions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import reduce
+from math import sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
+from flint import fmpq, fmpz
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.errors import InputError, counted
+from kahanmaps.errors import InputError
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
-from kahanmaps.maps.orbits.iteration import OrbitEnd, require_steps
+from kahanmaps.maps.floats.steps import SINGULAR, FloatStep, map_step
+from kahanmaps.maps.floats.straight_line_program import StepChecks, extreme, is_zero, solve
+from kahanmaps.maps.kahan import KahanFamily
+from kahanmaps.maps.orbits.iteration import OrbitEnd
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-METHODS = {"rk4": "explicit RK4", "midpoint": "implicit midpoint"}
-_PORTION = 20_000
-_MAX_CORRECTIONS = 50
-_ROUND_OFF = 4e-16  # relative size of a correction after which the iteration stops
-_STALLED = 1e-10  # relative size below which a correction that does not decrease is round-off
+_ROUNDING = 2.0**-52  # relative size of a residual, below which the equations are solved
+_STALLED = 1e-10  # relative size below which the last correction of a careful step is round-off
+_CAREFUL_ITERATIONS = 8
 
 
-class ClassicalOrbit:
-    """The orbit of an initial point under RK4 or the implicit midpoint rule, with time step 2 eps, in double precision.
+class Method(NamedTuple):
+    """A one-step method: its name in tables, its order, and its work per step.
 
-    `method` is "rk4" or "midpoint"; `start` and `eps` are exact. Iterate once over `portions`, then read `end`.
-    Raises InputError for invalid values.
-
-    >>> orbit = ClassicalOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/20", [1], 10, "midpoint")
-    >>> points = np.concatenate([x for _, x in orbit.portions()])
-    >>> points.shape, round(float(points[-1, 0]), 10), round((1.05 / 0.95) ** 10, 10)
-    ((11, 1), 2.7205514142, 2.7205514142)
-    >>> orbit.end.status
-    'completed'
+    `evaluations` counts evaluations of f; each part of a separable f counts by its share of the equations as 1/2.
+    `systems` counts linear systems, each of them with f' evaluated at every stage.
     """
 
-    def __init__(self, system: QuadraticSystem, eps: Any, start: Sequence[Any], steps: int, method: str) -> None:
-        require_steps(steps)
-        if method not in METHODS:
-            raise InputError(f"found the method {str(method)[:40]!r}, expected {' or '.join(METHODS)}")
-        if len(start) != system.dim:
-            raise InputError(f"found a point with {counted(len(start), 'coordinate')}, expected {system.dim}")
-        self.steps, self.method = steps, method
-        self.end: OrbitEnd | None = None
-        self._dim = system.dim
-        self._h = to_float(2 * rational(eps))
-        self._start = to_floats(start)
-        self._field = VectorField(system)
+    title: str
+    order: int
+    evaluations: float
+    systems: int = 0
 
-    def portions(self) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the step reached and the points (count, dim) since the previous portion; first the initial point."""
-        yield 0, self._start[None].copy()
-        take = self._rk4 if self.method == "rk4" else self._midpoint
-        step, x = 0, self._start
-        while step < self.steps:
-            out = np.empty((min(_PORTION, self.steps - step), self._dim))
-            done = 0
-            with np.errstate(all="ignore"):  # an overflow is a status, not a warning
-                while done < len(out):
-                    image = take(x)
-                    if image is None or not np.isfinite(image).all():
-                        break
-                    x = out[done] = image
-                    done += 1
-            step += done
-            if done:
-                yield step, out[:done]
-            if done < len(out):
-                self.end = OrbitEnd("overflow", step, f"step {step + 1} leaves the range of floating-point numbers")
-                if image is None:
-                    sentence = f"step {step + 1}: Newton's method finds no solution of the midpoint equation"
-                    self.end = OrbitEnd("singular", step, sentence)
-                return
-        self.end = OrbitEnd("completed", step, counted(step, "step"))
 
-    def _rk4(self, x: FloatArray) -> FloatArray | None:
-        f, h = self._field, self._h
-        a = f(x)
-        b = f(x + 0.5 * h * a)
-        c = f(x + 0.5 * h * b)
-        d = f(x + h * c)
-        image: FloatArray = x + h / 6.0 * (a + 2.0 * (b + c) + d)
-        return image
+METHODS = {
+    "kahan": Method("Kahan", 2, 1, 1),
+    "normal-form": Method("Kahan, normal form", 2, 1, 1),
+    "euler": Method("explicit Euler", 1, 1),
+    "symplectic-euler": Method("symplectic Euler", 1, 1),
+    "stormer-verlet": Method("Stormer-Verlet", 2, 1.5),
+    "midpoint": Method("implicit midpoint", 2, 3, 3),
+    "rk4": Method("RK4", 4, 4),
+    "gauss4": Method("Gauss 4", 4, 5, 3),
+    "yoshida4": Method("Kahan, Yoshida 4", 4, 3, 3),
+    "suzuki4": Method("Kahan, Suzuki 4", 4, 5, 5),
+    "yoshida6": Method("Kahan, Yoshida 6", 6, 7, 7),
+}
+IMPLICIT = {"midpoint", "gauss4"}
+SEPARABLE = {"symplectic-euler", "stormer-verlet"}
 
-    def _midpoint(self, x: FloatArray) -> FloatArray | None:
-        f, h = self._field, self._h
-        identity = np.eye(self._dim)
-        y, last = x, np.inf
-        for _ in range(_MAX_CORRECTIONS):
-            try:
-                change = np.linalg.solve(identity - 0.5 * h * f.jacobian(y), x - y + 0.5 * h * f(y))
-            except np.linalg.LinAlgError:
-                return None
-            y = y + change
-            # Corrections stop decreasing at the rounding error, which may exceed the tolerance. A correction that no
-            # longer decreases is accepted if it is small enough.
-            size, scale = np.abs(change).max(), np.abs(y).max()
-            if size <= _ROUND_OFF * scale or (size >= last and size <= _STALLED * scale):
-                image: FloatArray = x + h * f(y)
-                return image
-            last = size
-        return None
+_TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Runge-Kutta methods
+    "euler": ([[]], [1.0]),
+    "rk4": ([[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
+}
+_ROOT3 = sqrt(3.0)
+_GAUSS = [[0.25, 0.25 - _ROOT3 / 6], [0.25 + _ROOT3 / 6, 0.25]]
+_NODES = [0.5 - _ROOT3 / 6, 0.5 + _ROOT3 / 6]
+# Solution A of order 6, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
+_YOSHIDA6 = ["-1.17767998417887100694641568", "0.23557321335935813368479318", "0.78451361047755726381949763"]
+
+
+def composition(method: str) -> list[fmpq]:
+    """Return the shares of the time step that a symmetric composition of Kahan steps takes one after the other.
+
+    The shares, rational approximations beyond double precision, add up to 1 exactly.
+
+    >>> [float(share.p) / float(share.q) for share in composition("yoshida4")]
+    [1.3512071919596578, -1.7024143839193153, 1.3512071919596578]
+    """
+
+    if method == "yoshida6":
+        side = [fmpq(int(text.replace(".", "")), 10 ** len(text.partition(".")[2])) for text in reversed(_YOSHIDA6)]
+    else:  # k steps of 1/(k - k^(1/3)), one back, and k of them again; half as many on each side
+        k = 4 if method == "suzuki4" else 2
+        side = [1 / (k - fmpq(fmpz(k << 240).root(3), 1 << 80))] * (k // 2)
+    return [*side, 1 - 2 * sum(side, fmpq(0)), *reversed(side)]
+
+
+def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
+    """Return the numbers of evaluations of f and of linear systems in steps, some of them with more iterations.
+
+    >>> work("midpoint", 100), work("midpoint", 100, 1)
+    ((300, 300), (308, 308))
+    """
+    what, stages = METHODS[method], 2 if method == "gauss4" else 1
+    more = repeated * _CAREFUL_ITERATIONS
+    return what.evaluations * steps + stages * more, what.systems * steps + more
+
+
+class MethodEnsemble(FloatEnsemble):
+    """The orbits of many initial points under a method of `METHODS` other than "normal-form", with time step 2 eps.
+
+    `eps` is exact, `halves` the two groups of variables of a separable system (`separated`), for the methods that need
+    them; the other arguments are those of FloatEnsemble. The steps of an orbit in which an implicit method needed more
+    iterations than usual count as near-singular.
+
+    >>> growth = QuadraticSystem.from_text(["x"], ["x"])
+    >>> ensemble = MethodEnsemble(growth, "1/20", [[1]], "midpoint", kernel="numpy")
+    >>> ensemble.advance(10)
+    >>> round(float(ensemble.x[0, 0]), 10), round((1.05 / 0.95) ** 10, 10)
+    (2.7205514142, 2.7205514142)
+    """
+
+    def __init__(
+        self,
+        system: QuadraticSystem,
+        eps: Any,
+        starts: Any,
+        method: str,
+        *,
+        halves: tuple[frozenset[int], frozenset[int]] | None = None,
+        kernel: str | None = None,
+        threads: int | None = None,
+    ) -> None:
+        if method not in METHODS or method == "normal-form" or (method in SEPARABLE and halves is None):
+            raise InputError(f"found the method {str(method)[:40]!r}, expected one of {', '.join(METHODS)}")
+        self._made_of = system, rational(eps), method, halves
+        super().__init__(system, eps, starts, kernel=kernel, threads=threads)
+
+    def _build_step(self) -> None:
+        self._step = method_step(*self._made_of)
+        self._machine_code: Any = None
+
+    def end(self, orbit: int) -> OrbitEnd:
+        """Return how one orbit ended so far."""
+        end, method = super().end(orbit), self._made_of[2]
+        if self._batch.status[orbit] == SINGULAR and method in IMPLICIT:
+            sentence = f"step {end.steps + 1}: Newton's method finds no solution of the equations of {method}"
+            return OrbitEnd("singular", end.steps, sentence)
+        return end
+
+
+def method_step(
+    system: QuadraticSystem, eps: fmpq, method: str, halves: tuple[frozenset[int], frozenset[int]] | None = None
+) -> FloatStep:
+    """Return the step of a method; see `MethodEnsemble` for the arguments."""
+    if method not in _TABLEAUS and method not in IMPLICIT and method not in SEPARABLE:
+        shares = [fmpq(1)] if method == "kahan" else composition(method)
+        family = KahanFamily(system)
+        return map_step([factor for share in shares for factor in family.at(eps * share).factors])
+    field, h = FieldProgram(system), to_float(2 * eps)
+    if method in SEPARABLE and halves is not None:
+        write = _separable(field, h, halves, method)
+    elif method in _TABLEAUS:
+        write = _explicit(field, h, *_TABLEAUS[method])
+    else:
+        write = _midpoint(field, h / 2) if method == "midpoint" else _gauss(field, h)
+    return FloatStep(system.dim, write)
+
+
+class FieldProgram:
+    """A quadratic vector field, its Jacobian and its quadratic part, to be written into straight-line programs.
+
+    `terms[i]` are pairs (coefficient, indices of at most two variables).
+    """
+
+    def __init__(self, system: QuadraticSystem) -> None:
+        self.terms: list[list[tuple[float, tuple[int, ...]]]] = []
+        for polynomial in system.rhs:
+            self.terms.append([])
+            for monomial, coefficient in polynomial.terms():
+                indices = tuple(k for k, power in enumerate(monomial) for _ in range(int(power)))
+                self.terms[-1].append((to_float(coefficient), indices))
+
+    def __call__(self, x: Sequence[Any], degrees: tuple[int, ...] = (0, 1, 2)) -> list[Any]:
+        """Return f(x), or the sum of its terms of these degrees."""
+        kept = [[(c, indices) for c, indices in row if len(indices) in degrees] for row in self.terms]
+        return [_sum(c * reduce(lambda a, k: a * x[k], indices, 1.0) for c, indices in row) for row in kept]
+
+    def jacobian(self, x: Sequence[Any]) -> list[list[Any]]:
+        """Return the rows of f'(x)."""
+        rows = []
+        for terms in self.terms:
+            row: list[Any] = [0.0] * len(self.terms)
+            for c, indices in terms:
+                for k, j in enumerate(indices):
+                    row[j] = row[j] + c * reduce(lambda a, i: a * x[i], indices[:k] + indices[k + 1 :], 1.0)
+            rows.append(row)
+        return rows
+
+
+def _sum(values: Any) -> Any:
+    return reduce(lambda a, b: a + b, values, 0.0)
+
+
+Write = Callable[[Sequence[Any], StepChecks], list[Any]]
+
+
+def _explicit(field: FieldProgram, h: float, rows: list[list[float]], weights: list[float]) -> Write:
+    def combined(x: Sequence[Any], factors: Sequence[float], slopes: Sequence[Sequence[Any]]) -> list[Any]:
+        return [x[i] + _sum(h * a * k[i] for a, k in zip(factors, slopes, strict=True) if a) for i in range(len(x))]
+
+    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+        slopes: list[list[Any]] = []
+        for row in rows:
+            slopes.append(field(combined(x, row, slopes)))
+        return combined(x, weights, slopes)
+
+    return write
+
+
+def _separable(field: FieldProgram, h: float, halves: tuple[frozenset[int], frozenset[int]], method: str) -> Write:
+    """Positions and momenta change in turn: positions by h first, or momenta by h/2 before and after them."""
+    positions, momenta = halves
+    moves = [(positions, h), (momenta, h)]
+    if method == "stormer-verlet":
+        moves = [(momenta, h / 2), (positions, h), (momenta, h / 2)]
+
+    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+        state = list(x)
+        for group, duration in moves:
+            slopes = field(state)
+            state = [y + duration * slopes[i] if i in group else y for i, y in enumerate(state)]
+        return state
+
+    return write
+
+
+def _midpoint(field: FieldProgram, eps: float) -> Write:
+    """y = x + z with z = eps f(x + z), x~ = x + 2 z; the first iteration from z = 0 is Kahan's step."""
+
+    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+        z: list[Any] = [0.0] * len(x)
+
+        def equations(y: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], list[Any]]:
+            rows = [[float(i == j) - eps * a for j, a in enumerate(row)] for i, row in enumerate(field.jacobian(y[0]))]
+            return rows, [eps * f - w for f, w in zip(field(y[0]), z, strict=True)]
+
+        def left(d: Sequence[Any]) -> list[Any]:
+            return [eps * q for q in field(d, (2,))]
+
+        _newton(x, z, equations, left, 3, checks)
+        return [a + 2.0 * w for a, w in zip(x, z, strict=True)]
+
+    return write
+
+
+def _gauss(field: FieldProgram, h: float) -> Write:
+    """z_i = h sum_j a_ij f(x + z_j), x~ = x + sqrt(3) (z_2 - z_1); from the parabola through a step of Kahan's."""
+
+    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
+        n = len(x)
+        slopes = field(x)
+        rows = [
+            [*(float(i == j) - h / 2 * a for j, a in enumerate(row)), h * slopes[i]]
+            for i, row in enumerate(field.jacobian(x))
+        ]
+        step = solve(rows, lambda: 1.0, StepChecks(False))
+        z = [c * h * slopes[i] + c * c * (step[i] - h * slopes[i]) for c in _NODES for i in range(n)]
+
+        def equations(y: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], list[Any]]:
+            values, jacobians = [field(part) for part in y], [field.jacobian(part) for part in y]
+            rows, residuals = [], []
+            for r, weights in enumerate(_GAUSS):
+                for i in range(n):
+                    row = [
+                        float((r, i) == (s, j)) - h * weights[s] * jacobians[s][i][j] for s in (0, 1) for j in range(n)
+                    ]
+                    rows.append(row)
+                    residuals.append(_sum(h * weights[s] * values[s][i] for s in (0, 1)) - z[r * n + i])
+            return rows, residuals
+
+        def left(d: Sequence[Any]) -> list[Any]:
+            second = [field(d[:n], (2,)), field(d[n:], (2,))]
+            return [h * (w[0] * a + w[1] * b) for w in _GAUSS for a, b in zip(*second, strict=True)]
+
+        _newton(x, z, equations, left, 2, checks)
+        return [a + _ROOT3 * (z[n + i] - z[i]) for i, a in enumerate(x)]
+
+    return write
+
+
+def _newton(x: Sequence[Any], z: list[Any], equations: Any, left: Any, iterations: int, checks: StepChecks) -> None:
+    """Improve the increments z of the stages x + z in place, and check that they have converged.
+
+    `equations` returns the rows of the matrix and the residuals at the stages, `left` the residual that a correction
+    leaves. Pivots are not checked for their own sake: a bad elimination only slows Newton's method down.
+    """
+    n = len(x)
+    for _ in range(_CAREFUL_ITERATIONS if checks.careful else iterations):
+        stages = [[a + w for a, w in zip(x, z[k : k + n], strict=True)] for k in range(0, len(z), n)]
+        rows, residuals = equations(stages)
+        inner = StepChecks(False)
+        change = solve([[*row, r] for row, r in zip(rows, residuals, strict=True)], lambda: 1.0, inner)
+        z[:] = [a + b for a, b in zip(z, change, strict=True)]
+    size = reduce(lambda a, b: extreme("max", a, abs(b)), [*x, *z], 0.0)
+    if checks.careful:
+        for d in change:
+            if not is_zero(d):
+                checks.zero = checks.zero | (abs(d) > _STALLED * size)
+        checks.near = True
+    else:
+        checks.good = checks.good & inner.good
+        for rest in left(change):
+            if not is_zero(rest):
+                checks.good = checks.good & (abs(rest) <= _ROUNDING * size)
+
+
+def separated(
+    system: QuadraticSystem, hamiltonian: CubicHamiltonian | None
+) -> tuple[frozenset[int], frozenset[int]] | str:
+    """Return the positions and the momenta (indices of variables) of H = T(p) + V(q), or why there are none.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> file = load("henon_heiles")
+    >>> [sorted(group) for group in separated(file.system, file.hamiltonian)]
+    [[0, 1], [2, 3]]
+    >>> separated(load("euler_top").system, None)
+    'the system has no Hamiltonian form J grad H with constant J that is known'
+    """
+    if hamiltonian is None:
+        return "the system has no Hamiltonian form J grad H with constant J that is known"
+    n, names = system.dim, system.variables
+    # The derivative of a position depends on momenta only, and vice versa: colour the graph of these dependences.
+    neighbours: list[set[int]] = [set() for _ in range(n)]
+    for i, polynomial in enumerate(system.rhs):
+        for j in range(n):
+            if any(int(monomial[j]) for monomial in polynomial.monoms()) or hamiltonian.J[i, j] != 0:
+                neighbours[i].add(j)
+                neighbours[j].add(i)
+    color: dict[int, int] = {}
+    for first in range(n):
+        waiting = [(first, 0)] if first not in color else []
+        while waiting:
+            i, side = waiting.pop()
+            if i in color:
+                if color[i] != side:
+                    return f"H is not of the form T(p) + V(q): {names[i]} would be a position and a momentum"
+                continue
+            color[i] = side
+            waiting += [(j, 1 - side) for j in sorted(neighbours[i])]
+    return frozenset(i for i in color if color[i] == 0), frozenset(i for i in color if color[i] == 1)
 
 
 class VectorField:

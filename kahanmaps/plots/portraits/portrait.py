@@ -26,7 +26,7 @@ from kahanmaps.plots.style import COLOR_MAP, COLORS, MARKS, Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from kahanmaps.plots.drifts.drift_functions import WatchedFunction
+    from kahanmaps.plots.comparison.functions import WatchedFunction
 
 _MAX_NEIGHBOURS = (
     2000  # points: all pairs of points are compared; a curve through more points looks smooth without lines

@@ -9,17 +9,24 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
-from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.algebra.polynomials import RationalFunction, primitive_part
+from kahanmaps.algebra.printing import format_polynomial, format_rational_function
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.invariants.integrals_and_densities import CommutantIntegral, ModifiedHamiltonian, measured_integrals
-from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.invariants.integrals_and_densities import (
+    CommutantIntegral,
+    ModifiedHamiltonian,
+    measured_integrals,
+    normalized,
+)
+from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.steps import images_of
 from kahanmaps.plots.point_functions import PointFunction, point_function
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 _MAX_NAME = 30  # characters
+_EFFORT = -2  # of the search for integrals: it takes at most a few seconds
 
 
 class OfTheImage:
@@ -49,18 +56,11 @@ class OfTheImage:
         return value
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """Return the values, computed with one step of the Kahan map for all points at once."""
-        values = np.full(len(points), np.nan)
-        good = np.isfinite(points).all(axis=1)
-        if good.any():
-            x = points[good]
-            ensemble = FloatEnsemble(self._function.hamiltonian.system, self._eps, x, kernel="numpy")
-            ensemble.advance(1)
-            image = np.where((ensemble.failed_at >= 0)[:, None], np.nan, ensemble.x)
-            with np.errstate(all="ignore"):
-                computed = self._values(x, image)
-            values[good] = np.where(np.isfinite(computed), computed, np.nan)
-        return values
+        """Return the values at points (..., dim), computed with one step of the Kahan map for all points at once."""
+        rows = points.reshape(-1, points.shape[-1])
+        with np.errstate(all="ignore"):
+            computed = self._values(rows, images_of(self._function.map.at(self._eps), rows))
+        return np.where(np.isfinite(computed), computed, np.nan).reshape(points.shape[:-1])
 
 
 WatchedFunction = PointFunction | OfTheImage
@@ -91,6 +91,46 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     if hamiltonian is not None and "H" not in functions:
         functions["H"] = PointFunction("H", _as_function(hamiltonian, hamiltonian.H), eps)
     return functions
+
+
+def watched_functions(
+    file: SystemFile, eps: fmpq, progress: Callable[[str], None] = lambda _: None
+) -> tuple[list[WatchedFunction], dict[str, str]]:
+    """Return the known integrals of the Kahan map and of the flow, and the origin of each by name.
+
+    These are the `known_functions`, or the integrals that a quick search finds, normalized, and the limits for
+    eps -> 0 of those that depend on eps, which the flow conserves. The origin is "declared", "theorem", "found" or
+    "flow". `eps` is half the time step (exact).
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> watched_functions(load("euler_top"), fmpq(1, 10))[1]
+    {'(-F1 + 1)/eps^2': 'declared', 'x2^2 + 2*x3^2': 'flow', '(-F2/2 + 1/2)/eps^2': 'declared', 'x1^2 - x3^2': 'flow'}
+    """
+    found: list[WatchedFunction] = []
+    if file.hamiltonian is None and not measured_integrals(file):
+        progress("searching for integrals")
+        search = find_integrals(file, effort=_EFFORT)
+        found = [PointFunction(I.name, normalized(I.function, file.dim).function, eps) for I in search.integrals]
+    else:
+        found = known_functions(file, eps)
+    declared, hamiltonian = measured_integrals(file), file.hamiltonian
+    of_flow = [] if hamiltonian is None else [_as_function(hamiltonian, primitive_part(hamiltonian.H)[1])]
+    functions: list[WatchedFunction] = []
+    origins: dict[str, str] = {}
+    for function in found:
+        functions.append(function)
+        name = function.name
+        origins[name] = "declared" if name in declared else "flow" if name == "H" else "theorem"
+        if not (declared or hamiltonian):
+            origins[name] = "found"
+        if isinstance(function, PointFunction) and name != "H":
+            leading = normalized(function.function, file.dim).leading
+            if leading is not None and leading != function.function and leading not in of_flow:
+                of_flow.append(leading)
+                text = format_rational_function(leading)
+                functions.append(PointFunction(text if len(text) <= _MAX_NAME else f"limit of {name}", leading, eps))
+                origins[functions[-1].name] = "flow"
+    return functions, origins
 
 
 def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:

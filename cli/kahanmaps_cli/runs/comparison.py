@@ -1,0 +1,72 @@
+"""The options and the run that `compare` and `plot compare` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from kahanmaps import internals as lib
+from kahanmaps_cli import options as opt
+from kahanmaps_cli.params import ParameterKind, PointText
+from kahanmaps_cli.runs.ensemble_starts import read_starts
+
+comparison_options: Callable[[opt.F], opt.F] = opt.stack(
+    opt.system_options,
+    click.option(
+        "--start",
+        type=PointText(),
+        multiple=True,
+        metavar="X",
+        help="Initial point (default: a random point near the origin). Repeatable.",
+    ),
+    click.option(
+        "--starts", type=click.Path(), metavar="FILE", help="File of initial points, as for kahanmaps ensemble."
+    ),
+    opt.eps_options,
+    click.option(
+        "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps of each orbit."
+    ),
+    click.option(
+        "--methods",
+        type=ParameterKind("methods", lambda text: [name.strip() for name in text.split(",")]),
+        metavar="M1,M2,...",
+        help="Methods, all with the time step 2 eps: kahan, normal-form, euler, symplectic-euler, stormer-verlet, "
+        "midpoint, rk4, gauss4, yoshida4, suzuki4, yoshida6 (default: kahan,midpoint,rk4,gauss4,suzuki4,yoshida6).",
+    ),
+    opt.integral_option(
+        "Function whose drift is measured: an expression in the variables and eps, the name of a known integral, or "
+        "'known' for all (default: the known integrals, or those that a quick search finds). Repeatable."
+    ),
+    opt.seed_option,
+)
+
+
+def requested_comparison(options: dict[str, Any], progress: Callable[[str], None], **more: Any) -> lib.Comparison:
+    """Run the comparison that the options of `comparison_options` ask for."""
+    if options["start"] and options["starts"] is not None:
+        raise click.UsageError("give either --start X or --starts FILE")
+    file = opt.load_system(options["system"], options)
+    _ = file.real_approximation.system  # a map of another kind is refused first
+    starts: Any = options["start"] or None
+    if options["starts"] is not None:
+        starts = read_starts(options["starts"], file.variables)
+    return lib.compare(
+        file,
+        starts,
+        opt.the_eps(options["eps"], options["time_step"]),
+        options["steps"],
+        progress=progress,
+        **{"methods": options["methods"], "integrals": options["integrals"] or None, "seed": options["seed"], **more},
+    )
+
+
+def early_messages(result: lib.Comparison) -> list[str]:
+    """Return a sentence for each method with orbits that ended early."""
+    sentences = []
+    for run in result.runs:
+        if run.early:
+            number = "" if len(run.ends) == 1 else f" in {lib.counted(len(run.early), 'orbit')} of {len(run.ends)}"
+            sentences.append(f"{lib.METHODS[run.method].title} ended early{number}: {run.early[0].message}")
+    return sentences

@@ -1,0 +1,588 @@
+"""Numerical experiments with Kahan's method and others: drift of functions, errors, orders, work.
+
+All methods advance all initial points together, in the float engine (maps/floats). Nothing here is proved: numbers are
+measured in double precision, and do not depend on the kernel.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from math import log2, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.printing import csv_line, format_number, json_float
+from kahanmaps.atomic_files import atomic_write, write_atomically
+from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
+from kahanmaps.errors import InputError, counted
+from kahanmaps.maps.convention import either, eps_suffix, resolve_eps
+from kahanmaps.maps.floats.classical import IMPLICIT, METHODS, SEPARABLE, MethodEnsemble, separated, work
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.floats.float_conversion import FloatArray, exact, to_floats
+from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.maps.orbits.iteration import OrbitEnd
+from kahanmaps.plots.comparison.functions import WatchedFunction, requested_functions, watched_functions
+from kahanmaps.plots.portraits.trajectories import float_normal_form
+from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.taylor import solution
+
+DEFAULT_METHODS = ("kahan", "midpoint", "rk4", "gauss4", "suzuki4", "yoshida6")
+BINS = 200
+MAX_STEPS = 10**9
+MAX_FUNCTIONS = 12
+MAX_STARTS = 100_000
+_RANDOM_STARTS = 40
+_OF_ONE_SIZE = 5  # of them; the next ones are half as large
+_PROBE_STEPS = 1000
+_REFERENCE_STARTS = 4  # initial points from which errors are measured
+_SHORTER_TIMES = 6  # times, each half as long, for which the solution is computed
+_COARSEST, _FINEST = 1, 14  # logarithms to base 2 of the number of steps
+_MIN_SIZES = 5  # step sizes, before an order is regarded as settled
+_SETTLED = 0.004  # change of the slope from one step size to the next
+_ROUNDING = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
+_MIN_COMPILED_STEPS = 20_000
+_COLUMNS = ("kind", "method", "function", "eps", "step", "value", "evaluations")
+
+
+@dataclass(frozen=True, eq=False)
+class DriftCurve:
+    """The error of a function along the orbits of a method: the maximum in each bin of steps, and its step.
+
+    The error is exactly 0 if all values in the bin are equal to the initial values. Bins without values are omitted;
+    `undefined` counts points at which the function is undefined. `last` is the error at the last step (NaN if there is
+    none).
+    """
+
+    method: str
+    function: str
+    steps: NDArray[np.int64]
+    errors: FloatArray
+    undefined: int
+    last: float
+
+    @property
+    def largest(self) -> float:
+        """The largest error of all steps; NaN without values."""
+        return float(self.errors.max()) if len(self.errors) else float("nan")
+
+
+@dataclass(frozen=True)
+class StepError:
+    """The largest error of a method at a fixed time, after `steps` steps with half the time step `eps`.
+
+    `evaluations` counts evaluations of f for one initial point.
+    """
+
+    eps: fmpq
+    steps: int
+    error: float
+    evaluations: float
+
+
+@dataclass(frozen=True, eq=False)
+class MethodRun:
+    """What was measured for a method.
+
+    `ends` says how the orbit of each initial point ended; `evaluations` counts evaluations of f and `systems` linear
+    systems of all orbits, `repeated` steps in which an implicit method needed more iterations, `failures` orbits that
+    ended because Newton's method found no solution. `errors` are those at the time of the reference, by decreasing step
+    size; `order` is the slope between the last two errors above rounding (None: there are none). `seconds` is None
+    unless a clock was given.
+    """
+
+    method: str
+    ends: tuple[OrbitEnd, ...]
+    evaluations: float
+    systems: int
+    repeated: int
+    failures: int
+    errors: tuple[StepError, ...]
+    order: float | None
+    seconds: float | None
+
+    @property
+    def early(self) -> list[OrbitEnd]:
+        """The ends of the orbits that did not complete their steps."""
+        return [end for end in self.ends if not end.is_complete]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(PrintableResult):
+    """The result of `compare`.
+
+    `relative` is true for functions whose errors are relative to I(x_0) (for all initial points); they are absolute
+    otherwise. `labels` are the names of the functions in plots, `origins` says where each comes from: declared,
+    theorem, found, flow or requested. `time` is the time at which errors are measured, None without a reference;
+    `skipped` are methods that the system does not admit, with the reason. `eps` is half the time step (exact).
+    """
+
+    file: SystemFile = field(repr=False)
+    eps: fmpq
+    starts: tuple[tuple[fmpq, ...], ...]
+    steps: int
+    labels: Mapping[str, str]
+    origins: Mapping[str, str]
+    relative: Mapping[str, bool]
+    runs: tuple[MethodRun, ...]
+    curves: tuple[DriftCurve, ...]
+    time: fmpq | None
+    skipped: Mapping[str, str]
+    notes: tuple[str, ...]
+
+    def drift(self, method: str, function: str) -> DriftCurve:
+        """Return the drift of a function along the orbits of a method."""
+        return next(curve for curve in self.curves if (curve.method, curve.function) == (method, function))
+
+    def error_at(self, run: MethodRun) -> float | None:
+        """Return the error with the step size of the comparison."""
+        return next((entry.error for entry in run.errors if entry.eps == self.eps), None)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """Return all measured curves as rows of one table, whose kind is drift or error."""
+        rows: list[tuple[Any, ...]] = []
+        for curve in self.curves:
+            for step, value in zip(curve.steps.tolist(), curve.errors.tolist(), strict=True):
+                rows.append(("drift", curve.method, curve.function, format_number(self.eps), step, value, None))
+        for run in self.runs:
+            for at in run.errors:
+                rows.append(("error", run.method, None, format_number(at.eps), at.steps, at.error, at.evaluations))
+        return [dict(zip(_COLUMNS, row, strict=True)) for row in rows]
+
+    def write(self, path: str | Path) -> None:
+        """Write `rows` to a file, whose suffix is .csv or .parquet (which needs pyarrow)."""
+        rows, suffix = self.rows(), Path(path).suffix
+        if suffix not in (".csv", ".parquet"):
+            raise InputError(f"found {path}, expected a name that ends with .csv or .parquet")
+        columns = {name: [row[name] for row in rows] for name in _COLUMNS}
+        if suffix == ".csv":
+            lines = zip(*([("" if x is None else str(x)) for x in column] for column in columns.values()), strict=True)
+            write_atomically(path, "".join(map(csv_line, [_COLUMNS, *lines])).encode())
+            return
+        try:
+            arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+        except ImportError as error:
+            raise InputError(f"parquet needs pyarrow ({error}): pip install pyarrow, or write .csv") from error
+        with atomic_write(path) as stream:
+            parquet.write_table(arrow.table(columns), stream)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data, without the curves of the drift, which `rows` has."""
+        methods = []
+        for run in self.runs:
+            curves = [curve for curve in self.curves if curve.method == run.method]
+            methods.append(
+                {
+                    "method": run.method,
+                    "title": METHODS[run.method].title,
+                    "order": METHODS[run.method].order,
+                    "measured_order": run.order,
+                    "errors": [
+                        {
+                            "eps": format_number(at.eps),
+                            "steps": at.steps,
+                            "error": at.error,
+                            "evaluations": at.evaluations,
+                        }
+                        for at in run.errors
+                    ],
+                    "drift": {
+                        c.function: {"largest": json_float(c.largest), "last": json_float(c.last)} for c in curves
+                    },
+                    "evaluations": run.evaluations,
+                    "systems": run.systems,
+                    "repeated": run.repeated,
+                    "newton_failures": run.failures,
+                    "completed": len(run.ends) - len(run.early),
+                    "ended": [{"orbit": k, **end.to_json()} for k, end in enumerate(run.ends) if not end.is_complete][
+                        :20
+                    ],
+                    **({} if run.seconds is None else {"seconds": run.seconds}),
+                }
+            )
+        return {
+            "starts": [[format_number(entry) for entry in start] for start in self.starts[:20]],
+            "orbits": len(self.starts),
+            "steps": self.steps,
+            "time": None if self.time is None else format_number(self.time),
+            "functions": [
+                {"name": name, "origin": self.origins[name], "relative": self.relative[name]} for name in self.labels
+            ],
+            "methods": methods,
+            "reasons": dict(self.skipped),
+            "notes": list(self.notes),
+        }
+
+    def tables(self) -> Iterator[list[list[str]]]:
+        """Yield the tables of the result as rows of cells: methods; drift of each function."""
+        head = ["# method", "order", "measured", "error", "f per step", "systems per step", "orbits"]
+        timed = any(run.seconds is not None for run in self.runs)
+        rows = [head + ["seconds"] * timed]
+        for run in self.runs:
+            steps = max(1, sum(end.steps for end in run.ends))
+            error = self.error_at(run)
+            cells = [METHODS[run.method].title, str(METHODS[run.method].order)]
+            cells += ["-" if run.order is None else f"{run.order:.2f}", "-" if error is None else f"{error:.2g}"]
+            cells += [f"{run.evaluations / steps:.4g}", f"{run.systems / steps:.4g}"]
+            cells += [f"{len(run.ends) - len(run.early)} of {len(run.ends)}"]
+            rows.append(cells + ([] if run.seconds is None else [f"{run.seconds:.3f}"]))
+        yield rows
+        if self.labels:
+            rows = [["# drift", *self.labels]]
+            for run in self.runs:
+                rows.append([METHODS[run.method].title])
+                rows[-1] += [f"{self.drift(run.method, name).largest:.2g}" for name in self.labels]
+            yield rows
+
+    @property
+    def text(self) -> str:
+        """The tables and notes, as `print` shows them."""
+        lines = [f"# {self.file.name}{eps_suffix(self.eps)}, {counted(self.steps, 'step')}, measured in floating point"]
+        for rows in self.tables():
+            lines += ["\t".join(cells) for cells in rows]
+        return "\n".join([*lines, *self.remarks()])
+
+    def __str__(self) -> str:
+        return self.text
+
+    def remarks(self) -> list[str]:
+        """Return sentences on what the numbers mean and on what is missing."""
+        sentences = []
+        if self.time is not None:
+            number = format_number(self.time)
+            sentences.append(
+                f"error: at time {number}, against Taylor solutions in balls, from the first initial points"
+            )
+        absolute = [name for name in self.labels if not self.relative[name]]
+        if absolute:
+            sentences.append(f"absolute drift: {', '.join(absolute)}, for it is 0 at an initial point")
+        for run in self.runs:
+            if run.failures:
+                sentences.append(
+                    f"{METHODS[run.method].title}: Newton's method failed in {counted(run.failures, 'orbit')}"
+                )
+        return [*sentences, *(f"{METHODS[m].title} left out: {why}" for m, why in self.skipped.items()), *self.notes]
+
+
+def compare(
+    system: SystemLike,
+    start: Any = None,
+    eps: Any = None,
+    steps: int | None = None,
+    *,
+    x0: Any = None,
+    time_step: Any = None,
+    h: Any = None,
+    n: int | None = None,
+    methods: Sequence[str] | None = None,
+    integrals: Sequence[tuple[str, str]] | None = None,
+    linear_bins: bool = False,
+    orders: bool = True,
+    seed: int = 0,
+    kernel: str | None = None,
+    clock: Callable[[], float] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Comparison:
+    """Compare Kahan's method with others: drift of integrals, errors, measured orders and work.
+
+    Args:
+        system: a quadratic system.
+        start, x0: one initial point or several, exact numbers; floats are taken exactly. By default a random small one.
+        eps: an exact number, half the time step, also of all other methods.
+        time_step, h: the time step 2 eps, instead of eps.
+        steps, n: the number of steps over which the drift is measured, by default 10,000.
+        methods: names in `METHODS`, by default kahan, midpoint, rk4, gauss4, suzuki4 and yoshida6.
+        integrals: pairs (name, text) of functions; by default the known integrals, or those that a quick search finds.
+        linear_bins: bins of equal length for the drift; by default they grow with the step.
+        orders: measure errors and orders, which needs the solution as reference.
+        seed: the random seed of the initial point.
+        kernel: "numpy" or "numba" (default: numba if installed); the numbers are the same.
+        clock: a function such as `time.perf_counter`, by which the seconds of each method are measured.
+        progress: called with a sentence at each stage.
+
+    Returns:
+        A `Comparison`: errors |I(x_n) - I(x_0)|/|I(x_0)| of functions, of which the maximum over each of about 200 bins
+        of steps and over all initial points is kept, and errors against a Taylor solution in balls. All are measured
+        in floating point.
+
+    Raises:
+        InputError: for invalid values, and if a function is undefined at an initial point.
+
+    >>> result = compare("euler_top", [1, "1/2", "1/3"], "1/20", 1000, methods=["kahan", "rk4"], kernel="numpy")
+    >>> [f"{run.method} {run.order:.2f}" for run in result.runs]
+    ['kahan 2.00', 'rk4 4.00']
+    >>> for curve in result.curves[::4]:
+    ...     print(curve.method, curve.function, curve.largest < 1e-13)
+    kahan (-F1 + 1)/eps^2 True
+    rk4 (-F1 + 1)/eps^2 False
+    """
+    file = as_file(system).real_approximation
+    field, value = file.system, resolve_eps(eps, time_step, h, floats=True)
+    if value is None:
+        raise InputError("found no eps, expected eps= or h=, e.g. h=0.1")
+    value, count = rational(value), either(steps=steps, n=n)
+    count = 10_000 if count is None else count
+    if value == 0:
+        raise InputError("found eps = 0, expected another number: nothing moves")
+    if not isinstance(count, int) or not 1 <= count <= MAX_STEPS:
+        raise InputError(f"found {count} steps, expected 1 to {MAX_STEPS}")
+    starts = _starts(field, either(start=start, x0=x0), value, seed)
+    names, skipped, ensemble_of = _methods(file, value, starts, methods, kernel)
+    notes: list[str] = []
+    if integrals is None:
+        functions, origins = watched_functions(file, value, progress)
+        if not functions:
+            notes.append(
+                "no drift: no integral of the map is known, and a quick search found none (--integral gives one)"
+            )
+    else:
+        functions = requested_functions(file, value, integrals)
+        origins = {function.name: "requested" for function in functions}
+    if len(functions) > MAX_FUNCTIONS:
+        notes.append(f"shown: {MAX_FUNCTIONS} of {len(functions)} functions")
+        functions = functions[:MAX_FUNCTIONS]
+    initial, relative = _initial(functions, starts)
+    time, references = _references(field, starts[:_REFERENCE_STARTS], value, progress) if orders else (None, None)
+    if orders and time is None:
+        notes.append("no errors: no reference, for the solution moves not at all, or reaches a pole at once")
+    runs, curves = [], []
+    edges = _edges(count, linear_bins)
+    for name in names:
+        watched = [_Bins(edges) for _ in functions]
+        began = None if clock is None else clock()
+        ensemble = ensemble_of(name, value, len(starts), count)
+        for first, points in _portions(ensemble, count, bool(functions)):
+            with np.errstate(all="ignore"):
+                for function, bins, (origin, scale) in zip(functions, watched, initial, strict=True):
+                    bins.add(first, np.abs(function(points) - origin) / scale)
+            progress(f"{METHODS[name].title}: step {ensemble.step} of {count}")
+        seconds = None if clock is None or began is None else clock() - began
+        ends = tuple(ensemble.end(k) for k in range(len(starts)))
+        for function, bins in zip(functions, watched, strict=True):
+            curves.append(bins.curve(name, function.name))
+        errors: tuple[StepError, ...] = ()
+        order = None
+        if time is not None and references is not None:
+            errors, order = _errors(name, ensemble_of, time, value, references, progress)
+        repeated = int(ensemble.near_singular.sum()) if name in IMPLICIT else 0
+        evaluations, systems = work(name, sum(end.steps for end in ends), repeated)
+        failures = sum(end.status == "singular" for end in ends) if name in IMPLICIT else 0
+        runs.append(MethodRun(name, ends, evaluations, systems, repeated, failures, errors, order, seconds))
+    labels = {function.name: function.label for function in functions}
+    kept = {name: origins[name] for name in labels}
+    return Comparison(
+        file, value, starts, count, labels, kept, relative, tuple(runs), tuple(curves), time, skipped, tuple(notes)
+    )
+
+
+def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq, ...]:
+    """Return a random initial point with small rational coordinates, determined by the seed.
+
+    It is the first of 40 candidates, decreasing in size, from which RK4 completes a thousand steps, so that methods can
+    be compared; the first candidate if there is none. `eps` is half the time step.
+
+    >>> small_start(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]), "1/10")
+    (1/2, 2/3)
+    """
+    rng = random.Random(f"drift {seed}")
+    starts = []
+    for k in range(_RANDOM_STARTS):
+        sizes = ((rng.choice((-1, 1)) * rng.randint(1, 6), rng.randint(9, 16)) for _ in range(system.dim))
+        starts.append(tuple(fmpq(p, q << k // _OF_ONE_SIZE) for p, q in sizes))
+    ensemble = MethodEnsemble(system, eps, starts, "rk4", kernel="numpy")
+    ensemble.advance(_PROBE_STEPS)
+    complete = np.flatnonzero(ensemble.failed_at < 0)
+    return starts[complete[0] if len(complete) else 0]
+
+
+def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[tuple[fmpq, ...], ...]:
+    """Return the initial points as exact numbers."""
+    if given is None:
+        return (small_start(system, eps, seed),)
+    rows = given.tolist() if isinstance(given, np.ndarray) else given
+    rows = rows if len(rows) and isinstance(rows[0], list | tuple | np.ndarray) else [rows]
+    if len(rows) > MAX_STARTS:
+        raise InputError(f"found {len(rows)} initial points, expected at most {MAX_STARTS}")
+    starts = tuple(tuple(exact(float(x)) if isinstance(x, float) else rational(x) for x in row) for row in rows)
+    for start in starts:
+        if len(start) != system.dim:
+            raise InputError(
+                f"found a start with {counted(len(start), 'coordinate')}, expected {system.dim}: "
+                f"{', '.join(system.variables)}"
+            )
+    return starts
+
+
+def _methods(
+    file: SystemFile, eps: fmpq, starts: Sequence[Any], requested: Sequence[str] | None, kernel: str | None
+) -> tuple[list[str], dict[str, str], Callable[[str, fmpq, int, int], FloatEnsemble]]:
+    """Return the methods, the reasons for those left out, and how to start the first orbits at an eps by a method."""
+    names = list(dict.fromkeys(DEFAULT_METHODS if requested is None else requested))
+    for name in names:
+        if name not in METHODS:
+            raise InputError(f"found the method {str(name)[:40]!r}, expected one of {', '.join(METHODS)}")
+    skipped = {}
+    halves = separated(file.system, file.hamiltonian)
+    if isinstance(halves, str):
+        skipped = {name: halves for name in names if name in SEPARABLE}
+    form, why = float_normal_form(file) if "normal-form" in names else (None, "")
+    if why:
+        skipped["normal-form"] = why
+    if len(skipped) == len(names):
+        raise InputError("; ".join(f"the method {name} is not available: {why}" for name, why in skipped.items()))
+    points = np.array([to_floats(start) for start in starts])
+
+    def ensemble_of(name: str, at: fmpq, count: int, steps: int) -> FloatEnsemble:
+        chosen = kernel or (None if steps * count > _MIN_COMPILED_STEPS else "numpy")
+        if name in ("kahan", "normal-form"):
+            normal = form if name == "normal-form" else None
+            return FloatEnsemble(file.system, at, points[:count], form=normal, kernel=chosen)
+        of_system = None if isinstance(halves, str) else halves
+        return MethodEnsemble(file.system, at, points[:count], name, halves=of_system, kernel=chosen)
+
+    return [name for name in names if name not in skipped], skipped, ensemble_of
+
+
+def _initial(
+    functions: Sequence[WatchedFunction], starts: Sequence[Sequence[fmpq]]
+) -> tuple[list[tuple[FloatArray, FloatArray]], dict[str, bool]]:
+    """Return the initial values of each function and the divisors of its errors, and whether errors are relative."""
+    points = np.array([to_floats(start) for start in starts])
+    initial, relative = [], {}
+    for function in functions:
+        values, numbers = function(points), [function.at(start) for start in starts]
+        if None in numbers or not np.isfinite(values).all():
+            raise InputError(
+                f"{function.name} is not defined in floating point at the initial point: choose another one"
+            )
+        # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
+        relative[function.name] = all(number != 0 for number in numbers) and bool((values != 0.0).all())
+        initial.append((values, np.abs(values) if relative[function.name] else np.ones_like(values)))
+    return initial, relative
+
+
+def _portions(ensemble: FloatEnsemble, steps: int, watched: bool) -> Iterator[tuple[int, FloatArray]]:
+    """Advance an ensemble; yield the first step of each portion, and its points (count, n, dim)."""
+    if not watched:
+        ensemble.advance(steps)
+        return
+    for k, points in enumerate(ensemble.records(steps, 1)):
+        if k:  # at step 0 errors are 0 by definition
+            yield ensemble.step - len(points) + 1, points
+        if (ensemble.failed_at >= 0).all():
+            return
+
+
+def _references(
+    system: QuadraticSystem, starts: Sequence[Sequence[fmpq]], eps: fmpq, progress: Callable[[str], None]
+) -> tuple[fmpq | None, FloatArray | None]:
+    """Return a time, a power of 2 times the step, in which the solutions move by about their size, and its end points.
+
+    The direction of time is the sign of eps.
+    """
+    times = []
+    for start in starts:
+        speed = max(abs(entry) for entry in system.over(QQ).value(start))
+        if speed != 0:
+            times.append(max(abs(entry) for entry in start) / speed)
+    ratio = min(times, default=fmpq(0)) / abs(2 * eps)
+    if not times:
+        return None, None
+    whole = int(ratio.p) // int(ratio.q)
+    time = 2 * eps * (1 << max(0, whole.bit_length() - 1))
+    for _ in range(_SHORTER_TIMES):
+        progress(f"the solution at time {format_number(time)}")
+        ends = [solution(system, start, time) for start in starts]
+        if all(end is not None for end in ends):
+            return time, np.array([[float(ball.mid()) for ball in end or ()] for end in ends])
+        time /= 2
+    return None, None
+
+
+def _errors(
+    name: str,
+    ensemble_of: Callable[[str, fmpq, int, int], FloatEnsemble],
+    time: fmpq,
+    eps: fmpq,
+    references: FloatArray,
+    progress: Callable[[str], None],
+) -> tuple[tuple[StepError, ...], float | None]:
+    """Return the errors at a time for smaller and smaller steps, and the slope between the last two above rounding."""
+    found: dict[int, StepError] = {}
+    size = float(np.abs(references).max())
+
+    def measure(steps: int) -> StepError:
+        at = time / (2 * steps)
+        ensemble = ensemble_of(name, at, len(references), steps)
+        ensemble.advance(steps)
+        repeated = int(ensemble.near_singular.sum()) if name in IMPLICIT else 0
+        evaluations = work(name, steps * len(references), repeated)[0] / len(references)
+        error = float(np.abs(ensemble.x - references).max())  # NaN if an orbit has ended
+        return StepError(at, steps, error, evaluations)
+
+    slopes: list[float] = []
+    for k in range(_COARSEST, _FINEST + 1):
+        steps = 1 << k
+        found[steps] = measure(steps)
+        progress(f"{METHODS[name].title}: error with {steps} steps")
+        error, before = found[steps].error, found.get(steps // 2)
+        if not np.isfinite(error):
+            continue
+        if error <= _ROUNDING * size * sqrt(steps):
+            break
+        if before is not None and np.isfinite(before.error):
+            slopes.append(log2(before.error / error))
+        is_settled = len(slopes) >= 3 and max(abs(slopes[-1] - slope) for slope in slopes[-3:-1]) < _SETTLED
+        if len(found) >= _MIN_SIZES and is_settled and error < 0.01 * size:
+            break
+    requested = time / (2 * eps)
+    steps = int(requested.p)
+    if requested.q == 1 and steps not in found and steps <= MAX_STEPS:
+        found[steps] = measure(steps)
+    ordered = [found[steps] for steps in sorted(found) if np.isfinite(found[steps].error)]
+    return tuple(ordered), slopes[-1] if slopes else None
+
+
+def _edges(steps: int, linear: bool) -> NDArray[np.int64]:
+    """Return the ends of the bins: 0 = e_0 < e_1 < ... = steps; bin k holds the steps e_(k-1) < n <= e_k."""
+    if steps <= BINS:
+        return np.arange(steps + 1)
+    ends = np.linspace(0, steps, BINS + 1) if linear else np.geomspace(1, steps, BINS)
+    return np.unique(np.concatenate(([0], np.rint(ends).astype(np.int64), [steps])))
+
+
+class _Bins:
+    """The largest error so far in each bin."""
+
+    def __init__(self, edges: NDArray[np.int64]) -> None:
+        self._edges = edges
+        self._largest = np.full(len(edges) - 1, -1.0)
+        self._where = np.zeros(len(edges) - 1, dtype=np.int64)
+        self._undefined = 0
+        self._last = float("nan")
+
+    def add(self, first: int, errors: FloatArray) -> None:
+        """Add errors (steps, orbits) at the steps first, first + 1, ...; NaN if undefined."""
+        missing = ~np.isfinite(errors)
+        self._undefined += int(missing.sum())
+        errors = np.where(missing, -1.0, errors).max(axis=1)
+        self._last = float(errors[-1]) if errors[-1] >= 0 else float("nan")
+        bins = np.searchsorted(self._edges, np.arange(first, first + len(errors))) - 1
+        for part in np.split(np.arange(len(errors)), np.flatnonzero(np.diff(bins)) + 1):
+            best = part[errors[part].argmax()]
+            if errors[best] > self._largest[bins[best]]:
+                self._largest[bins[best]], self._where[bins[best]] = errors[best], first + best
+
+    def curve(self, method: str, function: str) -> DriftCurve:
+        """Return the curve of the largest errors, without empty bins."""
+        kept = self._largest >= 0
+        return DriftCurve(method, function, self._where[kept], self._largest[kept], self._undefined, self._last)

@@ -1,0 +1,185 @@
+"""Pictures of a comparison of methods: drift over time, error against step size, work against precision."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import time_step
+from kahanmaps.maps.floats.classical import METHODS
+from kahanmaps.maps.floats.float_conversion import to_float
+from kahanmaps.plots.comparison.compare import Comparison
+from kahanmaps.plots.figures import (
+    LETTER_WIDTH,
+    drawing,
+    label_number,
+    legend_above,
+    legend_height,
+    letter_count,
+    log_scale_with_zero,
+    new_figure,
+    wrapped,
+    write_beside,
+)
+from kahanmaps.plots.style import COLORS, LINES, MARKS, Style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+KINDS = ("drift", "error", "work")
+SCALES = ("loglog", "semilog")
+_PANEL = 5.5  # minimal width of a panel beside another, in centimetres
+_LOST = 1e3
+_MAX_PANELS = 6
+_NO_VALUES = (1e-17, 1e-15)  # limits of the axis if all errors are 0
+
+
+def plot_comparison(
+    result: Comparison, style: Style | None = None, *, show: str = "drift", scale: str = "loglog"
+) -> Figure:
+    """Plot the result of `compare`: "drift", "error" or "work". Raises InputError where this was not measured.
+
+    The drift is plotted by `plot_drift`. Errors against the time step have lines of the slopes of the orders beside
+    them; the work is the number of evaluations of f.
+    """
+    style = style or Style()
+    if show == "drift":
+        return plot_drift(result, style, scale=scale)
+    if show not in KINDS:
+        raise InputError(f"found the picture {show[:40]!r}, expected {', '.join(KINDS)}")
+    runs = [run for run in result.runs if any(entry.error > 0 for entry in run.errors)]
+    if result.time is None or not runs:
+        raise InputError("found no errors of the methods, for there is no reference solution or all errors are 0")
+    labels = [METHODS[run.method].title for run in runs]
+    with drawing(style):
+        from matplotlib.lines import Line2D
+
+        figure = new_figure(style, 0.72 + legend_height(labels, style, title=True, max_columns=2))
+        axes = figure.subplots()
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        handles = []
+        ends: dict[int, tuple[float, float]] = {}  # order: the step and the least error, for the lines of slopes
+        for k, run in enumerate(runs):
+            entries = [entry for entry in run.errors if entry.error > 0]
+            x = [abs(to_float(2 * entry.eps)) if show == "error" else entry.evaluations for entry in entries]
+            look = {**_look(k), "marker": MARKS[k % len(MARKS)], "markersize": 3.5, "linewidth": 0.9}
+            axes.plot(x, [entry.error for entry in entries], **look)
+            handles.append(Line2D([], [], **look))
+            order = METHODS[run.method].order
+            if order not in ends or entries[0].error < ends[order][1]:
+                ends[order] = x[0], entries[0].error
+        if show == "error":
+            _order_lines(axes, ends, abs(to_float(time_step(result.eps))))
+            axes.set_xlabel("time step $h$")
+        else:
+            axes.set_xlabel("evaluations of $f$ for one initial point")
+        axes.set_ylabel(f"error at time {label_number(result.time)}")
+        legend_above(figure, handles, labels, style, None, max_columns=2)
+    return figure
+
+
+def _order_lines(axes: Axes, ends: dict[int, tuple[float, float]], step: float) -> None:
+    """Draw a dotted line of each order, a little below the best method of this order, and mark the requested step."""
+    low, high = axes.get_ylim()
+    for order, (x, error) in sorted(ends.items()):
+        y = error / 3
+        end = max(axes.get_xlim()[0], x * (low / y) ** (1 / order))
+        axes.plot([x, end], [y, y * (end / x) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1)
+        write_beside(axes, str(order), (x, y), (4, -2), color="0.4", fontsize="small", va="center")
+    axes.set_ylim(low, high)
+    axes.axvline(step, color="0.85", linewidth=0.8, zorder=0)
+
+
+def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "loglog") -> Figure:
+    """Plot the errors of functions against the step, with a panel for each function and a line for each method.
+
+    `scale` is "loglog", or "semilog" with a linear axis of steps. An error of exactly 0 is in a band marked 0 at the
+    bottom; an arrow at the top stands for errors above `clipped_from`. A cross ends the line of an orbit that ended
+    early, at the step given in the legend. Raises InputError for an unknown scale.
+    """
+    if scale not in SCALES:
+        raise InputError(f"found the scale {scale[:40]!r}, expected {' or '.join(SCALES)}")
+    style = style or Style()
+    names = list(result.labels)[:_MAX_PANELS]
+    count = len(names)
+    if not count:
+        raise InputError(f"found no known integral of {result.file.name}, expected one: give --integral NAME=EXPR")
+    columns = 1 if count <= 3 else 3 if count > 4 and style.width >= 3 * _PANEL else 2
+    if count <= 3 and style.width >= _PANEL * count:
+        columns = count
+    rows = -(-count // columns)
+    with drawing(style):
+        from matplotlib.lines import Line2D
+
+        methods = [run.method for run in result.runs]
+        ended = {run.method: max(end.steps for end in run.early) for run in result.runs if run.early}
+        labels = [
+            METHODS[method].title + (f" (ended at step {ended[method]})" if method in ended else "")
+            for method in methods
+        ]
+        panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
+        aspect = panel * rows + legend_height(labels, style, title=True, max_columns=3)
+        figure = new_figure(style, aspect)
+        height = 0.75 / rows * 72 * style.inches(aspect)[1]  # of a panel, in points
+        panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
+        for axes, name in zip(panels, names, strict=False):
+            curves = [curve for curve in result.curves if curve.function == name]
+            errors = np.concatenate([curve.errors for curve in curves]) if curves else np.array([])
+            limit = clipped_from(result, name)
+            positive = np.minimum(errors[errors > 0], limit)
+            least, largest = (positive.min(), positive.max()) if len(positive) else _NO_VALUES
+            zero = log_scale_with_zero(axes, float(least), float(largest), len(positive) < len(errors))
+            if scale == "loglog":
+                axes.set_xscale("log")
+                axes.set_xlim(1 if result.steps > 9 else 0.9, max(result.steps, 2))
+            else:
+                axes.set_xlim(0, result.steps)
+            for curve in curves:
+                look = _look(methods.index(curve.method))
+                heights = np.where(curve.errors > 0, curve.errors, np.nan if zero is None else zero)
+                axes.plot(curve.steps, heights, linewidth=0.9, marker="o" if len(heights) == 1 else None, **look)
+                end = {"color": look["color"], "markersize": 5, "clip_on": False}
+                beyond = np.flatnonzero(heights > limit)
+                if len(beyond):
+                    axes.plot(curve.steps[beyond[:1]], [limit], marker="^", **end)
+                elif len(heights) and curve.method in ended:
+                    axes.plot(curve.steps[-1:], heights[-1:], marker="x", **end)
+            # Break the line before the name only: the name may be a formula that contains spaces.
+            function, kind = result.labels[name], "relative" if result.relative[name] else "absolute"
+            if "$" in function:
+                is_long = letter_count(f"{kind} error of {function}") * LETTER_WIDTH * style.font_size > height
+                label = f"{kind} error of{chr(10) if is_long else ' '}{function}"
+            else:
+                label = f"{kind} error of " + function.replace(" ", "\N{NO-BREAK SPACE}")
+                label = wrapped(label, height, style.font_size, max_lines=2)
+            axes.set_ylabel(label)
+        for k, axes in enumerate(panels):
+            if k >= count:
+                axes.set_visible(False)
+            elif k + columns >= count:
+                axes.set_xlabel("step $n$")
+                axes.tick_params(labelbottom=True)
+        title = rf"time step $2\varepsilon = {label_number(time_step(result.eps))}$"
+        handles = [Line2D([], [], linewidth=0.9, **_look(k)) for k in range(len(methods))]
+        legend_above(figure, handles, labels, style, title, max_columns=3)
+    return figure
+
+
+def clipped_from(result: Comparison, name: str) -> float:
+    """Return the error of a function above which errors are not plotted, but shown as an arrow at the top.
+
+    It is a thousand, or ten times the largest error of the completed orbits if that is larger: a diverging orbit would
+    flatten all other curves.
+    """
+    whole = {run.method for run in result.runs if not run.early}
+    completed = [curve.errors for curve in result.curves if curve.function == name and curve.method in whole]
+    return max([_LOST, *(10 * float(errors.max()) for errors in completed if len(errors))])
+
+
+def _look(k: int) -> dict[str, Any]:
+    """Return color and line style of the k-th method; beyond seven the same colors have other lines."""
+    return {"color": COLORS[k % len(COLORS)], "linestyle": LINES[(k + k // len(COLORS)) % len(LINES)]}
