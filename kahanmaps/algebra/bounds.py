@@ -77,7 +77,7 @@ class BoundField(Field):
 
     def __init__(self) -> None:
         self._denominators: list[CoefficientSize] = []
-        self._number_of: dict[int, tuple[Any, int]] = {}
+        self._index_by_id: dict[int, tuple[Any, int]] = {}
 
     @property
     def zero(self) -> Bound:
@@ -100,25 +100,28 @@ class BoundField(Field):
         """The degree of the product of everything that must not be zero."""
         return sum(size.degree for size in self._denominators)
 
-    def denominator(self, of: Any, size: CoefficientSize) -> int:
-        """Return the index of the denominator that belongs to the object `of`; the same object has the same index.
+    def denominator(self, owner: Any, size: CoefficientSize) -> int:
+        """Return the index of the denominator that belongs to the object `owner`; the same object has the same index.
 
         The common bound of the entries of a matrix gets a new index each time, since it represents different entries.
         """
-        if isinstance(of, Bound) and of.is_common:
+        if isinstance(owner, Bound) and owner.is_common:
             self._denominators.append(size)
             return len(self._denominators) - 1
-        known = self._number_of.get(id(of))
-        if known is None:
-            known = self._number_of[id(of)] = (of, len(self._denominators))  # storing `of` keeps its id unique
+        entry = self._index_by_id.get(id(owner))
+        if entry is None:
+            entry = self._index_by_id[id(owner)] = (
+                owner,
+                len(self._denominators),
+            )  # storing the owner keeps its id unique
             self._denominators.append(size)
-        return known[1]
+        return entry[1]
 
     def product(self, powers: Mapping[int, int]) -> CoefficientSize:
         """Return the size of a product of denominators."""
         total = ONE
-        for number, power in powers.items():
-            total = total * self._denominators[number] ** power
+        for index, power in powers.items():
+            total = total * self._denominators[index] ** power
         return total
 
     def convert(self, value: Any) -> Bound:
@@ -178,7 +181,7 @@ class Bound(Element):
 
     def over(self, scale: int, denominator: Mapping[int, int]) -> CoefficientSize:
         """Return the size of the numerator over a larger denominator."""
-        missing = {number: power - self.denominator.get(number, 0) for number, power in denominator.items()}
+        missing = {index: power - self.denominator.get(index, 0) for index, power in denominator.items()}
         return self.numerator * self.field.product(missing) * CoefficientSize(0, log2(scale // self.scale))
 
     @property
@@ -198,9 +201,9 @@ class Bound(Element):
         return Bound(self.field, self.numerator * other.numerator, self.scale * other.scale, denominator)
 
     def _over(self, other: Bound) -> Bound:
-        number = self.field.denominator(other, other.numerator)
+        index = self.field.denominator(other, other.numerator)
         numerator = self.numerator * self.field.product(other.denominator) * CoefficientSize(0, log2(other.scale))
-        return Bound(self.field, numerator, self.scale, _product(self.denominator, {number: 1}))
+        return Bound(self.field, numerator, self.scale, _product(self.denominator, {index: 1}))
 
     def _same(self, other: Bound) -> bool:
         return self is other
@@ -253,15 +256,15 @@ class BoundMatrix:
     def det(self) -> Bound:
         """Bound the determinant: n! products of n entries."""
         n, entry = self._rows, self.entry
-        denominator = {number: n * power for number, power in entry.denominator.items()}
+        denominator = {index: n * power for index, power in entry.denominator.items()}
         return Bound(self.field, self._minor(n), entry.scale**n, denominator)
 
     def solve(self, right: BoundMatrix) -> BoundMatrix:
         """Bound the solution by Cramer's rule: with entries N/d it is d adj(N) right / det N."""
         n, entry = self._rows, self.entry
-        number = self.field.denominator(self, self._minor(n))
+        index = self.field.denominator(self, self._minor(n))
         d = self.field.product(entry.denominator) * CoefficientSize(0, log2(entry.scale))
-        inverse = Bound(self.field, self._minor(n - 1) * CoefficientSize(0, log2(n)) * d, 1, {number: 1})
+        inverse = Bound(self.field, self._minor(n - 1) * CoefficientSize(0, log2(n)) * d, 1, {index: 1})
         return BoundMatrix(self.field, n, right._columns, inverse * right.entry)
 
     def _minor(self, size: int) -> CoefficientSize:
@@ -283,9 +286,9 @@ def log2(value: fmpz | int) -> float:
 
 def _lcm(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
     """Return the least common multiple of two products of powers of denominators: exponents by denominator."""
-    return {number: max(left.get(number, 0), right.get(number, 0)) for number in {*left, *right}}
+    return {index: max(left.get(index, 0), right.get(index, 0)) for index in {*left, *right}}
 
 
 def _product(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
     """Return the product of two products of powers of denominators: exponents by denominator."""
-    return {number: left.get(number, 0) + right.get(number, 0) for number in {*left, *right}}
+    return {index: left.get(index, 0) + right.get(index, 0) for index in {*left, *right}}

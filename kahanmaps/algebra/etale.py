@@ -149,8 +149,8 @@ class EtaleElement(Element):
             return EtaleElement(self.field, fmpq_poly(solution.entries()))
         common, inverse, _ = other.polynomial.xgcd(self.field.chi)
         if common.degree() != 0:
-            what = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
-            raise ZeroDivisionError(f"division by {what}")
+            divisor = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
+            raise ZeroDivisionError(f"division by {divisor}")
         return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)
 
     def _same(self, other: EtaleElement) -> bool:
@@ -203,12 +203,12 @@ class EtaleMatrix(EntryMatrix):
         if self._rows != self._columns or self._rows != right._rows:
             raise ValueError("matrix must be square, and the right side of the same height")
         size, degree, columns = self._rows * self.field.degree, self.field.degree, right._columns
-        big: list[fmpq] = []
+        entries: list[fmpq] = []
         for row in self.tolist():
             blocks = [entry.matrix.tolist() for entry in row]
-            big += [number for k in range(degree) for block in blocks for number in block[k]]
-        sides = [entry.polynomial[k] for row in right.tolist() for k in range(degree) for entry in row]
-        coefficients = fmpq_mat(size, size, big).solve(fmpq_mat(size, columns, sides))
+            entries += [number for k in range(degree) for block in blocks for number in block[k]]
+        right_entries = [entry.polynomial[k] for row in right.tolist() for k in range(degree) for entry in row]
+        coefficients = fmpq_mat(size, size, entries).solve(fmpq_mat(size, columns, right_entries))
         solution = [
             EtaleElement(self.field, fmpq_poly([coefficients[i * degree + k, j] for k in range(degree)]))
             for i in range(self._rows)

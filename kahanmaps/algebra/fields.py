@@ -218,9 +218,8 @@ class Element(ABC):
         right = operand(self.field, other)
         if right is not None:
             return self, right
-        left = (
-            operand(other.field, self) if isinstance(other, type(self)) else None
-        )  # Python calls no reflected method for equal types
+        # Python calls no reflected method for equal types.
+        left = operand(other.field, self) if isinstance(other, type(self)) else None
         return None if left is None else (left, other)
 
     def __add__(self, other: Any) -> Self:

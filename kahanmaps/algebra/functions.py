@@ -136,31 +136,36 @@ class FunctionField(Field):
         if self.reduces:
             return None
         columns = enumerate(zip(*(tuple(map(int, m)) for m in polynomial.monoms()), strict=True))
-        used = [(point[k], powers) for k, powers in columns if any(powers)]
+        operands = [(point[k], powers) for k, powers in columns if any(powers)]
         denominators: list[fmpq_mpoly] = []  # none of which divides another
-        for entry, _ in sorted(used, key=lambda one: -int(one[0].denominator.total_degree())):
+        for entry, _ in sorted(operands, key=lambda operand: -int(operand[0].denominator.total_degree())):
             if (
                 all(self.quotient(D, entry.denominator) is None for D in denominators)
                 and not entry.denominator.is_constant()
             ):
                 denominators.append(entry.denominator)
-        missing = [[0] * len(polynomial) for _ in denominators]
+        exponents = [[0] * len(polynomial) for _ in denominators]
         rows = []
-        for entry, powers in used:
+        for entry, powers in operands:
             factor = entry.numerator / entry.denominator.leading_coefficient()
             if not entry.denominator.is_constant():
                 quotients = ((k, self.quotient(D, entry.denominator)) for k, D in enumerate(denominators))
-                place, quotient = next((k, quotient) for k, quotient in quotients if quotient is not None)
+                index, quotient = next((k, quotient) for k, quotient in quotients if quotient is not None)
                 factor = self.times(entry.numerator, quotient)
-                missing[place] = [a - e for a, e in zip(missing[place], powers, strict=True)]
+                exponents[index] = [a - e for a, e in zip(exponents[index], powers, strict=True)]
             rows.append((factor, powers))
-        tops = [-min(row) for row in missing]
-        rows += [(D, tuple(top + a for a in row)) for D, top, row in zip(denominators, tops, missing, strict=True)]
+        largest_powers = [-min(row) for row in exponents]
+        rows += [
+            (D, tuple(largest_power + a for a in row))
+            for D, largest_power, row in zip(denominators, largest_powers, exponents, strict=True)
+        ]
         # The longest factor comes last: in the innermost sum the other operands of its products are short.
         rows.sort(key=lambda row: len(row[0]))
         terms = {tuple(powers[m] for _, powers in rows): c for m, c in enumerate(polynomial.coeffs())}
         total = self._horner(terms, [factor for factor, _ in rows])
-        powers = tuple((D, top) for D, top in zip(denominators, tops, strict=True) if top)
+        powers = tuple(
+            (D, largest_power) for D, largest_power in zip(denominators, largest_powers, strict=True) if largest_power
+        )
         return Function(self, total, self.product_of(powers), powers)
 
     def product_of(self, powers: Sequence[tuple[fmpq_mpoly, int]]) -> fmpq_mpoly:
@@ -248,15 +253,15 @@ class Function(Element):
     def _over(self, other: Function) -> Function:
         if self.field.vanishes(other.numerator):
             raise ZeroDivisionError("division by the zero function")
-        shared = [(D, min(top, low)) for D, top in self.powers for E, low in other.powers if D == E]
+        shared = [(D, min(power, other_power)) for D, power in self.powers for E, other_power in other.powers if D == E]
         if shared:
             # a/D^3 over b/D^2 is a/(D b): the denominators as they stand would be multiplied into both sides.
-            upper, lower = (
-                self.field.product_of([(D, top - sum(n for E, n in shared if D == E)) for D, top in value.powers])
+            own_rest, other_rest = (
+                self.field.product_of([(D, power - sum(n for E, n in shared if D == E)) for D, power in value.powers])
                 for value in (self, other)
             )
             times = self.field.times
-            return self.field.fraction(times(self.numerator, lower), times(other.numerator, upper))
+            return self.field.fraction(times(self.numerator, other_rest), times(other.numerator, own_rest))
         return self._times(Function(self.field, other.denominator, other.numerator))
 
     def _same(self, other: Function) -> bool:
@@ -280,7 +285,7 @@ class FunctionMatrix(EntryMatrix):
         total: Function = self.field.one
         for block in self._blocks():
             n = len(block)
-            rows, cleared = FunctionMatrix(
+            rows, denominator = FunctionMatrix(
                 self.field, n, n, [self[i, j] for i in block for j in block]
             )._polynomial_rows()
             if len(rows) > _MAX_ROWS_BY_MINORS:
@@ -288,7 +293,7 @@ class FunctionMatrix(EntryMatrix):
             else:
                 minor = _minors(self.field, [[*row, self.field.context.constant(0)] for row in rows])[-1]
                 value = -minor if len(rows) % 2 else minor
-            total = total * Function(self.field, value, cleared)
+            total = total * Function(self.field, value, denominator)
         return total
 
     def solve(self, right: FunctionMatrix) -> FunctionMatrix:
@@ -362,9 +367,9 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
     count(sum(map(len, chain(*rows))))  # for the text of the hash key
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
     budget, before = field.budget, counted()
-    for known in (key, (key, budget)):
-        minors, products, units = _cache.get(known, (None, 0, 0))
-        if known in _cache and products <= budget:
+    for cached_key in (key, (key, budget)):
+        minors, products, units = _cache.get(cached_key, (None, 0, 0))
+        if cached_key in _cache and products <= budget:
             count(units)
             if minors is None:
                 field.budget = -1

@@ -37,16 +37,15 @@ __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reco
 
 
 _UNLUCKY_PRIMES = 3  # after this number of failures the black box counts as not rational
-_CONFIRMATIONS = (
-    5  # values modulo a new prime each; a box like the Legendre symbol passes each one with probability 1/2
-)
+# Values modulo a new prime each; a black box like the Legendre symbol passes each one with probability 1/2.
+_CONFIRMATIONS = 5
 
 
 Point = tuple[int, ...]
 Exponents = tuple[int, ...]
 BlackBox = Callable[[int, Point], Sequence[int] | None]
 
-NOTHING: Mapping[int, int] = MappingProxyType({})
+NONE_FIXED: Mapping[int, int] = MappingProxyType({})
 _BAD_POINTS = 20  # in a row, before another prime is tried
 _DETERMINING = 4  # entries that determine their common denominator together; more only enlarge the matrices
 
@@ -61,19 +60,19 @@ class Unlucky(Exception):
 
 @dataclass
 class Samples:
-    """The limits of the black box calls, their number so far, and the length of the vectors of values."""
+    """The limits of the calls of the black box, how many values were `taken`, and the length of their vectors."""
 
     max_samples: int
     budget: Budget | None
-    spent: int = 0
+    taken: int = 0
     length: int | None = None
 
     def check(self, needed: int = 0) -> None:
         """Raise Stop if `needed` further values exceed the limit or the budget is spent."""
-        if self.spent + needed > self.max_samples:
-            raise Stop(f"{self.spent} values were taken and {needed} more are needed, the limit is {self.max_samples}")
+        if self.taken + needed > self.max_samples:
+            raise Stop(f"{self.taken} values were taken and {needed} more are needed, the limit is {self.max_samples}")
         if self.budget is not None and self.budget.is_spent:
-            raise Stop(f"work limit reached after {self.spent} values; raise --effort")
+            raise Stop(f"work limit reached after {self.taken} values; raise --effort")
 
 
 class SampledValues:
@@ -92,7 +91,7 @@ class SampledValues:
         for _ in range(_BAD_POINTS):
             self.samples.check(1)
             point = draw()
-            self.samples.spent += 1
+            self.samples.taken += 1
             answer = self._black_box(self.prime, point)
             if answer is not None:
                 values = tuple(int(value) % self.prime for value in answer)
@@ -109,22 +108,24 @@ class SampledValues:
                 break
         raise Unlucky(f"no value modulo {self.prime} at {_BAD_POINTS} points in a row")
 
-    def anywhere(self, symbols: int, rng: random.Random, fixed: Mapping[int, int] = NOTHING) -> Callable[[], Point]:
+    def random_points(
+        self, symbols: int, rng: random.Random, fixed: Mapping[int, int] = NONE_FIXED
+    ) -> Callable[[], Point]:
         """Return a function that draws random points with some coordinates fixed."""
         return lambda: tuple(fixed[i] if i in fixed else rng.randrange(1, self.prime) for i in range(symbols))
 
     def monomials(self, k: int, exponents: Sequence[Exponents]) -> list[int]:
         """Return the values of the monomials at point k."""
-        known, point, p = self._powers[k], self.points[k], self.prime
+        cached, point, p = self._powers[k], self.points[k], self.prime
         row = []
         for monomial in exponents:
-            value = known.get(monomial)
+            value = cached.get(monomial)
             if value is None:
                 value = 1
                 for base, exponent in zip(point, monomial, strict=True):
                     if exponent:
                         value = value * pow(base, exponent, p) % p
-                known[monomial] = value
+                cached[monomial] = value
             row.append(value)
         return row
 
@@ -156,16 +157,16 @@ class Quotient:
     @classmethod
     def of(cls, shape: Shape, numerator: Sequence[int], denominator: Sequence[int], prime: int) -> Quotient | None:
         """Normalize a fraction and drop its zero terms; return None if the denominator is 0."""
-        upper = {monomial: c for monomial, c in zip(shape.numerator, numerator, strict=True) if c}
-        lower = {monomial: c for monomial, c in zip(shape.denominator, denominator, strict=True) if c}
-        if not lower:
+        numerator_terms = {monomial: c for monomial, c in zip(shape.numerator, numerator, strict=True) if c}
+        denominator_terms = {monomial: c for monomial, c in zip(shape.denominator, denominator, strict=True) if c}
+        if not denominator_terms:
             return None
-        support = Shape(tuple(upper), tuple(lower))
-        factor = pow(lower[support.lead], -1, prime)
+        support = Shape(tuple(numerator_terms), tuple(denominator_terms))
+        factor = pow(denominator_terms[support.lead], -1, prime)
         return cls(
             support,
-            tuple(c * factor % prime for c in upper.values()),
-            tuple(c * factor % prime for c in lower.values()),
+            tuple(c * factor % prime for c in numerator_terms.values()),
+            tuple(c * factor % prime for c in denominator_terms.values()),
         )
 
 
@@ -225,7 +226,7 @@ def reconstruct(
     samples = Samples(max_samples, budget)
     primes: list[int] = []
 
-    def fresh() -> SampledValues:
+    def at_new_prime() -> SampledValues:
         prime = draw(rng)
         while prime in primes:
             prime = draw(rng)
@@ -236,13 +237,15 @@ def reconstruct(
     try:
         for _ in range(_UNLUCKY_PRIMES):
             try:
-                functions = _lift(_first_prime(fresh(), len(names), max_degree, rng), fresh, tuple(names), primes, rng)
-                return Reconstruction(functions, "", samples.spent, tuple(primes))
+                functions = _lift(
+                    _first_prime(at_new_prime(), len(names), max_degree, rng), at_new_prime, tuple(names), primes, rng
+                )
+                return Reconstruction(functions, "", samples.taken, tuple(primes))
             except Unlucky as unlucky:
                 reason = str(unlucky)
     except Stop as stop:
         reason = str(stop)
-    return Reconstruction(None, reason, samples.spent, tuple(primes))
+    return Reconstruction(None, reason, samples.taken, tuple(primes))
 
 
 # -- modulo the first prime --------------------------------------------------------------------------------------------
@@ -251,7 +254,7 @@ def reconstruct(
 def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: random.Random) -> list[Quotient]:
     """Interpolate the functions modulo one prime."""
     p = values.prime
-    values.take(values.anywhere(symbols, rng))
+    values.take(values.random_points(symbols, rng))
     anchor = values.points[0]
     one: Exponents = (0,) * symbols
     entries = range(len(values.values[0]))
@@ -267,8 +270,8 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
         active = order[: stage + 1]
         for i in entries:
             keys[i].append(str(axes[j][i][1]))
-        moving = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
-        for i in moving:
+        dependent = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
+        for i in dependent:
             if quotients[i].shape.unknowns <= 2 and set(
                 quotients[i].shape.numerator + quotients[i].shape.denominator
             ) <= {one}:
@@ -277,15 +280,15 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
                 quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, p)
                 assert quotient is not None  # D is monic
                 quotients[i] = quotient
-        moving = [
+        dependent = [
             i
-            for i in moving
+            for i in dependent
             if any(sum(m) != m[j] for m in (*quotients[i].shape.numerator, *quotients[i].shape.denominator))
         ]
-        if not moving:
+        if not dependent:
             continue
         shapes = {}
-        for i in moving:  # the possible monomials after adding symbol j, with its exponents on the axis
+        for i in dependent:  # the possible monomials after adding symbol j, with its exponents on the axis
             sides = zip((quotients[i].shape.numerator, quotients[i].shape.denominator), axes[j][i], strict=True)
             shapes[i] = Shape(
                 *(
@@ -293,18 +296,18 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
                     for monomials, side in sides
                 )
             )
-        bound = max(sum(_size(axes[a][i][0]) + _size(axes[a][i][1]) for a in active) + 2 for i in moving)
+        bound = max(sum(_size(axes[a][i][0]) + _size(axes[a][i][1]) for a in active) + 2 for i in dependent)
         if max(shape.unknowns for shape in shapes.values()) > bound:
             direction = tuple(rng.randrange(1, p) if i in active else 0 for i in range(symbols))
             line = _along_line(values, anchor, direction, max_degree, rng)
-            for i in moving:
+            for i in dependent:
                 keys[i].append(str(line[i][1]))
                 shapes[i] = Shape(
                     tuple(m for m in shapes[i].numerator if sum(m) <= _size(line[i][0])),
                     tuple(m for m in shapes[i].denominator if sum(m) <= _size(line[i][1])),
                 )
         groups: dict[tuple[str, ...], list[int]] = {}
-        for i in moving:
+        for i in dependent:
             groups.setdefault(tuple(keys[i]), []).append(i)
         monic = [str(N / N.leading_coefficient()) if int(N.degree()) >= 0 else "" for N, _ in axes[j]]
         pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
@@ -326,46 +329,46 @@ def _along_line(
     On an axis t is 0 at the origin, so that exponents of t are exponents of the symbol.
     """
     p = values.prime
-    moving = [i for i, d in enumerate(direction) if d]
-    start = anchor[moving[0]] if len(moving) == 1 else 0
-    where = [start]
+    varying = [i for i, d in enumerate(direction) if d]
+    start = anchor[varying[0]] if len(varying) == 1 else 0
+    nodes = [start]
 
     def draw() -> Point:
         t = rng.randrange(p)
-        while t in where:
+        while t in nodes:
             t = rng.randrange(p)
-        where.append(t)
+        nodes.append(t)
         return tuple((a + (t - start) * d) % p for a, d in zip(anchor, direction, strict=True))
 
     # Newton's form: a further point adds one term to each polynomial, so that points can be taken one by one until all
     # fractions are determined. Their degrees are not known in advance.
     entries = range(len(values.values[0]))
     vanishing = nmod_poly([-start, 1], p)
-    through = [nmod_poly([v], p) for v in values.values[0]]
+    interpolants = [nmod_poly([v], p) for v in values.values[0]]
     fractions: list[tuple[nmod_poly, nmod_poly] | None] = [None for _ in entries]
     n = 1
     while any(pair is None for pair in fractions):
         if n > 2 * max_degree + 2:
             raise Stop(f"not the values of a rational function of degree at most {max_degree} along a line")
         values.take(draw)
-        t, n = where[-1], n + 1
-        slope = 1 / vanishing(t)
+        t, n = nodes[-1], n + 1
+        inverse = 1 / vanishing(t)
         for i in entries:
             if fractions[i] is None:
                 values.samples.check()
                 count(5 + n * (1 + n / 100))
-                through[i] += vanishing * ((values.values[-1][i] - through[i](t)) * slope)
+                interpolants[i] += vanishing * ((values.values[-1][i] - interpolants[i](t)) * inverse)
         vanishing *= nmod_poly([-t, 1], p)
         for i in entries:
             if fractions[i] is None:
-                fractions[i] = _least_fraction(through[i], vanishing, n)
+                fractions[i] = _least_fraction(interpolants[i], vanishing, n)
     return [pair for pair in fractions if pair is not None]
 
 
-def _least_fraction(through: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
+def _least_fraction(interpolant: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
     """Find N/D = through modulo `vanishing` with deg N + deg D <= n - 2, D monic, by the Euclidean algorithm."""
-    p = through.modulus()
-    before, after = (vanishing, nmod_poly([0], p)), (through, nmod_poly([1], p))
+    p = interpolant.modulus()
+    before, after = (vanishing, nmod_poly([0], p)), (interpolant, nmod_poly([1], p))
     while True:
         N, D = after
         if _size(N) + _size(D) <= n - 2:
@@ -403,28 +406,28 @@ def fit(
     pairs: list[tuple[list[int], list[int]]],
     symbols: int,
     rng: random.Random,
-    fixed: Mapping[int, int] = NOTHING,
+    fixed: Mapping[int, int] = NONE_FIXED,
 ) -> dict[int, Quotient]:
     """Fit fractions of these shapes to all values but the last, which must agree; take further values as needed.
 
     With `fixed` coordinates only points with these coordinates are used.
     """
-    done: dict[int, Quotient] = {}
-    draw = values.anywhere(symbols, rng, fixed)
+    fitted: dict[int, Quotient] = {}
+    draw = values.random_points(symbols, rng, fixed)
     values.take(draw)
     while True:
         usable = [k for k, point in enumerate(values.points) if all(point[i] == v for i, v in fixed.items())]
         needed = 0
         for determining, others in pairs:
-            if determining[0] not in done:
-                needed = max(needed, _solve(values, usable, shapes, determining, None, done))
-            if determining[0] in done:
-                denominator = done[determining[0]]
+            if determining[0] not in fitted:
+                needed = max(needed, _solve(values, usable, shapes, determining, None, fitted))
+            if determining[0] in fitted:
+                denominator = fitted[determining[0]]
                 for i in others:
-                    if i not in done:
-                        needed = max(needed, _solve(values, usable, shapes, [i], denominator, done))
+                    if i not in fitted:
+                        needed = max(needed, _solve(values, usable, shapes, [i], denominator, fitted))
         if needed == 0:
-            return done
+            return fitted
         values.samples.check(needed)
         for _ in range(needed):
             values.take(draw)
@@ -435,33 +438,35 @@ def _solve(
     usable: list[int],
     shapes: dict[int, Shape],
     members: list[int],
-    known: Quotient | None,
-    done: dict[int, Quotient],
+    known_denominator: Quotient | None,
+    fitted: dict[int, Quotient],
 ) -> int:
-    """Solve for the fractions of members with one denominator (perhaps `known`) and enter them into `done`.
+    """Solve for the fractions of members with one denominator, perhaps a known one, and enter them into `fitted`.
 
     Returns the number of further values that are needed, 0 on success. Raises Unlucky if there is no solution.
     """
     p = values.prime
     values.samples.check()
-    denominator = shapes[members[0]].denominator if known is None else known.shape.denominator
+    denominator = shapes[members[0]].denominator if known_denominator is None else known_denominator.shape.denominator
     widths = [len(shapes[i].numerator) for i in members]
     # The last point is held out as a check; without symbols all points are the same.
     last = usable[-1]
     rows: list[int] = []
     height = 0
     for k in usable[:-1] if values.points[0] else usable[:1]:
-        lower = values.monomials(k, denominator)
-        if known is not None:
-            lower = [sum(c * m for c, m in zip(known.denominator, lower, strict=True)) % p]
+        denominator_values = values.monomials(k, denominator)
+        if known_denominator is not None:
+            denominator_values = [
+                sum(c * m for c, m in zip(known_denominator.denominator, denominator_values, strict=True)) % p
+            ]
         offset = 0
         for i, width in zip(members, widths, strict=True):
             v = p - values.values[k][i]
             rows += [0] * offset + values.monomials(k, shapes[i].numerator) + [0] * (sum(widths) - offset - width)
-            rows += [v * m % p for m in lower]
+            rows += [v * m % p for m in denominator_values]
             offset += width
             height += 1
-    width = sum(widths) + (len(denominator) if known is None else 1)
+    width = sum(widths) + (len(denominator) if known_denominator is None else 1)
     if height == 0:
         return max(1, -(-(width - 1) // len(members)))
     count(20 + len(rows) * (0.5 + min(height, width) / 1500))
@@ -471,10 +476,16 @@ def _solve(
     if nullity == 0:
         raise Unlucky(f"the values modulo {p} do not fit the monomials found")
     solution = [int(kernel[i, 0]) for i in range(width)]
-    lower = solution[sum(widths) :] if known is None else [solution[-1] * c % p for c in known.denominator]
+    denominator_values = (
+        solution[sum(widths) :]
+        if known_denominator is None
+        else [solution[-1] * c % p for c in known_denominator.denominator]
+    )
     offset = 0
     for i, size in zip(members, widths, strict=True):
-        quotient = Quotient.of(replace(shapes[i], denominator=denominator), solution[offset : offset + size], lower, p)
+        quotient = Quotient.of(
+            replace(shapes[i], denominator=denominator), solution[offset : offset + size], denominator_values, p
+        )
         offset += size
         fits = quotient is not None
         if quotient is not None:
@@ -484,7 +495,7 @@ def _solve(
             fits = D != 0 and (N - v * D) % p == 0
         if quotient is None or not fits:
             raise Unlucky(f"a value modulo {p} that was held out does not agree")
-        done[i] = quotient
+        fitted[i] = quotient
     return 0
 
 
@@ -493,7 +504,7 @@ def _solve(
 
 def _lift(
     first: list[Quotient],
-    fresh: Callable[[], SampledValues],
+    at_new_prime: Callable[[], SampledValues],
     names: tuple[str, ...],
     primes: list[int],
     rng: random.Random,
@@ -513,8 +524,8 @@ def _lift(
         functions = _functions_with_residues(list(shapes.values()), residues, modulus, names)
         try:
             if functions is None:
-                values = fresh()
-            elif (counterexample := _find_counterexample(functions, fresh, rng)) is not None:
+                values = at_new_prime()
+            elif (counterexample := _find_counterexample(functions, at_new_prime, rng)) is not None:
                 values = counterexample
             else:
                 return functions
@@ -527,9 +538,12 @@ def _lift(
                 raise
             continue
         for i, shape in shapes.items():
-            upper = dict(zip(fitted[i].shape.numerator, fitted[i].numerator, strict=True))
-            lower = dict(zip(fitted[i].shape.denominator, fitted[i].denominator, strict=True))
-            new = [*(upper.get(m, 0) for m in shape.numerator), *(lower.get(m, 0) for m in shape.denominator)]
+            numerator_terms = dict(zip(fitted[i].shape.numerator, fitted[i].numerator, strict=True))
+            denominator_terms = dict(zip(fitted[i].shape.denominator, fitted[i].denominator, strict=True))
+            new = [
+                *(numerator_terms.get(m, 0) for m in shape.numerator),
+                *(denominator_terms.get(m, 0) for m in shape.denominator),
+            ]
             residues[i] = chinese(residues[i], modulus, new, values.prime)
         modulus *= values.prime
 
@@ -553,12 +567,12 @@ def _functions_with_residues(
 
 
 def _find_counterexample(
-    functions: tuple[RationalFunction, ...], fresh: Callable[[], SampledValues], rng: random.Random
+    functions: tuple[RationalFunction, ...], at_new_prime: Callable[[], SampledValues], rng: random.Random
 ) -> SampledValues | None:
     """Compare the functions with the black box modulo new primes; return the values modulo a prime that disagrees."""
     for _ in range(_CONFIRMATIONS):
-        values = fresh()
-        values.take(values.anywhere(len(functions[0].names) if functions else 0, rng))
+        values = at_new_prime()
+        values.take(values.random_points(len(functions[0].names) if functions else 0, rng))
         field = GF(values.prime)
         point = [field.convert(entry) for entry in values.points[-1]]
         try:
@@ -566,6 +580,8 @@ def _find_counterexample(
         except BadPrime as error:
             raise Unlucky(str(error)) from error
         pairs = zip(computed, values.values[-1], strict=True)
-        if not all(own is not None and field.convert(own) == value for own, value in pairs):
+        if not all(
+            computed_value is not None and field.convert(computed_value) == value for computed_value, value in pairs
+        ):
             return values
     return None

@@ -210,8 +210,8 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
         rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []
         for column in range(matrix.ncols()):
-            top = len(pivots)
-            others = [k for k in range(top, len(rows)) if not _is_zero(rows[k][column])]
+            row = len(pivots)
+            others = [k for k in range(row, len(rows)) if not _is_zero(rows[k][column])]
             if not others:
                 continue
             best = others[0]
@@ -219,14 +219,14 @@ def _eliminate(field: Field, matrix: Any) -> tuple[list[list[Any]], list[int]]:
                 best = max(others, key=lambda k: rows[k][column].abs_lower())
                 if rows[best][column].contains(0):
                     raise PrecisionLost("the rank cannot be decided with balls this wide: use more bits")
-            rows[top], rows[best] = rows[best], rows[top]
-            lead = rows[top][column]
-            rows[top] = [entry / lead for entry in rows[top]]
-            rows[top][column] = field.one  # exactly; over balls lead / lead is only a ball around 1
+            rows[row], rows[best] = rows[best], rows[row]
+            lead = rows[row][column]
+            rows[row] = [entry / lead for entry in rows[row]]
+            rows[row][column] = field.one  # exactly; over balls lead / lead is only a ball around 1
             for i in range(len(rows)):
-                if i != top and not _is_zero(rows[i][column]):
+                if i != row and not _is_zero(rows[i][column]):
                     factor = rows[i][column]
-                    rows[i] = [a - factor * b for a, b in zip(rows[i], rows[top], strict=True)]
+                    rows[i] = [a - factor * b for a, b in zip(rows[i], rows[row], strict=True)]
                     rows[i][column] = field.zero
             pivots.append(column)
         return rows, pivots

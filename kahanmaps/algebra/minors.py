@@ -8,19 +8,19 @@ from functools import cache
 from typing import Any
 
 Product = Callable[[Any, Any], Any]
-Foresight = Callable[[list[tuple[Any, Any]]], None]
+PairsCheck = Callable[[list[tuple[Any, Any]]], None]
 
 
 def kernel_minors(
-    rows: Sequence[Sequence[Any]], times: Product = operator.mul, foresee: Foresight | None = None
+    rows: Sequence[Sequence[Any]], times: Product = operator.mul, check_pairs: PairsCheck | None = None
 ) -> list[Any]:
     """Return the vector of signed maximal minors of an n x (n + 1) matrix, which is in its kernel.
 
     `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays); the result is exact
     if the ring is. `times` multiplies two elements. The minors of the first k rows are computed for k = 1, 2, ..., with
-    2^(n+1) n/2 products in all. An entry None is a zero whose products are skipped. `foresee` is called with all pairs
-    to be multiplied for a further row, and may raise. The k-th minor omits column k and has the sign (-1)^k; it is None
-    if all its products contain a None.
+    2^(n+1) n/2 products in all. An entry None is a zero whose products are skipped. `check_pairs` is called with all
+    pairs to be multiplied for a further row, and may raise. The k-th minor omits column k and has the sign (-1)^k; it
+    is None if all its products contain a None.
 
     >>> kernel_minors([[1, 2, 3], [4, 5, 6]])
     [-3, 6, -3]
@@ -31,9 +31,9 @@ def kernel_minors(
     width = len(rows) + 1
     minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
     for row, layer in zip(rows[1:], _layers(width), strict=True):
-        if foresee is not None:
+        if check_pairs is not None:
             pairs = ((row[j], minors[without]) for _, products in layer for j, without, _ in products)
-            foresee([(entry, minor) for entry, minor in pairs if entry is not None and minor is not None])
+            check_pairs([(entry, minor) for entry, minor in pairs if entry is not None and minor is not None])
         larger: dict[int, Any] = {}
         for mask, products in layer:
             total: Any = None
@@ -48,8 +48,8 @@ def kernel_minors(
                     total = term if total is None else total + term
             larger[mask] = total
         minors = larger
-    full = (1 << width) - 1
-    maximal = (minors[full ^ 1 << j] for j in range(width))
+    all_columns = (1 << width) - 1
+    maximal = (minors[all_columns ^ 1 << j] for j in range(width))
     return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(maximal)]
 
 
@@ -65,6 +65,8 @@ def _layers(width: int) -> list[list[tuple[int, list[tuple[int, int, bool]]]]]:
         for mask in range(1 << width):
             if mask.bit_count() == k:
                 columns = [j for j in range(width) if mask >> j & 1]
-                layer.append((mask, [(j, mask ^ 1 << j, bool((k - 1 + at) % 2)) for at, j in enumerate(columns)]))
+                layer.append(
+                    (mask, [(j, mask ^ 1 << j, bool((k - 1 + position) % 2)) for position, j in enumerate(columns)])
+                )
         layers.append(layer)
     return layers

@@ -61,13 +61,13 @@ def split_columns(form: Any, rank: int) -> tuple[list[int], list[int]]:
     >>> split_columns(*nmod_mat([[0, 2, 4, 0], [0, 1, 2, 3]], 7).rref())
     ([1, 3], [0, 2])
     """
-    first, k = list[int](), 0
+    pivot_columns, k = list[int](), 0
     for i in range(rank):
         while not form[i, k]:
             k += 1
-        first.append(k)
+        pivot_columns.append(k)
         k += 1
-    return first, sorted(set(range(form.ncols())).difference(first))
+    return pivot_columns, sorted(set(range(form.ncols())).difference(pivot_columns))
 
 
 def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
@@ -76,13 +76,13 @@ def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
     >>> kernel(nmod_mat([[1, 2, 0], [0, 0, 1]], 7), 2)
     [[5, 1, 0]]
     """
-    prime, (first, free) = form.modulus(), split_columns(form, rank)
-    count(len(free) * (len(first) / 3 + form.ncols() / 50))
+    prime, (pivot_columns, free) = form.modulus(), split_columns(form, rank)
+    count(len(free) * (len(pivot_columns) / 3 + form.ncols() / 50))
     basis = []
     for k in free:
         vector = [0] * form.ncols()
         vector[k] = 1
-        for i, j in enumerate(first):
+        for i, j in enumerate(pivot_columns):
             if j > k:
                 break
             vector[j] = -int(form[i, k]) % prime

@@ -79,8 +79,10 @@ def check_names(names: Sequence[str], *, iterates: bool = False) -> None:
     seen = set()
     for name in names:
         if not is_name(name.rstrip("~") if iterates and isinstance(name, str) else name):
-            given = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
-            raise InputError(f"found {given}, expected a name: ASCII letters, digits and _, not starting with a digit")
+            found_text = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
+            raise InputError(
+                f"found {found_text}, expected a name: ASCII letters, digits and _, not starting with a digit"
+            )
         if name in seen:
             raise InputError(f"found the name {quoted(name)} twice, expected distinct names")
         seen.add(name)
@@ -95,8 +97,8 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
     if start == end:
         raise ExpressionError(f"found nothing, {_EXPECTED}", text, start)
     if end - start > digits + 20:
-        given = f"found a number of {end - start} characters"
-        raise ExpressionError(f"{given}, expected at most {digits} digits", text, start)
+        found_text = f"found a number of {end - start} characters"
+        raise ExpressionError(f"{found_text}, expected at most {digits} digits", text, start)
     if _POWER.fullmatch(text, start, end):
         try:
             return parse_constant(text[start:end], limits=limits)
@@ -122,8 +124,10 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
             # Check the length first: Python's int() raises for more than 4300 digits.
             size = power.lstrip("+-").lstrip("0")
             if len(size) > 9 or int(size or "0") > limits.power_of_ten:
-                given = f"found the power of ten {quoted(power)}"
-                raise ExpressionError(f"{given}, expected at most {limits.power_of_ten} in size", text, match.start(6))
+                found_text = f"found the power of ten {quoted(power)}"
+                raise ExpressionError(
+                    f"{found_text}, expected at most {limits.power_of_ten} in size", text, match.start(6)
+                )
             shift += int(power)
         if shift:
             ten = fmpz(10) ** abs(shift)
@@ -131,10 +135,10 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
     return -value if sign == "-" else value
 
 
-def require_text(text: object, what: str, hint: str) -> None:
+def require_text(text: object, expected: str, hint: str) -> None:
     """Raise `InputError` (for a float `InexactNumber`) unless `text` is a str."""
     if not isinstance(text, str):
-        raise wrong_kind(text, f"{what} as text", hint)
+        raise wrong_kind(text, f"{expected} as text", hint)
 
 
 def wrong_kind(value: Any, expected: str, hint: str) -> InputError:
@@ -179,8 +183,8 @@ def parse_point(text: str, dimension: int | None = None, *, limits: ExpressionLi
             return ()
         raise ExpressionError("found nothing, expected a point: numbers separated by commas, e.g. 1/2,-1/3,0", text)
     if dimension is not None and len(entries) != dimension:
-        given = "1 number" if len(entries) == 1 else f"{len(entries)} numbers"
-        raise ExpressionError(f"found {given}, expected {dimension}, separated by commas", text)
+        found_text = "1 number" if len(entries) == 1 else f"{len(entries)} numbers"
+        raise ExpressionError(f"found {found_text}, expected {dimension}, separated by commas", text)
     point = []
     for entry, (start, end) in enumerate(entries, 1):
         try:
@@ -206,13 +210,13 @@ def point_entries(text: str) -> list[tuple[int, int]]:
     inside = text[start:end]
     if not inside.strip(BLANKS):
         return []
-    between = "," if "," in inside else r"[ \t\r\n]+"
-    if between != ",":
+    separator = "," if "," in inside else r"[ \t\r\n]+"
+    if separator != ",":
         start += len(inside) - len(inside.lstrip(BLANKS))
         inside = inside.strip(BLANKS)
-    places = [match.span() for match in re.finditer(between, inside)]
-    starts = [0, *(last for _, last in places)]
-    ends = [*(first for first, _ in places), len(inside)]
+    separators = [match.span() for match in re.finditer(separator, inside)]
+    starts = [0, *(last for _, last in separators)]
+    ends = [*(first for first, _ in separators), len(inside)]
     return [(start + first, start + last) for first, last in zip(starts, ends, strict=True)]
 
 
@@ -237,8 +241,8 @@ def parse_polynomial(
        ^
     """
     _check_expression(text, variables, constants)
-    work = _Arithmetic(text, ring(variables), constants, limits, quotients=False)
-    return work.polynomial(_parse(work).numerator)
+    arithmetic = _Arithmetic(text, ring(variables), constants, limits, quotients=False)
+    return arithmetic.polynomial(_parse(arithmetic).numerator)
 
 
 def parse_rational_function(
@@ -257,13 +261,14 @@ def parse_rational_function(
     '(x + 1)/(y - 1)'
     """
     _check_expression(text, variables, constants)
-    work = _Arithmetic(text, ring(variables), constants, limits, quotients=True)
-    numerator, denominator = _parse(work)
-    if denominator is None or not numerator.value:
-        return RationalFunction(work.polynomial(numerator), work.ring.constant(1))
+    arithmetic = _Arithmetic(text, ring(variables), constants, limits, quotients=True)
+    numerator, denominator = _parse(arithmetic)
+    if denominator is None or not numerator.element:
+        return RationalFunction(arithmetic.polynomial(numerator), arithmetic.ring.constant(1))
     # Make the denominator integral first: otherwise its normal form would take one lcm for each coefficient.
     return RationalFunction(
-        work.polynomial(numerator) * denominator.common_denominator, denominator.value * denominator.common_denominator
+        arithmetic.polynomial(numerator) * denominator.common_denominator,
+        denominator.element * denominator.common_denominator,
     )
 
 
@@ -315,7 +320,7 @@ _OPERAND = "expected a number, a name or '('"
 
 
 class _Polynomial(NamedTuple):
-    """A polynomial, or a number, of known size.
+    """A polynomial, or a number, of known size: the `element` (fmpq_mpoly or fmpq).
 
     `common_denominator` times it has integer coefficients of absolute value at most 2**bits.
 
@@ -323,7 +328,7 @@ class _Polynomial(NamedTuple):
     Numbers are fmpq, which is much faster than constant polynomials.
     """
 
-    value: Any
+    element: Any
     common_denominator: fmpz
     bits: int
     terms: int = 1
@@ -359,19 +364,19 @@ def _tokens(text: str) -> Iterator[Token]:
         match = _TOKEN.match(text, column)
         if match is None:
             hint = _WRITE.get(text[column], "use numbers, names and + - * / ^ ( )")
-            given = repr(text[column])
+            found_text = repr(text[column])
             if not (text[column].isascii() and text[column].isprintable()):
-                given = f"U+{ord(text[column]):04X} {unicodedata.name(text[column], '')}".rstrip()
-            raise ExpressionError(f"found the character {given}, {hint}", text, column)
+                found_text = f"U+{ord(text[column]):04X} {unicodedata.name(text[column], '')}".rstrip()
+            raise ExpressionError(f"found the character {found_text}, {hint}", text, column)
         yield Token(match[0], match.lastgroup or match[0], column)
         column = match.end()
     yield Token("", _END, len(text))
 
 
-def _parse(work: _Arithmetic) -> _Quotient:
+def _parse(arithmetic: _Arithmetic) -> _Quotient:
     """Compute the value of the text. Raises `ExpressionError`."""
     # Check length and brackets first, since the recursion below is as deep as the brackets.
-    text, limits = work.text, work.limits
+    text, limits = arithmetic.text, arithmetic.limits
     if len(text) > limits.characters:
         raise ExpressionError(f"found {len(text)} characters, expected at most {limits.characters}", text)
     if not text.strip(BLANKS):
@@ -389,10 +394,10 @@ def _parse(work: _Arithmetic) -> _Quotient:
             raise ExpressionError("found ')' without its '(', expected brackets in pairs", text, column)
     if opened:
         raise ExpressionError("found '(' without its ')', expected brackets in pairs", text, opened[-1])
-    reader = _Reader(work)
+    reader = _Reader(arithmetic)
     value = reader.sum()
     if reader.next.kind != _END:
-        raise _syntax_error(reader.next, work)
+        raise _syntax_error(reader.next, arithmetic)
     return value
 
 
@@ -403,9 +408,9 @@ class _Reader:
     brackets lead to recursion, and their depth is limited.
     """
 
-    def __init__(self, work: _Arithmetic) -> None:
-        self.work = work
-        self.tokens = _tokens(work.text)
+    def __init__(self, arithmetic: _Arithmetic) -> None:
+        self.arithmetic = arithmetic
+        self.tokens = _tokens(arithmetic.text)
         self.next = next(self.tokens)
 
     def take(self) -> Token:
@@ -416,13 +421,13 @@ class _Reader:
         pieces: list[Any] = [self.product()]
         while self.next.kind in ("+", "-"):
             pieces += [self.take(), self.product()]
-        return self.work.sum(pieces) if len(pieces) > 1 else pieces[0]
+        return self.arithmetic.sum(pieces) if len(pieces) > 1 else pieces[0]
 
     def product(self) -> _Quotient:
         pieces: list[Any] = [self.power()]
         while self.next.kind in ("*", "/"):
             pieces += [self.take(), self.power()]
-        return self.work.product(pieces) if len(pieces) > 1 else pieces[0]
+        return self.arithmetic.product(pieces) if len(pieces) > 1 else pieces[0]
 
     def power(self) -> _Quotient:
         bases = []
@@ -430,9 +435,9 @@ class _Reader:
         while self.next.kind in ("^", "**"):
             bases.append((signs, value, self.take()))
             signs, value = self.signs(), self.atom()
-        value = self.work.negated(signs, value)
+        value = self.arithmetic.negated(signs, value)
         for signs, base, operator in reversed(bases):
-            value = self.work.negated(signs, self.work.power(base, operator, value))
+            value = self.arithmetic.negated(signs, self.arithmetic.power(base, operator, value))
         return value
 
     def signs(self) -> list[Token]:
@@ -447,18 +452,18 @@ class _Reader:
             value = self.sum()
             closing = self.take()
             if closing.kind != ")":
-                raise _syntax_error(closing, self.work)
+                raise _syntax_error(closing, self.arithmetic)
             return value
         if token.kind not in ("number", "name"):
-            raise _syntax_error(token, self.work)
+            raise _syntax_error(token, self.arithmetic)
         if self.next.kind in ("number", "name", "("):  # before the name is looked up: sin(x) is a call
-            raise _syntax_error(self.next, self.work)
-        return self.work.number(token) if token.kind == "number" else self.work.name(token)
+            raise _syntax_error(self.next, self.arithmetic)
+        return self.arithmetic.number(token) if token.kind == "number" else self.arithmetic.name(token)
 
 
-def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
+def _syntax_error(token: Token, arithmetic: _Arithmetic) -> ExpressionError:
     """Return the error for a token that is not allowed at its position."""
-    text = work.text
+    text = arithmetic.text
     if token.kind == _END:
         return ExpressionError(f"found the end of the text, {_OPERAND}", text, len(text))
     column = token.start_pos
@@ -469,12 +474,12 @@ def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
     while start > 0 and (before[start - 1].isalnum() or before[start - 1] in "_.") and before[-1] != ")":
         start -= 1
     operand = before[start:]
-    if token.kind == "(" and is_name(operand) and operand not in work.names:
+    if token.kind == "(" and is_name(operand) and operand not in arithmetic.names:
         call = f"found {quoted(operand + '(')}, which looks like a function call"
         return ExpressionError(f"{call}: only + - * / ^ are available, and products are written with *", text, start)
     example = f"{operand}*{token}" if len(operand) + len(token) < 40 else "x*y"
-    given = f"found {quoted(token)} right after {quoted(operand)}"
-    return ExpressionError(f"{given}, expected an operator between them: write {example}", text, column)
+    found_text = f"found {quoted(token)} right after {quoted(operand)}"
+    return ExpressionError(f"{found_text}, expected an operator between them: write {example}", text, column)
 
 
 class _Arithmetic:
@@ -514,7 +519,7 @@ class _Arithmetic:
     def name(self, token: Token) -> _Quotient:
         value = self.names.get(token)
         if value is None:
-            raise self.unknown(str(token), token.start_pos)
+            raise self.unknown_name(str(token), token.start_pos)
         self.check_bits(max(value.numerator.bits, _bits(value.numerator.common_denominator)), token.start_pos)
         return value
 
@@ -531,7 +536,7 @@ class _Arithmetic:
                 polynomials.append(value.numerator)
                 continue
             for denominator, terms in fractions:
-                if denominator.value == value.denominator.value:
+                if denominator.element == value.denominator.element:
                     terms.append(value.numerator)
                     break
             else:
@@ -539,7 +544,7 @@ class _Arithmetic:
                 degree = sum(denominator.degree for denominator, _ in fractions)
                 self.check_degree(degree, "a common denominator", pieces[max(i - 1, 1)].start_pos)
 
-        def total(values: list[_Polynomial]) -> _Polynomial:
+        def sum_of(values: list[_Polynomial]) -> _Polynomial:
             """Add in pairs: adding one by one would copy the growing sum once for each term."""
             while len(values) > 1:
                 odd = values[-1:] if len(values) % 2 else []
@@ -548,14 +553,14 @@ class _Arithmetic:
             return values[0]
 
         if not fractions:
-            return _Quotient(total(polynomials), None)
-        common, numerator = fractions[0][0], total(fractions[0][1])
+            return _Quotient(sum_of(polynomials), None)
+        common, numerator = fractions[0][0], sum_of(fractions[0][1])
         for denominator, terms in fractions[1:]:
-            crossed = self.times(total(terms), common, column)
+            crossed = self.times(sum_of(terms), common, column)
             numerator = self.add(self.times(numerator, denominator, column), crossed, column)
             common = self.times(common, denominator, column)
         if polynomials:
-            numerator = self.add(numerator, self.times(total(polynomials), common, column), column)
+            numerator = self.add(numerator, self.times(sum_of(polynomials), common, column), column)
         return _Quotient(numerator, common)
 
     def product(self, pieces: list[Any]) -> _Quotient:
@@ -583,8 +588,8 @@ class _Arithmetic:
             raise self.error_at("found an exponent with variables in it, expected an integer", column)
         if exponent.q != 1 or abs(exponent.p) > self.limits.exponent:
             bits = exponent.height_bits()
-            given = f"found the exponent {exponent if bits < 100 else f'of about {bits * 1000 // 3322} digits'}"
-            raise self.error_at(f"{given}, expected an integer of size at most {self.limits.exponent}", column)
+            found_text = f"found the exponent {exponent if bits < 100 else f'of about {bits * 1000 // 3322} digits'}"
+            raise self.error_at(f"{found_text}, expected an integer of size at most {self.limits.exponent}", column)
         n = int(exponent.p)
         if n < 0:
             base, n = self.reciprocal(base, column), -n
@@ -597,20 +602,20 @@ class _Arithmetic:
 
     def reciprocal(self, value: _Quotient, column: int) -> _Quotient:
         numerator, denominator = value.numerator, value.denominator or self.one
-        if not numerator.value:
+        if not numerator.element:
             raise self.error_at("found a division by 0", column)
         number = _constant(_Quotient(numerator, None))
         if number is not None:
             return _Quotient(self.times_number(denominator, 1 / number, column), None)
         if not self.quotients:
             raise self.error_at("found a division by something with variables in it, expected a polynomial", column)
-        leading = numerator.value.leading_coefficient()
+        leading = numerator.element.leading_coefficient()
         if leading == 1:
             return _Quotient(denominator, numerator)
         # Make the leading coefficient 1, so that denominators which differ by a constant become equal.
         self.spend(numerator.terms, numerator.bits, column)
         monic = numerator._replace(
-            value=numerator.value / leading, common_denominator=abs((leading * numerator.common_denominator).p)
+            element=numerator.element / leading, common_denominator=abs((leading * numerator.common_denominator).p)
         )
         return _Quotient(self.times_number(denominator, 1 / leading, column), monic)
 
@@ -620,16 +625,18 @@ class _Arithmetic:
     # Arithmetic of numbers and polynomials: estimate the size, then raise an error or compute.
 
     def add(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
-        scale = left.common_denominator
+        common_denominator = left.common_denominator
         bits = max(left.bits, right.bits) + 1
         if left.common_denominator != right.common_denominator:
-            scale = left.common_denominator.lcm(right.common_denominator)
-            size = _bits(scale)
-            bits = 2 + max(side.bits + size - side.common_denominator.bit_length() for side in (left, right))
-            self.check_bits(size, column)
+            common_denominator = left.common_denominator.lcm(right.common_denominator)
+            denominator_bits = _bits(common_denominator)
+            bits = 2 + max(
+                summand.bits + denominator_bits - summand.common_denominator.bit_length() for summand in (left, right)
+            )
+            self.check_bits(denominator_bits, column)
         self.check_bits(bits, column)
         self.spend(left.terms + right.terms, bits, column)
-        return self.counted(left.value + right.value, scale, bits, column)
+        return self.measured(left.element + right.element, common_denominator, bits, column)
 
     def times(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
         if right is self.one:
@@ -640,10 +647,12 @@ class _Arithmetic:
         self.check_bits(max(bits, _bits(left.common_denominator) + _bits(right.common_denominator)), column)
         bits_of_pair = bits // 8  # FLINT takes some 50 ns for a pair of terms, up to coefficients of 8 words
         if pairs * (bits_of_pair // 64 + 1) > self.limits.words:
-            given = f"found a product of polynomials with {left.terms} and {right.terms} terms"
-            raise self.error_at(f"{given}, which is too large to expand", column)
+            found_text = f"found a product of polynomials with {left.terms} and {right.terms} terms"
+            raise self.error_at(f"{found_text}, which is too large to expand", column)
         self.spend(pairs, bits_of_pair, column)
-        return self.counted(left.value * right.value, left.common_denominator * right.common_denominator, bits, column)
+        return self.measured(
+            left.element * right.element, left.common_denominator * right.common_denominator, bits, column
+        )
 
     def times_number(self, value: _Polynomial, number: fmpq, column: int) -> _Polynomial:
         if number == 1:
@@ -652,7 +661,7 @@ class _Arithmetic:
         self.check_bits(max(bits, _bits(value.common_denominator) + _bits(number.q)), column)
         self.spend(value.terms, bits, column)
         return value._replace(
-            value=value.value * number, common_denominator=value.common_denominator * number.q, bits=bits
+            element=value.element * number, common_denominator=value.common_denominator * number.q, bits=bits
         )
 
     def repeated(self, value: _Polynomial, n: int, column: int) -> _Polynomial:
@@ -662,7 +671,7 @@ class _Arithmetic:
             bits = value.bits * n
             self.check_bits(max(bits, _bits(value.common_denominator) * n), column)
             self.spend(1, bits, column)
-            return _Polynomial(value.value**n, value.common_denominator**n, bits, 1, value.degree * n)
+            return _Polynomial(value.element**n, value.common_denominator**n, bits, 1, value.degree * n)
         result = value
         for digit in f"{n:b}"[1:]:
             result = self.times(result, result, column)
@@ -670,28 +679,28 @@ class _Arithmetic:
                 result = self.times(result, value, column)
         return result
 
-    # Refusals
+    # Limits, and the errors where they are exceeded.
 
-    def counted(self, value: Any, scale: fmpz, bits: int, column: int) -> _Polynomial:
+    def measured(self, value: Any, common_denominator: fmpz, bits: int, column: int) -> _Polynomial:
         if isinstance(value, fmpq):
             return self.constant(value).numerator
         if len(value) > self.limits.terms:
-            given = f"found a polynomial of {len(value)} terms"
-            raise self.error_at(f"{given}, expected at most {self.limits.terms}", column)
-        return _Polynomial(value, scale, bits, len(value), int(value.total_degree()))
+            found_text = f"found a polynomial of {len(value)} terms"
+            raise self.error_at(f"{found_text}, expected at most {self.limits.terms}", column)
+        return _Polynomial(value, common_denominator, bits, len(value), int(value.total_degree()))
 
     def polynomial(self, value: _Polynomial) -> fmpq_mpoly:
         """The value as a polynomial even if it is a number."""
-        return self.ring.constant(value.value) if isinstance(value.value, fmpq) else value.value
+        return self.ring.constant(value.element) if isinstance(value.element, fmpq) else value.element
 
     def check_bits(self, bits: int, column: int) -> None:
         if bits > self.max_bits:
-            given = f"found a number of about {bits * 1000 // 3322} digits"
-            raise self.error_at(f"{given}, expected at most {self.limits.digits}", column)
+            found_text = f"found a number of about {bits * 1000 // 3322} digits"
+            raise self.error_at(f"{found_text}, expected at most {self.limits.digits}", column)
 
-    def check_degree(self, degree: int, what: str, column: int) -> None:
+    def check_degree(self, degree: int, operation: str, column: int) -> None:
         if degree > self.limits.degree:
-            raise self.error_at(f"found {what} of degree {degree}, expected at most {self.limits.degree}", column)
+            raise self.error_at(f"found {operation} of degree {degree}, expected at most {self.limits.degree}", column)
 
     def spend(self, terms: int, bits: int, column: int) -> None:
         """Count the machine words of `terms` terms with coefficients of this number of bits."""
@@ -702,26 +711,26 @@ class _Arithmetic:
     def error_at(self, message: str, column: int) -> ExpressionError:
         return ExpressionError(message, self.text, column)
 
-    def unknown(self, name: str, column: int | None) -> UnknownName:
-        known = list(self.names)
-        if not known:
+    def unknown_name(self, name: str, column: int | None) -> UnknownName:
+        names = list(self.names)
+        if not names:
             return UnknownName(f"found the name {quoted(name)}, expected numbers only", self.text, column)
-        meant = ""
+        suggestion = ""
         if len(name) <= 40:  # the search for a look-alike is quadratic
-            folded = {other.lower(): other for other in known}
+            folded = {other.lower(): other for other in names}
             from difflib import get_close_matches
 
-            meant = "".join(folded[other] for other in get_close_matches(name.lower(), folded, 1, 0.7))
-            products = (f"{name[:i]}*{name[i:]}" for i in range(1, len(name)) if {name[:i], name[i:]} <= set(known))
-            meant = next(products, meant)
-        hint = f"did you mean {meant}? " if meant else ""
-        listed = ", ".join(known[:30]) + (", ..." if len(known) > 30 else "")
+            suggestion = "".join(folded[other] for other in get_close_matches(name.lower(), folded, 1, 0.7))
+            products = (f"{name[:i]}*{name[i:]}" for i in range(1, len(name)) if {name[:i], name[i:]} <= set(names))
+            suggestion = next(products, suggestion)
+        hint = f"did you mean {suggestion}? " if suggestion else ""
+        listed = ", ".join(names[:30]) + (", ..." if len(names) > 30 else "")
         return UnknownName(f"found the unknown name {quoted(name)}: {hint}known are {listed}", self.text, column)
 
 
 def _constant(value: _Quotient) -> fmpq | None:
     """The number that a value is, or None where variables are left in it."""
-    numerator = value.numerator.value
+    numerator = value.numerator.element
     if not numerator:
         return fmpq(0)
     if value.denominator is not None or value.numerator.degree > 0:

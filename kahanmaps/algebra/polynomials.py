@@ -50,8 +50,8 @@ def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
     (x, y)
     """
     if len(set(names)) != len(names):
-        twice = sorted({name for name in names if list(names).count(name) > 1})
-        raise InputError(f"found the variable {quoted(twice[0])} twice, expected distinct names")
+        repeated = sorted({name for name in names if list(names).count(name) > 1})
+        raise InputError(f"found the variable {quoted(repeated[0])} twice, expected distinct names")
     return fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
 
 
@@ -200,23 +200,23 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     """
     if all(isinstance(entry, fmpq) for entry in point):
         # Compute in integers over a common denominator: one gcd for the result instead of one for each term.
-        top = degree(polynomial)
-        if top <= 0:
-            return polynomial.leading_coefficient() if top == 0 else fmpq(0)
+        total_degree = degree(polynomial)
+        if total_degree <= 0:
+            return polynomial.leading_coefficient() if total_degree == 0 else fmpq(0)
         X, W = over_one(point)
         denominator = common_denominator(polynomial)
         powers: list[list[Any]] = [*([fmpz(1), entry] for entry in X), [fmpz(1), W]]
         total: Any = fmpz(0)
         for monomial, coefficient in polynomial.terms():
             term: Any = coefficient.p * (denominator // coefficient.q)
-            for table, exponent in zip(powers, (*monomial, top - int(sum(monomial))), strict=True):
+            for table, exponent in zip(powers, (*monomial, total_degree - int(sum(monomial))), strict=True):
                 if exponent:
                     term = term * _power(table, exponent)
             total += term
-        return fmpq(total, denominator * _power(powers[-1], top))
-    own = field.value(polynomial, point)
-    if own is not None:
-        return own
+        return fmpq(total, denominator * _power(powers[-1], total_degree))
+    field_value = field.value(polynomial, point)
+    if field_value is not None:
+        return field_value
     count(1 + 3 * len(polynomial))
     powers = [[field.one, entry] for entry in point]
     total = field.zero
@@ -253,8 +253,8 @@ def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> 
 def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:
     """Replace some variables by numbers; the result is in the ring of the remaining variables."""
     names = names_of(polynomial)
-    known: dict[Any, Any] = {name: value for name, value in values.items() if name in names}
-    return polynomial.subs(known).project_to_context(ring([name for name in names if name not in known]))
+    replaced: dict[Any, Any] = {name: value for name, value in values.items() if name in names}
+    return polynomial.subs(replaced).project_to_context(ring([name for name in names if name not in replaced]))
 
 
 def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:

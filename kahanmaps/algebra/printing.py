@@ -147,18 +147,22 @@ def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _
     >>> format_product([(x + y, 2), (y, -1), (x - 1, -3)], fmpq(-2, 3)), format_product([(x + y, 1)])
     ('-2*(x + y)^2/(3*y*(x - 1)^3)', 'x + y')
     """
-    parts = []
+    factor_texts = []
     for number, powers in numerator_and_denominator(factors, constant):
         bases = [(f"({format_polynomial(g)})" if len(g) > 1 else format_polynomial(g), k) for g, k in powers]
         powers_text = [base + (f"^{k}" if k > 1 else "") for base, k in bases]
-        parts.append(([str(number)] if number > 1 else []) + powers_text)
-    numerator, denominator = ("*".join(part) for part in parts)
+        factor_texts.append(([str(number)] if number > 1 else []) + powers_text)
+    numerator, denominator = ("*".join(texts) for texts in factor_texts)
     if len(factors) == 1 and factors[0][1] == 1 and constant == 1:
         return format_polynomial(factors[0][0])
     sign = "-" if constant < 0 else ""
     if not denominator:
         return f"{sign}{numerator or 1}"
-    return f"{sign}{numerator or 1}/({denominator})" if len(parts[1]) > 1 else f"{sign}{numerator or 1}/{denominator}"
+    return (
+        f"{sign}{numerator or 1}/({denominator})"
+        if len(factor_texts[1]) > 1
+        else f"{sign}{numerator or 1}/{denominator}"
+    )
 
 
 def numerator_and_denominator(
@@ -252,9 +256,9 @@ class Notation:
         """
         factored = shorter_factors(function)
         if factored is None:
-            is_negative, *parts = integer_fraction(function)
-            numerator, denominator = map(self.polynomial, parts)
-            is_polynomial = parts[1].is_one()
+            is_negative, *polynomials = integer_fraction(function)
+            numerator, denominator = map(self.polynomial, polynomials)
+            is_polynomial = polynomials[1].is_one()
         else:
             is_negative, (numerator_factors, denominator_factors) = (
                 factored[1] < 0,
@@ -270,14 +274,14 @@ class Notation:
         if number == 1 and [k for _, k in powers] == [1]:
             return self.polynomial(powers[0][0])
         variables = [g**k for g, k in powers if len(g) == 1]
-        parts = [self.polynomial(prod(variables[1:], start=variables[0] * number))] if variables else []
+        factor_texts = [self.polynomial(prod(variables[1:], start=variables[0] * number))] if variables else []
         if not variables and (number > 1 or not powers):
-            parts = [self.number(fmpq(number))]
+            factor_texts = [self.number(fmpq(number))]
         for g, k in powers:
             if len(g) > 1:
                 base = self.enclosed(self.polynomial(g))
-                parts.append(base if k == 1 else self.power(base, k))
-        return parts[0] if len(parts) == 1 and variables else self.row(self.times.join(parts))
+                factor_texts.append(base if k == 1 else self.power(base, k))
+        return factor_texts[0] if len(factor_texts) == 1 and variables else self.row(self.times.join(factor_texts))
 
 
 PLAIN = Notation(str, str, "{}^{}".format)

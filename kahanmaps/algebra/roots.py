@@ -45,10 +45,10 @@ class Root:
             )
         factors = polynomial.factor()[1]
         if len(factors) != 1 or factors[0][1] != 1:
-            parts = ", ".join(format_univariate(factor) for factor, _ in factors)
+            factors_text = ", ".join(format_univariate(factor) for factor, _ in factors)
             g = format_univariate(polynomial)
-            what = f"it is a power of {parts}" if len(factors) == 1 else f"its factors are {parts}"
-            raise InputError(f"found a root of {g}, expected an irreducible polynomial: {what}")
+            reason = f"it is a power of {factors_text}" if len(factors) == 1 else f"its factors are {factors_text}"
+            raise InputError(f"found a root of {g}, expected an irreducible polynomial: {reason}")
         self.polynomial = polynomial / polynomial.leading_coefficient()
         self.near = near
         self._near_text = "" if near is None else QQ.format(near)
@@ -196,15 +196,15 @@ def parse_algebraic_point(
             raise InputError(f"entry {number}: {error}\n{hint}") from None
         except InputError as error:
             raise InputError(f"entry {number}: {error}") from None
-    used = [k for k, name in enumerate(roots) if any(name not in entry.unused_gens() for entry in entries)]
-    if len(used) > 1:
-        names = " and ".join(list(roots)[k] for k in used)
+    occurring = [k for k, name in enumerate(roots) if any(name not in entry.unused_gens() for entry in entries)]
+    if len(occurring) > 1:
+        names = " and ".join(list(roots)[k] for k in occurring)
         raise InputError(f"found the algebraic numbers {names} in a point, expected one")
-    if not used:
+    if not occurring:
         return tuple(entry.leading_coefficient() if entry else fmpq(0) for entry in entries)
-    name, root = list(roots.items())[used[0]]
+    name, root = list(roots.items())[occurring[0]]
     generator = ring([name]).gens()[0]
-    values = [generator if k == used[0] else generator * 0 for k in range(len(roots))]
+    values = [generator if k == occurring[0] else generator * 0 for k in range(len(roots))]
     return AlgebraicPoint(root, tuple(entry.compose(*values, ctx=generator.context()) for entry in entries))
 
 

@@ -50,11 +50,11 @@ class SolutionComponent:
     @property
     def free(self) -> tuple[int, ...]:
         """The indices of the free variables."""
-        used = [False] * self.values[0].context().nvars()
+        occurs = [False] * self.values[0].context().nvars()
         for value in (*self.values, *self.equations):
             for i, exponent in enumerate(value.degrees()):
-                used[i] = used[i] or exponent > 0
-        return tuple(i for i, u in enumerate(used) if u)
+                occurs[i] = occurs[i] or exponent > 0
+        return tuple(i for i, u in enumerate(occurs) if u)
 
     @property
     def point(self) -> tuple[fmpq, ...]:
@@ -62,19 +62,19 @@ class SolutionComponent:
         zero = (0,) * self.values[0].context().nvars()
         return tuple(value[zero] if not value.is_zero() else fmpq(0) for value in self.values)
 
-    def slopes(self, i: int) -> list[fmpq]:
-        """Return the derivative of the values in the free variable i."""
+    def direction(self, i: int) -> list[fmpq]:
+        """Return the derivative of the values with respect to the free variable i."""
         return [v.derivative(i).leading_coefficient() if v.degrees()[i] else fmpq(0) for v in self.values]
 
     def contains(self, other: SolutionComponent) -> bool:
         """Whether the linear family `other`, or the point, lies in this linear family."""
         size = len(self.values)
-        slopes = [self.slopes(i) for i in self.free]
-        space = fmpq_mat(size, len(slopes), [slope[k] for k in range(size) for slope in slopes])
+        directions = [self.direction(i) for i in self.free]
+        space = fmpq_mat(size, len(directions), [direction[k] for k in range(size) for direction in directions])
         offset = [a - b for a, b in zip(other.point, self.point, strict=True)]
-        vectors = [offset, *(other.slopes(i) for i in other.free)]
-        wider = fmpq_mat([[*space.tolist()[k], *(v[k] for v in vectors)] for k in range(size)])
-        return int(wider.rank()) == len(slopes)
+        vectors = [offset, *(other.direction(i) for i in other.free)]
+        joined = fmpq_mat([[*space.tolist()[k], *(v[k] for v in vectors)] for k in range(size)])
+        return int(joined.rank()) == len(directions)
 
 
 @dataclass
@@ -158,16 +158,18 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
     remainder = context.constant(0)
     leads = [(tuple(g.monoms()[0]), g) for g in basis]
     while not p.is_zero():
-        top, value = tuple(p.monoms()[0]), p.leading_coefficient()
+        leading_exponents, leading_coefficient = tuple(p.monoms()[0]), p.leading_coefficient()
         count(10 + len(p) + len(leads) / 2)
         for lead, g in leads:
-            if all(a <= b for a, b in zip(lead, top, strict=True)):
-                cofactor = context.from_dict({tuple(b - a for a, b in zip(lead, top, strict=True)): fmpq(1)})
-                p = p - g * cofactor * (value / g.leading_coefficient())
+            if all(a <= b for a, b in zip(lead, leading_exponents, strict=True)):
+                cofactor = context.from_dict(
+                    {tuple(b - a for a, b in zip(lead, leading_exponents, strict=True)): fmpq(1)}
+                )
+                p = p - g * cofactor * (leading_coefficient / g.leading_coefficient())
                 break
         else:
-            head = context.from_dict({top: value})
-            remainder, p = remainder + head, p - head
+            leading_term = context.from_dict({leading_exponents: leading_coefficient})
+            remainder, p = remainder + leading_term, p - leading_term
     return remainder
 
 
@@ -189,8 +191,8 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
         for p in forms:
             total = total + p * fmpq(rng.randint(1, 99))
         point = [fmpq(rng.randint(-99, 99)) for _ in range(count)]
-        second = (total.derivative(i).derivative(j) for i in range(count) for j in range(count))
-        return fmpq_mat(count, count, [evaluate(p, QQ, point) for p in second])
+        second_derivatives = (total.derivative(i).derivative(j) for i in range(count) for j in range(count))
+        return fmpq_mat(count, count, [evaluate(p, QQ, point) for p in second_derivatives])
 
     first = hessian()
     if first.det() == 0:
@@ -199,12 +201,12 @@ def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
     _, factors = ratio.charpoly().factor()
     blocks = []
     for factor, multiplicity in factors:
-        part = fmpq_mat(count, count)
+        annihilator = fmpq_mat(count, count)
         power = QQ.identity(count)
         for coefficient in (factor**multiplicity).coeffs():
-            part = part + power * coefficient
+            annihilator = annihilator + power * coefficient
             power = power * ratio
-        blocks.append(nullspace(QQ, part))
+        blocks.append(nullspace(QQ, annihilator))
     T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
     # Return nothing unless the coordinates decouple: they would only make the numbers longer.
     block_of = [k for k, block in enumerate(blocks) for _ in block]
@@ -314,9 +316,9 @@ class _Solver:
         self.solutions.conjugate.append(SolutionComponent(values, tuple(equations)))
 
     def _give_up(self, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], reason: str) -> None:
-        part = SolutionComponent(values, tuple(equations))
-        if part not in self.solutions.unsolved:
-            self.solutions.unsolved.append(part)
+        component = SolutionComponent(values, tuple(equations))
+        if component not in self.solutions.unsolved:
+            self.solutions.unsolved.append(component)
         self.solutions.reason = reason
 
 
@@ -325,12 +327,12 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
     # Factors of high degree lead to long branches: the least of the largest degrees decides, not the number of factors.
     products = []
     for p in equations:
-        used = sum(e > 0 for e in p.degrees())
-        if used == 1:
+        variable_count = sum(e > 0 for e in p.degrees())
+        if variable_count == 1:
             bits = max(max(abs(c.p), c.q).bit_length() for c in p.coeffs())
             count(40 + degree(p) ** 2 * (1 + bits / 200) / 2)
         elif len(p) <= MAX_FACTORED:
-            count(60 + 5 * used**2 + 3 * len(p))
+            count(60 + 5 * variable_count**2 + 3 * len(p))
         else:
             continue
         products.append(p.factor()[1])
@@ -382,12 +384,12 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         cleared = integers.from_dict({tuple(m): c.p * (denominator // c.q) for m, c in p.terms()})
         if not add(cleared.primitive()[1]):
             return None
-    used = sum(any(lead[i] for lead in leads) for i in range(integers.nvars()))
+    variable_count = sum(any(lead[i] for lead in leads) for i in range(integers.nvars()))
     vector = fmpz_mpoly_vec(basis, integers)
     while pairs:
         if budget.is_spent:
             return None
-        total, _, i, j = heappop(pairs)
+        lcm_degree, _, i, j = heappop(pairs)
         waiting.remove((i, j))
         count(4 + len(basis) / 10)
         common = pack(map(max, leads[i], leads[j])) + guard
@@ -402,7 +404,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
             continue
         s_polynomial = basis[i].spoly(basis[j])
         mean = sum(map(len, basis)) / len(basis)
-        count(5 + mean * total * used * sqrt(used * bits * len(s_polynomial)) / 200)
+        count(5 + mean * lcm_degree * variable_count * sqrt(variable_count * bits * len(s_polynomial)) / 200)
         remainder = s_polynomial.reduction_primitive_part(vector)
         if not remainder.is_zero():
             if not add(remainder):

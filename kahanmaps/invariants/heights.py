@@ -135,12 +135,14 @@ class HeightGrowth:
     @property
     def text(self) -> str:
         """A sentence on the kind of growth and its reason."""
-        parts = [f"heights grow as: {self.kind}"]
+        phrases = [f"heights grow as: {self.kind}"]
         if self.constant is not None:
-            parts.append(f"about {decimal_text(self.constant)} {'n^2' if self.kind is Growth.QUADRATIC else 'n'} bits")
+            phrases.append(
+                f"about {decimal_text(self.constant)} {'n^2' if self.kind is Growth.QUADRATIC else 'n'} bits"
+            )
         if self.kind is Growth.EXPONENTIAL and self.ratio is not None:
-            parts.append(f"by a factor of about {decimal_text(self.ratio)} in {counted(self.every, 'step')}")
-        return f"{', '.join(parts)}; {self.reason}"
+            phrases.append(f"by a factor of about {decimal_text(self.ratio)} in {counted(self.every, 'step')}")
+        return f"{', '.join(phrases)}; {self.reason}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: heights at the steps 0, 1, 2, 4, 8, ... (times `every`) and the last; numbers rounded as text."""
@@ -227,17 +229,17 @@ def height_growth(
     if every < 1:
         raise InputError(f"found every = {every}, expected at least 1")
     require_steps(steps)
-    at = range(0, steps + 1, every)
-    first = height(kahan_map.point(start))
-    bits = first if kahan_map.eps is None else max(first, height([kahan_map.eps]))
+    requested_steps = range(0, steps + 1, every)
+    start_height = height(kahan_map.point(start))
+    bits = start_height if kahan_map.eps is None else max(start_height, height([kahan_map.eps]))
     if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
         # A single step could take minutes, and its numbers would usually be over the budget as well.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
-        return HeightGrowth((first,), end, every)
+        return HeightGrowth((start_height,), end, every)
     normal_form = _NOT_GIVEN if normal_form is None else normal_form
-    method = choose_method(None, "exact", normal_form, None if every == 1 else at).name
+    method = choose_method(None, "exact", normal_form, None if every == 1 else requested_steps).name
     if method == "doubling" and isinstance(normal_form, SystemNormalForm):
-        iterates = Orbit(kahan_map, start, at=at, normal_form=normal_form, max_digits=max_digits)
+        iterates = Orbit(kahan_map, start, at=requested_steps, normal_form=normal_form, max_digits=max_digits)
         # A return to the initial point shows at a multiple of the period, since steps are left out.
         heights: list[int] = []
         origin, return_step = None, None
@@ -255,7 +257,7 @@ def height_growth(
             end = OrbitEnd("periodic", end.steps, f"at step {return_step} the orbit is at its start")
     else:
         form = normal_form if method == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
-        orbit = Orbit(kahan_map, start, at[-1], normal_form=form, max_digits=max_digits)
+        orbit = Orbit(kahan_map, start, requested_steps[-1], normal_form=form, max_digits=max_digits)
         heights = [bits for _, bits in _within(orbit, every, budget)]
         assert orbit.end is not None
         end = orbit.end
@@ -315,8 +317,8 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     low, high = min(heights[:half]), max(heights[:half])
     if low <= min(heights[half:]) and max(heights[half:]) <= high:
         return Growth.BOUNDED, f"the second half of them stays within {low} to {high} bits, as the first"
-    least, spread = min(rises), max(rises) - min(rises)
-    if least > 0 and spread <= least / 4 and (spread <= _NOISE or spread <= least / 32):
+    least_rise, spread = min(rises), max(rises) - min(rises)
+    if least_rise > 0 and spread <= least_rise / 4 and (spread <= _NOISE or spread <= least_rise / 32):
         return Growth.LINEAR, f"{measured}, about the same each time"
     return Growth.UNDECIDED, f"{measured}, which fits no rule; more steps may tell"
 

@@ -102,9 +102,9 @@ class ClaimedFunction(PhaseFunction):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         points = [tuple(point)]
         if self.map is not None and self.iterates:
-            over = self.map.at(eps, field)
+            map_at_eps = self.map.at(eps, field)
             while len(points) <= self.iterates:
-                points.append(over.step(points[-1]))
+                points.append(map_at_eps.step(points[-1]))
         return self.on(field, eps, points)
 
     def on(self, field: Field, eps: Any, points: Sequence[Sequence[Any]]) -> Any:
@@ -115,21 +115,21 @@ class ClaimedFunction(PhaseFunction):
             return self.function.value(field, (*coordinates, *values, field.convert(eps)))
 
 
-def orbit_about(over: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
+def orbit_about(map_at_eps: Map, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
     """Return an orbit of `length` steps with x in the middle or, if the inverse is not known, at the beginning.
 
     With x in the middle the formulas of the points have lower degrees.
     """
-    points, before = [x], 0
+    points, steps_back = [x], 0
     try:
-        inverse = over.inverse
-        before = length // 2
+        inverse = map_at_eps.inverse
+        steps_back = length // 2
     except InputError:
-        inverse = over
-    for _ in range(before):
+        inverse = map_at_eps
+    for _ in range(steps_back):
         points.insert(0, inverse.step(points[0]))
     while len(points) <= length:
-        points.append(over.step(points[-1]))
+        points.append(map_at_eps.step(points[-1]))
     return points
 
 
@@ -168,10 +168,10 @@ def _not_all_zero(polynomials: Sequence[fmpq_mpoly], dim: int) -> str:
     names = names_of(polynomials[0])
     coefficients = [c for polynomial in polynomials for c in coefficients_in(polynomial, dim)]
     if "eps" in names[dim:]:  # the last variable: divide each coefficient by its power of eps, which is not 0
-        least = [min(int(monomial[-1]) for monomial in c.monoms()) for c in coefficients]
+        lowest_orders = [min(int(monomial[-1]) for monomial in c.monoms()) for c in coefficients]
         coefficients = [
-            c.context().from_dict({(*m[:-1], int(m[-1]) - low): value for m, value in c.terms()})
-            for c, low in zip(coefficients, least, strict=True)
+            c.context().from_dict({(*m[:-1], int(m[-1]) - order): value for m, value in c.terms()})
+            for c, order in zip(coefficients, lowest_orders, strict=True)
         ]
     symbols = {name for c in coefficients for name in names if name not in c.unused_gens()}
     if len(symbols) == 1:
@@ -317,12 +317,10 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, r
 def is_constant(numerator: fmpq_mpoly, denominator: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
     """Whether the quotient of two polynomials does not depend on the first `dim` variables; `denominator` is not 0."""
     monomial, coefficients = denominator.monoms()[0][:dim], list[fmpq_mpoly]()
-    for part in (
-        numerator,
-        denominator,
-    ):  # the coefficient of this monomial, a polynomial in the other variables
-        terms = {(*(0,) * dim, *m[dim:]): value for m, value in part.terms() if m[:dim] == monomial}
-        coefficients.append(part.context().from_dict(terms))
+    # The coefficient of this monomial in each of them, a polynomial in the other variables.
+    for polynomial in (numerator, denominator):
+        terms = {(*(0,) * dim, *m[dim:]): value for m, value in polynomial.terms() if m[:dim] == monomial}
+        coefficients.append(polynomial.context().from_dict(terms))
     difference = numerator * coefficients[1] - denominator * coefficients[0]
     return bool((difference if root is None else root.remainder(difference, dim)).is_zero())
 
@@ -385,12 +383,12 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: R
     numerator, denominator = at_eps(phi, eps, root, dim)
     if numerator.is_zero():
         text = format_rational_function(phi)
-        what = "0/0" if denominator.is_zero() else "identically 0"
-        at = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
-        which = f", which is {what} at {at}" if text != "0" else ""
+        value_text = "0/0" if denominator.is_zero() else "identically 0"
+        place = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
+        explanation = f", which is {value_text} at {place}" if text != "0" else ""
         raise InputError(
-            f"found the density {quoted(text) if which else text}{which}, expected a function that is not zero: "
-            "the measure is dx/phi"
+            f"found the density {quoted(text) if explanation else text}{explanation}, "
+            "expected a function that is not zero: the measure is dx/phi"
         )
     return where(dim, numerator) if denominator.is_zero() else where(dim, numerator, denominator)
 
@@ -469,7 +467,7 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
         numerator, denominator = _content(P, dim), _content(Q, dim)
         P, Q = P / numerator, Q / denominator
         alpha, beta, gamma = alpha * denominator, beta * denominator, gamma * numerator
-        p, q = _lowest(P), _lowest(Q)
+        p, q = _lowest_order_terms(P), _lowest_order_terms(Q)
         common = p.gcd(q)
         p, q = p / common, q / common
         if degree_in(p, dim) or degree_in(q, dim):
@@ -512,7 +510,7 @@ def _content(polynomial: fmpq_mpoly, dim: int) -> fmpq_mpoly:
     return content / content if content.is_constant() else content
 
 
-def _lowest(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+def _lowest_order_terms(polynomial: fmpq_mpoly) -> fmpq_mpoly:
     """Return the terms of lowest order in eps, divided by this power of eps."""
     order = min(int(monomial[-1]) for monomial in polynomial.monoms())
     terms: dict[tuple[int, ...], fmpq] = {}

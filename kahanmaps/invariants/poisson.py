@@ -60,7 +60,7 @@ class PoissonTensor(ABC):
         """Return the matrix P(x), None at a pole."""
 
     @abstractmethod
-    def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
+    def derivative(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
         """Return the matrix sum_l v_l dP/dx_l for a direction v, at a point that is not a pole."""
 
 
@@ -81,10 +81,10 @@ class HamiltonianTensor(PoissonTensor):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         return poisson_tensor(self.hamiltonian, field, eps, point)
 
-    def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
-        local = self.hamiltonian.system.over(field)
+    def derivative(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
+        system_over_field = self.hamiltonian.system.over(field)
         with field.working():
-            first, second = local.jacobian(point), local.hessian_times(direction)
+            first, second = system_over_field.jacobian(point), system_over_field.hessian_times(direction)
             return (second * first + first * second) * field.convert_matrix(self.hamiltonian.J) * -(eps * eps)
 
 
@@ -174,25 +174,29 @@ class MatrixPoissonTensor(PoissonTensor):
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():
-            place = (*point, field.convert(eps))
-            upper = {pair: entry.value(field, place) for pair, entry in self._upper.items()}
+            arguments = (*point, field.convert(eps))
+            upper = {pair: entry.value(field, arguments) for pair, entry in self._upper.items()}
             return None if None in upper.values() else self._matrix(field, upper)
 
-    def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
+    def derivative(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
         with field.working():
-            place = (*point, field.convert(eps))
+            arguments = (*point, field.convert(eps))
 
-            def slope(parts: Sequence[Any]) -> Any:
-                terms = [v * evaluate(P, field, place) for v, P in zip(direction, parts, strict=False) if len(P)]
+            def directional_derivative(partial_derivatives: Sequence[Any]) -> Any:
+                terms = [
+                    v * evaluate(P, field, arguments)
+                    for v, P in zip(direction, partial_derivatives, strict=False)
+                    if len(P)
+                ]
                 return sum(terms[1:], terms[0]) if terms else field.zero
 
             upper = {}
             for pair, entry in self._upper.items():
-                numerator, denominator = self._slopes[pair]
-                N, D = evaluate(entry.numerator, field, place), evaluate(entry.denominator, field, place)
-                upper[pair] = slope(numerator) / D
+                numerator, denominator = self._gradients[pair]
+                N, D = evaluate(entry.numerator, field, arguments), evaluate(entry.denominator, field, arguments)
+                upper[pair] = directional_derivative(numerator) / D
                 if not entry.is_polynomial:
-                    upper[pair] = upper[pair] - N * slope(denominator) / (D * D)
+                    upper[pair] = upper[pair] - N * directional_derivative(denominator) / (D * D)
             return self._matrix(field, upper)
 
     @cached_property
@@ -205,7 +209,7 @@ class MatrixPoissonTensor(PoissonTensor):
         }
 
     @cached_property
-    def _slopes(self) -> dict[tuple[int, int], tuple[Any, Any]]:
+    def _gradients(self) -> dict[tuple[int, int], tuple[Any, Any]]:
         return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._upper.items()}
 
     def _matrix(self, field: Field, upper: Mapping[tuple[int, int], Any]) -> Any:
@@ -263,9 +267,9 @@ def transformation_sides(
         return None
     *earlier, (last, last_point) = map_.stages(point)
     for factor, x in earlier:
-        slopes = factor.jacobian(x)
+        jacobian = factor.jacobian(x)
         with field.working():
-            P = slopes * P * slopes.transpose()
+            P = jacobian * P * jacobian.transpose()
     N, M = last.numerator_matrix(last_point, image), last.denominator_matrix(last_point)
     with field.working():
         return N * P * N.transpose(), M * P_image * M.transpose()
@@ -281,10 +285,10 @@ def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequenc
     if P is None or _is_zero(field, P):
         return None
     with field.working():
-        # along[i][j, k] = sum_l P_il d_l P_jk, the derivative of P_jk along row i of P.
-        along = [tensor.along(field, eps, point, [P[i, l] for l in range(n)]) for i in range(n)]
+        # derivatives[i][j, k] = sum_l P_il d_l P_jk, the derivative of P_jk along row i of P.
+        derivatives = [tensor.derivative(field, eps, point, [P[i, l] for l in range(n)]) for i in range(n)]
         return [
-            along[i][j, k] + along[j][k, i] + along[k][i, j]
+            derivatives[i][j, k] + derivatives[j][k, i] + derivatives[k][i, j]
             for i in range(n)
             for j in range(i + 1, n)
             for k in range(j + 1, n)

@@ -80,7 +80,7 @@ class ComposedMap(MapFamily):
 
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
-        """The sum of those of the letters, where these are one map and its inverse; else there is no one flow."""
+        """The sum over the letters if they are one map and its inverse; otherwise 0, as there is no common flow."""
         letters = self._letters
         return sum(steps for _, steps in letters) if all(letter == letters[0][0] for letter, _ in letters) else 0
 
@@ -204,10 +204,12 @@ def composed_map(
     if symbols is None:
         symbols = tuple(dict.fromkeys(name for map_, _ in powers for name in map_.symbols))
     context = ring(symbols)
-    own = {name: RationalFunction(x, context.constant(1)) for name, x in zip(symbols, context.gens(), strict=True)}
+    themselves = {
+        name: RationalFunction(x, context.constant(1)) for name, x in zip(symbols, context.gens(), strict=True)
+    }
     given_parts: list[MapFactor] = []
     for k, (map_, power) in enumerate(powers):
-        functions = own | dict(values[k]) if values else own
+        functions = themselves | dict(values[k]) if values else themselves
         missing = next((name for name in map_.symbols if name not in functions), None)
         if missing is not None:
             raise InputError(
@@ -251,8 +253,8 @@ def is_involution(map_: MapFamily) -> bool:
         field = random_prime_field(rng)
         x = tuple(field.random(rng) for _ in map_.variables)
         try:
-            over = map_.at(field.random(rng), field, [field.random(rng) for _ in map_.symbols])
-            if over.step(over.step(x)) != x:
+            map_at_eps = map_.at(field.random(rng), field, [field.random(rng) for _ in map_.symbols])
+            if map_at_eps.step(map_at_eps.step(x)) != x:
                 return False
         except (BadPrime, SingularStep):
             continue

@@ -169,12 +169,12 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequen
     if degree <= 1:
         exponents = [tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1)]
     else:
-        seen = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
-        exponents = [(*m, degree - sum(m)) for m in seen]
-    droppable = over is QQ or over.characteristic > 0  # balls may only contain 0
+        monomials = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
+        exponents = [(*m, degree - sum(m)) for m in monomials]
+    drops_zeros = over is QQ or over.characteristic > 0  # balls may only contain 0
     position = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
-        tuple(tuple((position[m], c) for m, c in entry.items() if not droppable or c != 0) for entry in row)
+        tuple(tuple((position[m], c) for m, c in entry.items() if not drops_zeros or c != 0) for entry in row)
         for row in by_monomial
     )
     return Equation(over, tuple(exponents), terms)

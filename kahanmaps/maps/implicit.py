@@ -219,9 +219,9 @@ class Map(LatexDisplay):
 
     def jacobian(self, point: Sequence[Any]) -> Any:
         """Return the Jacobi matrix dPhi(x), for one factor M(x)^{-1} N(x, x~). Raises SingularStep."""
-        slopes = [factor.jacobian(x) for factor, x in self.stages(point)]
+        jacobians = [factor.jacobian(x) for factor, x in self.stages(point)]
         with self.field.working():
-            return reduce(lambda total, slope: slope * total, slopes)
+            return reduce(lambda total, slope: slope * total, jacobians)
 
     def _singular(self, point: tuple[Any, ...]) -> SingularStep:
         coordinates = ",".join(self.field.format(entry) for entry in point)
@@ -289,20 +289,20 @@ class ElementaryMap(Map):
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
         """Return N(x, x~) = d(r - M x~)/dx at fixed x~, with which dPhi(x) = M(x)^{-1} N(x, x~)."""
         one, zero, n = self.field.one, self.field.zero, self.dim
-        X, after = [*point, one], [*image, one]
+        X, X_image = [*point, one], [*image, one]
         columns = []
         with self.field.working():
             for k in range(n):
-                slopes = []  # of the monomials, by X_k
+                derivatives = []  # of the monomials, by X_k
                 for exponent in self._equation.exponents:
-                    slope = self.field.convert(exponent[k])
+                    derivative = self.field.convert(exponent[k])
                     if exponent[k]:
                         for i, (entry, e) in enumerate(zip(X, exponent, strict=True)):
                             for _ in range(e - (i == k)):
-                                slope = slope * entry
-                    slopes.append(slope)
-                L = self._equation.rows(slopes, zero)
-                columns.append([-sum((a * b for a, b in zip(row, after, strict=True)), zero) for row in L])
+                                derivative = derivative * entry
+                    derivatives.append(derivative)
+                L = self._equation.rows(derivatives, zero)
+                columns.append([-sum((a * b for a, b in zip(row, X_image, strict=True)), zero) for row in L])
             return self.field.matrix(n, n, [columns[k][i] for i in range(n) for k in range(n)])
 
     def determinant(self, point: Sequence[Any]) -> Any:
@@ -543,13 +543,13 @@ class ImplicitMap(MapFamily):
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ElementaryMap:
         """Return the map over a field at eps. Raises InputError for eps = 0, BadPrime if it has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
-        for cached_field, at, map_at_eps in self._last:
-            if cached_field is over and at is element:
+        for cached_field, cached_eps, map_at_eps in self._last:
+            if cached_field is over and cached_eps is element:
                 return map_at_eps
         point = (*values, element)
         equation = equation_of(self.rows, over, point)
-        is_needed = self.backward is not None or equation.degree > 1
-        backward = (lambda: equation_of(self.inverse_rows, over, point)) if is_needed else None
+        needs_inverse_rows = self.backward is not None or equation.degree > 1
+        backward = (lambda: equation_of(self.inverse_rows, over, point)) if needs_inverse_rows else None
         map_at_eps = ElementaryMap(equation, element, backward, self.variables)
         self._last[:] = [] if values else [(over, element, map_at_eps)]  # maps with values of symbols are not cached
         return map_at_eps
@@ -581,15 +581,15 @@ def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     rng = random.Random(f"map {derive_seed(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
     tried = 0
     while tried < 3:
-        over = random_prime_field(rng)
-        x = tuple(over.random(rng) for _ in range(map_.dim))
+        field = random_prime_field(rng)
+        x = tuple(field.random(rng) for _ in range(map_.dim))
         try:
-            values = [over.random(rng) if root is None else root.over(over) for _ in map_.symbols]
-            local = map_.at(over.random(rng), over, values)
-            image = local.step(x)
-            if local.jacobian(x).det() == 0:
+            values = [field.random(rng) if root is None else root.over(field) for _ in map_.symbols]
+            map_at_eps = map_.at(field.random(rng), field, values)
+            image = map_at_eps.step(x)
+            if map_at_eps.jacobian(x).det() == 0:
                 return "the map is not dominant: det dPhi is identically 0"
-            preimage = x if map_.backward is None else local.inverse.step(image)
+            preimage = x if map_.backward is None else map_at_eps.inverse.step(image)
         except BadPrime:
             continue
         except SingularStep:

@@ -71,13 +71,15 @@ def inverse_rows(rows: Rows) -> Rows:
     ]
     field, sample = _graph_point(rows)
     solution = _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
-    home = ring(names)
-    exchange = [home.constant(0)] * n + list(home.gens())
+    names_ring = ring(names)
+    exchanged = [names_ring.constant(0)] * n + list(names_ring.gens())
     inverse = []
     for i in range(n):
-        numerator, denominator = (part.compose(*exchange, ctx=home) for part in solution[i])
+        numerator, denominator = (part.compose(*exchanged, ctx=names_ring) for part in solution[i])
         scale = denominator.leading_coefficient()
-        inverse.append((*(denominator / scale if i == j else home.constant(0) for j in range(n)), -numerator / scale))
+        inverse.append(
+            (*(denominator / scale if i == j else names_ring.constant(0) for j in range(n)), -numerator / scale)
+        )
     return tuple(inverse)
 
 
@@ -160,10 +162,10 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
         _, chosen, u = min(
             linear, key=lambda candidate: (sum(bool(candidate[1].degrees()[v]) for v in unknowns), candidate[0])
         )
-        eliminated, slope = _coefficients(chosen, u)
-        others = [_substituted(p, u, -eliminated, slope) for p in relations if p is not chosen]
+        constant, factor = _coefficients(chosen, u)  # constant + factor x_u = 0
+        others = [_substituted(p, u, -constant, factor) for p in relations if p is not chosen]
         solution = _solved(others, [v for v in unknowns if v != u], on_graph)
-        (a, b), (c, d) = (_substitute_solution(part, solution) for part in (-eliminated, slope))
+        (a, b), (c, d) = (_substitute_solution(part, solution) for part in (-constant, factor))
         return solution | {u: _lowest(a * d, b * c)}
     # No equation is linear in an unknown: resultants eliminate one.
     if len(unknowns) == 1:
@@ -172,17 +174,17 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
             f"{relations[0].degrees()[unknowns[0]]} preimages"
         )
     u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in relations))
-    through = sorted((p for p in relations if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
-    first, name = through[0], str(through[0].context().names()[u])
+    containing = sorted((p for p in relations if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
+    pivot, name = containing[0], str(containing[0].context().names()[u])
     eliminated = [p for p in relations if not p.degrees()[u]]
-    for p in through[1:]:
-        if len(first) * len(p) * (first.degrees()[u] + p.degrees()[u]) > _MAX_RESULTANT:
+    for p in containing[1:]:
+        if len(pivot) * len(p) * (pivot.degrees()[u] + p.degrees()[u]) > _MAX_RESULTANT:
             raise TooLarge("the inverse of this map is too large to be computed: give it as well")
-        eliminated.append(first.resultant(p, name))
+        eliminated.append(pivot.resultant(p, name))
     others = [v for v in unknowns if v != u]
     solution = _solved(eliminated, others, on_graph)
     common = None
-    for p in through:
+    for p in containing:
         numerator, _ = _substitute_solution(p, solution)
         common = numerator if common is None else common.gcd(numerator)
     return solution | _solved([common], [u], on_graph)
@@ -191,17 +193,17 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
 def _coefficients(polynomial: Any, u: int) -> list[Any]:
     """Return the coefficients of the powers of a variable, the lowest first."""
     context = polynomial.context()
-    parts: list[dict[tuple[int, ...], Any]] = [{} for _ in range(polynomial.degrees()[u] + 1)]
+    terms_by_power: list[dict[tuple[int, ...], Any]] = [{} for _ in range(polynomial.degrees()[u] + 1)]
     for monomial, coefficient in polynomial.terms():
-        parts[monomial[u]][(*monomial[:u], 0, *monomial[u + 1 :])] = coefficient
-    return [context.from_dict(part) for part in parts]
+        terms_by_power[monomial[u]][(*monomial[:u], 0, *monomial[u + 1 :])] = coefficient
+    return [context.from_dict(terms) for terms in terms_by_power]
 
 
 def _substituted(polynomial: Any, u: int, numerator: Any, denominator: Any) -> Any:
     """Substitute numerator/denominator for a variable, and clear the denominator."""
-    *lower, total = _coefficients(polynomial, u)
+    *coefficients, total = _coefficients(polynomial, u)
     power = denominator**0
-    for coefficient in reversed(lower):
+    for coefficient in reversed(coefficients):
         power = power * denominator
         total = total * numerator + coefficient * power
     return total

@@ -113,8 +113,8 @@ class KahanMap(ElementaryMap):
     def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
         """Return M = I - eps f'(x) and r = (I + eps B) x + 2 eps c."""
         column = self.field.column(x)
-        side = column + (self.local.B * column + self.local.c * self.field.convert(2)) * self.eps
-        return self.denominator_matrix(x), side
+        rhs = column + (self.local.B * column + self.local.c * self.field.convert(2)) * self.eps
+        return self.denominator_matrix(x), rhs
 
     def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
         """Return the matrix I + eps f'(x~)."""
@@ -194,10 +194,10 @@ class KahanFamily(MapFamily):
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> KahanMap:
         """Return the map Phi(., eps) over a field. Raises InputError for eps = 0, BadPrime if it has no reduction."""
-        last = self._last
-        if last is None or last.field is not over or last.eps is not eps or last.values != tuple(values):
-            self._last = last = KahanMap(self.system, eps, over, values)
-        return last
+        cached = self._last
+        if cached is None or cached.field is not over or cached.eps is not eps or cached.values != tuple(values):
+            self._last = cached = KahanMap(self.system, eps, over, values)
+        return cached
 
     @cached_property
     def rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:  # type: ignore[override]  # read only
@@ -206,8 +206,8 @@ class KahanFamily(MapFamily):
         *x, eps = context.gens()
         variables = [context.gen(self.names.index(name)) for name in names_of(self.system.rhs[0])]
         rows = []
-        for i, (slopes, f) in enumerate(zip(self.system.jacobian(self.names), self.system.rhs, strict=True)):
-            row = [int(i == j) - eps * slope for j, slope in enumerate(slopes)]
+        for i, (gradient, f) in enumerate(zip(self.system.jacobian(self.names), self.system.rhs, strict=True)):
+            row = [int(i == j) - eps * derivative for j, derivative in enumerate(gradient)]
             product = sum((entry * y for entry, y in zip(row, x, strict=False)), context.constant(0))
             rows.append((*row, -product - 2 * eps * f.compose(*variables, ctx=context)))
         return tuple(rows)

@@ -56,7 +56,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     context = ring((*variables, *parameters))
     points = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
     step = 2 * copies * context.gens()[-1]
-    last = [_linear_in_one_point(f, points, step, degree) for f in rhs]
+    last_point = [_linear_in_one_point(f, points, step, degree) for f in rhs]
 
     def unit(column: int, other: Any) -> tuple[fmpq_mpoly, ...]:
         """The row that says that a coordinate of the image is `other`."""
@@ -66,7 +66,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     zero = [context.constant(0)] * ((copies - 1) * n)
     forward = [unit(k * n + i, points[k + 1][i]) for k in range(copies - 1) for i in range(n)]
     backward = [unit((k + 1) * n + i, points[k][i]) for k in range(copies - 1) for i in range(n)]
-    for i, (matrix, right) in enumerate(last):
+    for i, (matrix, right) in enumerate(last_point):
         unknown = [context.constant(int(i == j)) for j in range(n)]
         new_row = [delta - entry for delta, entry in zip(unknown, matrix, strict=True)]
         old_row = [delta + entry for delta, entry in zip(unknown, matrix, strict=True)]
@@ -82,19 +82,19 @@ def _linear_in_one_point(
     """Return `step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and the constant term."""
     n, copies = len(points[0]), len(points)
     one = step * 0 + 1
-    linear, free = [step * 0 for _ in range(n)], step * 0
+    linear, constant = [step * 0 for _ in range(n)], step * 0
     for monomial, coefficient in f.terms():
         factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
         factors += [None] * (degree - len(factors))
-        share = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
+        term = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
         # The mean over all arrangements is the symmetric form. Some of them are equal, and are counted as often.
         for arrangement in permutations(factors):
-            product = share
+            product = term
             for point, j in zip(points, arrangement[:copies], strict=True):
                 product = product * (one if j is None else point[j])
             j = arrangement[-1]
             if j is None:
-                free = free + product
+                constant = constant + product
             else:
                 linear[j] = linear[j] + product
-    return linear, free
+    return linear, constant

@@ -1,8 +1,8 @@
 """A map on projective space: (X : Z), x = X/Z, goes to the kernel of the matrix L of its equation.
 
 The n x (n + 1) matrix L of forms of degree d in (X : Z) (equation.py) has n + 1 signed maximal minors, which are forms
-of degree n d; a common factor may be divided out. The forms of several factors are put into each
-other. Source: petrera-suris-2016, eq. (eq: Phi gen).
+of degree n d; a common factor may be divided out. The forms of several factors are composed. Source:
+petrera-suris-2016, eq. (eq: Phi gen).
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ _MAX_TERMS = 3_000  # of a form of several factors, before a common one is divid
 
 
 class HomogeneousMap(NamedTuple):
-    """The `forms` without common factor that give a map on projective space, and the `factor` that was divided out
-    of what `Equation.image` gives, of several factors put into each other.
+    """The `forms` without common factor that give a map on projective space.
 
-    `denominator` is up to its sign that of the map, det M(x) made homogeneous: of several factors the product of
-    theirs. A last form that is zero says that the map is singular everywhere.
+    `factor` is the common factor by which the forms of `Equation.image`, composed for several factors of a map, were
+    divided. `denominator` is, up to its sign, det M(x) made homogeneous; for several factors it is the product of
+    theirs. The map is singular everywhere if the last form is zero.
     """
 
     forms: list[Any]
@@ -39,7 +39,7 @@ class HomogeneousMap(NamedTuple):
 def homogeneous_map(map_over: Map) -> HomogeneousMap:
     """The forms of a map over QQ or GF(p) with p < 2^63; exact. Their variables are named x1, ..., xn, z.
 
-    Raises TooLarge where those of several factors have too many terms, put into each other.
+    Raises TooLarge if the forms of several factors have too many terms when they are composed.
 
     >>> from kahanmaps.maps.kahan import KahanMap
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -53,10 +53,10 @@ def homogeneous_map(map_over: Map) -> HomogeneousMap:
         size, degree = equation.dim, composed.degree * factor_map.degree
         if comb(degree + size, size) > _MAX_TERMS:
             raise TooLarge(f"the composition of {len(others) + 1} maps is too large for forms on projective space")
-        moved, common = _without_common_factor([form.compose(*composed.forms) for form in factor_map.forms])
+        forms, common = _without_common_factor([form.compose(*composed.forms) for form in factor_map.forms])
         factor, denominator = (part.compose(*composed.forms) for part in (factor_map.factor, factor_map.denominator))
         outer_factor = composed.factor**equation.image_degree
-        composed = HomogeneousMap(moved, outer_factor * factor * common, composed.denominator * denominator)
+        composed = HomogeneousMap(forms, outer_factor * factor * common, composed.denominator * denominator)
     return composed
 
 

@@ -68,7 +68,7 @@ class Integers:
         integer, part = split_by_primes(value.p, self.power)
         return integer, fmpq(part, value.q)
 
-    def divisor(self, value: fmpz) -> fmpz:
+    def prepared_divisor(self, value: fmpz) -> fmpz:
         """Return the divisor for `difference`; here the integer itself."""
         return value
 
@@ -91,8 +91,8 @@ class Terms:
 
         t(i + j) t(i - j) = t(i + 1) t(i - 1) W(j)^2 - t(i)^2 W(j + 1) W(j - 1),      i - j = 1 or 2.
 
-    The scales s(n) are long, but certain quotients of them stay short: `part(n)` is s(n + 1) s(n - 1)/s(n)^2, and
-    `ratio(n)` is S(n - 1) s(n + 1)/(S(n) s(n)), where S denotes the scales of W.
+    The scales s(n) are long, but certain quotients of them stay short: `own_quotient(n)` is s(n + 1) s(n - 1)/s(n)^2,
+    and `mixed_quotient(n)` is S(n - 1) s(n + 1)/(S(n) s(n)), where S denotes the scales of W.
 
     `numbers` (Integers, or its equivalent over a number field) splits terms into integer and scale. If `gamma` is
     given, all terms with an index divisible by 3 are stored without a factor gamma^(1/3): in the formula above, a
@@ -117,7 +117,9 @@ class Terms:
         # The division by t(i - j): for 1 and W(2) in the scale, otherwise by w, which divides exactly.
         is_by_scale = multiples is None or first[0] == first[1] == 1
         self._low = {
-            low: (None, first[low - 1]) if is_by_scale else (numbers.divisor(self._terms[low]), self._first[low])
+            low: (None, first[low - 1])
+            if is_by_scale
+            else (numbers.prepared_divisor(self._terms[low]), self._first[low])
             for low in (1, 2)
         }
 
@@ -132,7 +134,7 @@ class Terms:
                 raise ArithmeticError("a term before the first")
             low = 2 - n % 2
             i, j = (n + low) // 2, (n - low) // 2
-            a, b = self.part(i), self._W.part(j)
+            a, b = self.own_quotient(i), self._W.own_quotient(j)
             if self._gamma is not None and (i % 3 == 0) != (j % 3 == 0):
                 a, b = (a * self._gamma, b) if j % 3 == 0 else (a, b * self._gamma)
             (square, outer), (W_square, W_outer) = self.pair(i), self._W.pair(j)
@@ -153,32 +155,32 @@ class Terms:
             self._pairs[n] = term * term, self.integer(n + 1) * self.integer(n - 1)
         return self._pairs[n]
 
-    def part(self, n: int) -> Any:
+    def own_quotient(self, n: int) -> Any:
         """Return s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
         if n not in self._parts:
             at_n_minus_1, at_n, at_n_plus_1 = (self._scale(k, n <= _DIRECT) for k in (n - 1, n, n + 1))
-            part = at_n_plus_1 * at_n_minus_1 / (at_n * at_n)
+            quotient = at_n_plus_1 * at_n_minus_1 / (at_n * at_n)
             if n > _DIRECT:
                 k = n // 2
-                root = self.ratio(k + 1) * self._W.part(k) if n % 2 else 1 / self.ratio(k)
-                part = part * root * root
-            self._parts[n] = part
+                root = self.mixed_quotient(k + 1) * self._W.own_quotient(k) if n % 2 else 1 / self.mixed_quotient(k)
+                quotient = quotient * root * root
+            self._parts[n] = quotient
         return self._parts[n]
 
-    def ratio(self, n: int) -> Any:
+    def mixed_quotient(self, n: int) -> Any:
         """Return S(n - 1) s(n + 1)/(S(n) s(n)), for n >= 2."""
         if self is self._W:
-            return self.part(n)
+            return self.own_quotient(n)
         if n not in self._ratios:
             W = self._W
             is_first = n <= _DIRECT
-            ratio = W._scale(n - 1, is_first) * self._scale(n + 1, is_first)
-            ratio = ratio / (W._scale(n, is_first) * self._scale(n, is_first))
+            quotient = W._scale(n - 1, is_first) * self._scale(n + 1, is_first)
+            quotient = quotient / (W._scale(n, is_first) * self._scale(n, is_first))
             if n > _DIRECT:
                 k = n // 2
-                root = self.ratio(k + 1) * W.part(k) if n % 2 else 1 / W.part(k)
-                ratio = ratio * root * root
-            self._ratios[n] = ratio
+                root = self.mixed_quotient(k + 1) * W.own_quotient(k) if n % 2 else 1 / W.own_quotient(k)
+                quotient = quotient * root * root
+            self._ratios[n] = quotient
         return self._ratios[n]
 
     def forget(self, n: int) -> None:

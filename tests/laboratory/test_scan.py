@@ -218,7 +218,7 @@ def test_a_time_limit_ends_a_scan_with_what_is_known(monkeypatch, stage):
     ],
 )
 def test_what_cannot_be_scanned_is_refused(change, message, monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.scan.scan._MAX_ROOM", 99)
+    monkeypatch.setattr("kahanmaps.laboratory.scan.scan._MAX_LENGTH", 99)
     options = {"over": ["c"], **change}
     with pytest.raises(InputError, match=message):
         scan(load("henon_heiles"), options.pop("over"), **options)

@@ -142,7 +142,7 @@ def test_forms_have_to_agree_at_more_steps_than_the_degree(name, stride, last):
         def at(self, number):
             return begin(map_over) if number == last else super().at(number)
 
-    assert not elliptic._is_proved(begin(map_over), search, Wrong(map_over, steps._places, steps._first))
+    assert not elliptic._is_proved(begin(map_over), search, Wrong(map_over, steps._groups, steps._first))
     assert steps.at(search.first - 1) is None  # nothing is given that has not been compared
     assert steps.at(search.first) is not None
 
@@ -151,7 +151,7 @@ def test_primes_that_coordinates_have_in_common_are_found(monkeypatch):
     # Of coordinates (Y x - X y, q y) a prime q divides all where it divides the denominator W of the point (X, Y)/W.
     map_over, search, numbers = sequences("weierstrass")
     points = single_steps(map_over, begin(map_over), 30)
-    bad = elliptic._Exact(search, numbers).steps(map_over)._places[0][0]._primes
+    bad = elliptic._Exact(search, numbers).steps(map_over)._groups[0][0]._primes
     at, q = next((n, q) for n in range(8, 31) for q in range(50, 500) if points[n].denominator % q == 0 != bad % q)
     X, Y = points[at].numerators
     rows = fmpq_mat(3, 3, numbers[0, 0].coefficients)

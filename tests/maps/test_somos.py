@@ -57,11 +57,11 @@ def test_terms_and_what_is_left_out_of_them(H, y, z):
             split_by_primes(x.p, primes)[0] in (1, -1) and split_by_primes(x.q, primes)[0] == 1 for x in scale.values()
         )
         assert all(primes.gcd(terms.integer(n)) == 1 for n in range(1, 41))
-        assert all(terms.part(n) == scale[n + 1] * scale[n - 1] / scale[n] ** 2 for n in range(2, 39))
+        assert all(terms.own_quotient(n) == scale[n + 1] * scale[n - 1] / scale[n] ** 2 for n in range(2, 39))
         scales.append(scale)
     S, s = scales
-    assert all(sequence.ratio(n) == S[n - 1] * s[n + 1] / (S[n] * s[n]) for n in range(2, 39))
-    assert all(multiples.ratio(n) == multiples.part(n) for n in range(2, 39))
+    assert all(sequence.mixed_quotient(n) == S[n - 1] * s[n + 1] / (S[n] * s[n]) for n in range(2, 39))
+    assert all(multiples.mixed_quotient(n) == multiples.own_quotient(n) for n in range(2, 39))
 
 
 @given(rational, rational, rational)

@@ -158,7 +158,7 @@ def test_a_member_moves_as_by_generic_steps(chi, seed, eps):
     results = list(islice(NormalSteps(normal_form, fmpq(eps)).points(start), 9))
     assert [IntegerPoint.from_rationals(point.rationals()) for point in results] == generic
     assert [point.lowest_terms() for point in results] == [point.lowest_terms() for point in generic]
-    assert all(point.height <= point.bits + point._assembly.excess for point in results)
+    assert all(point.height <= point.bits + point._assembly.extra_bits for point in results)
 
 
 def test_what_two_conjugate_planes_share_is_taken_out(monkeypatch):

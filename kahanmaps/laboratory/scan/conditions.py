@@ -33,31 +33,32 @@ def conditions(
     components: list[Component] = []
     count = len(names)
 
-    def parts_of(on_lines: bool) -> list[ModularComponents]:
-        parts = []
+    def modular_components(on_lines: bool) -> list[ModularComponents]:
+        modular = []
         for sweep in sweeps:
             if sweep.on_lines is on_lines and degrees in sweep.classes:
                 unassigned = points_outside(sweep.classes[degrees], components, sweep.prime)
-                least = 0 if sweep.complete else count - sweep.width
+                min_dimension = 0 if sweep.complete else count - sweep.width
                 if unassigned:
-                    parts.append(find_components(unassigned, sweep.prime, sweep.measured, least, rng, check))
+                    modular.append(find_components(unassigned, sweep.prime, sweep.measured, min_dimension, rng, check))
         if count > 1:  # rows of hyperplanes end with the constant; forms of other hypersurfaces begin with it
             hypersurfaces = {
-                part.prime: [
-                    *((row[-1], *row[:-1]) for (row,) in part.linear.get(count - 1, [])),
-                    *part.hypersurfaces.get((), []),
+                at_prime.prime: [
+                    *((row[-1], *row[:-1]) for (row,) in at_prime.linear.get(count - 1, [])),
+                    *at_prime.hypersurfaces.get((), []),
                 ]
-                for part in parts
+                for at_prime in modular
             }
             components.extend(
-                Component((form,), count - 1, degrees, at) for form, at in lift_hypersurfaces(hypersurfaces, names)
+                Component((form,), count - 1, degrees, primes)
+                for form, primes in lift_hypersurfaces(hypersurfaces, names)
             )
-        return parts
+        return modular
 
-    parts_of(on_lines=True)
-    parts = parts_of(on_lines=False)
+    modular_components(on_lines=True)
+    modular = modular_components(on_lines=False)
     for dimension in range(max(1, count - 1)):
-        linear = {part.prime: part.linear[dimension] for part in parts if part.linear.get(dimension)}
+        linear = {at_prime.prime: at_prime.linear[dimension] for at_prime in modular if at_prime.linear.get(dimension)}
         if dimension == 0 and len(linear) > 1:
             low, high = min(linear), max(linear)
             few, many = len(linear[low]), len(linear[high])
@@ -65,22 +66,29 @@ def conditions(
             if few >= _SHARE * low and many - few >= _SHARE * (high - low):
                 continue
         lifted = lift_linear(linear)
-        components += [Component(linear_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
+        components += [
+            Component(linear_equations(rows, names), dimension, degrees, primes) for rows, primes in lifted.items()
+        ]
         if dimension == 0:
-            points = {p: [tuple(-row[-1] % p for row in rows) for rows in some] for p, some in linear.items()}
-            unassigned = {p: points_outside(some, components, p) for p, some in points.items()}
+            points = {p: [tuple(-row[-1] % p for row in rows) for rows in at_p] for p, at_p in linear.items()}
+            unassigned = {p: points_outside(at_p, components, p) for p, at_p in points.items()}
             unassigned.update((sweep.prime, []) for sweep in sweeps if sweep.complete and sweep.prime not in unassigned)
             conjugate = lift_conjugate_points(unassigned, names, rng, check)
-            components += [Component(equations, 0, degrees, at) for equations, at in conjugate]
-    for size in {len(rows) for part in parts for rows in part.hypersurfaces if rows}:
-        inside = {part.prime: [rows for rows in part.hypersurfaces if len(rows) == size] for part in parts}
+            components += [Component(equations, 0, degrees, primes) for equations, primes in conjugate]
+    for size in {len(rows) for at_prime in modular for rows in at_prime.hypersurfaces if rows}:
+        inside = {
+            at_prime.prime: [rows for rows in at_prime.hypersurfaces if len(rows) == size] for at_prime in modular
+        }
         for rows in lift_linear(inside):
-            hypersurfaces = {part.prime: part.hypersurfaces.get(residues(rows, part.prime) or (), []) for part in parts}
+            hypersurfaces = {
+                at_prime.prime: at_prime.hypersurfaces.get(residues(rows, at_prime.prime) or (), [])
+                for at_prime in modular
+            }
             equations = linear_equations(rows, names)
             free = [name for k, name in enumerate(names) if k not in pivots(rows)]
-            for form, at in lift_hypersurfaces(hypersurfaces, free):
+            for form, primes in lift_hypersurfaces(hypersurfaces, free):
                 polynomial = form.project_to_context(ring(names))
-                components.append(Component((polynomial, *equations), len(free) - 1, degrees, at))
+                components.append(Component((polynomial, *equations), len(free) - 1, degrees, primes))
     return components
 
 
@@ -92,7 +100,7 @@ def points_outside(points: Sequence[Point], components: Iterable[Component], pri
     for component in components:
         terms = sum(map(len, component.equations))
         count_work(10 * terms * (1 + len(outside) / 200))
-        on = np.ones(len(outside), dtype=bool)
+        is_on = np.ones(len(outside), dtype=bool)
         for equation in component.equations:
             total = np.zeros(len(outside), dtype=np.int64)
             for exponents, coefficient in equation.terms():
@@ -101,6 +109,6 @@ def points_outside(points: Sequence[Point], components: Iterable[Component], pri
                     for _ in range(int(exponent)):
                         term = term * outside[:, k] % prime
                 total += term
-            on &= total % prime == 0
-        outside = outside[~on]
+            is_on &= total % prime == 0
+        outside = outside[~is_on]
     return [tuple(x) for x in outside.tolist()]

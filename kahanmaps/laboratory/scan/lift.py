@@ -157,14 +157,14 @@ def _lift_product(
     pivots = {next(k for k, c in enumerate(form) if c) for form in products.values()}
     if len(products) < _MIN_PRIMES or len(pivots) > 1:
         return [], ()
-    *primes, last = sorted(products)
+    *primes, last_prime = sorted(products)
     combined, modulus = products[primes[0]], primes[0]
     for p in primes[1:]:
         combined, modulus = chinese(combined, modulus, products[p], p), modulus * p
     values = rational_vector(combined, modulus)
-    if values is None or residues([values], last) != (tuple(products[last]),):
+    if values is None or residues([values], last_prime) != (tuple(products[last_prime]),):
         return [], ()
-    return _factor(values, names), (*primes, last)
+    return _factor(values, names), (*primes, last_prime)
 
 
 def _factor(values: Sequence[fmpq], names: Sequence[str]) -> list[fmpq_mpoly]:
@@ -180,9 +180,9 @@ def _multiply(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[in
     def degree_of(form: Sequence[int]) -> int:
         return next(d for d in range(100) if len(exponents_up_to(variables, d)) == len(form))
 
-    top = sum(map(degree_of, forms))
-    count(5 * sum(map(len, forms)) + (10 + len(exponents_up_to(variables, top))) * len(forms))
-    row = reduce(lambda a, b: product_of(a, b, variables, top, p) or [], forms, [1])
+    degree = sum(map(degree_of, forms))
+    count(5 * sum(map(len, forms)) + (10 + len(exponents_up_to(variables, degree))) * len(forms))
+    row = reduce(lambda a, b: product_of(a, b, variables, degree, p) or [], forms, [1])
     scale = pow(next(c for c in row if c), -1, p)
     return [c * scale % p for c in row]
 
@@ -260,8 +260,8 @@ def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[
     shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest)
     # Any residues have a relation with (2 height + 1)^size of about the modulus; only much smaller ones count.
-    small = (2 * height + 1) ** size << spare <= modulus
-    return [int(c) for c in shortest] if small and shortest[-1] else None
+    is_small = (2 * height + 1) ** size << spare <= modulus
+    return [int(c) for c in shortest] if is_small and shortest[-1] else None
 
 
 def _solve_modulo(equations: Sequence[fmpq_mpoly], p: int) -> set[tuple[int, ...]]:

@@ -97,13 +97,13 @@ class Scanned:
         return member_of(self.file, parameters), values.get("eps", self.eps)
 
     def degrees_on(
-        self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random, most: int = 1 << 20
+        self, equations: Sequence[fmpq_mpoly], expected: Sequence[int], rng: random.Random, max_degree: int = 1 << 20
     ) -> Degrees | None:
         """Measure the degrees of a random member on a component modulo a random prime of 61 bits, on one random line.
 
         Returns None if the component has no point modulo the primes tried. A degree is -1 if the iterate is defined
         nowhere. As many degrees are measured as are `expected`, which also says about how large they are; the sequence
-        ends before a degree above `most`.
+        ends before a degree above `max_degree`.
         """
         for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
             field = GF(random_prime(rng))
@@ -112,13 +112,13 @@ class Scanned:
                 if values is None:
                     continue
                 *parameters, eps = values if len(self.names) > len(self.map.symbols) else (*values, self.eps)
-                over = self.map.at(field.random(rng) if eps is None else field.convert(eps), field, parameters)
+                member = self.map.at(field.random(rng) if eps is None else field.convert(eps), field, parameters)
             except BadPrime:
                 continue
             break
         else:
             return None
-        line = Line(over, rng, Budget(), most)
+        line = Line(member, rng, Budget(), max_degree)
         degrees: list[int] = []
         try:
             for degree in expected:

@@ -122,16 +122,16 @@ def _hypersurfaces(
     """
     for degree in range(2, _MAX_PRODUCT_DEGREE + 1):
         size = len(exponents_up_to(points.shape[1], degree))
-        enough = int(_SPARE * size) + 2
+        sample_size = int(_SPARE * size) + 2
         table = _monomials(points, degree, prime)
         for attempt in range(_TRIES if degree == 2 else _TRIES_HIGH_DEGREE if degree <= MAX_DEGREE else 1):
             check()
-            if len(points) < max(enough, needed):
+            if len(points) < max(sample_size, needed):
                 break
             count_work(size * len(points) / 500)
-            chosen = rng.sample(range(len(points)), size - 1 if attempt else enough)
+            chosen = rng.sample(range(len(points)), size - 1 if attempt else sample_size)
             basis = null_space(table[chosen].tolist(), size, prime)
-            if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(enough, needed):
+            if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(sample_size, needed):
                 continue
             for factor, factor_degree in _factors(basis[0], degree, points.shape[1], prime):
                 inside = _monomials(points, factor_degree, prime) @ factor % prime == 0

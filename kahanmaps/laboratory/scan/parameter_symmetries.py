@@ -81,15 +81,15 @@ def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[
         for signs in sorted(product((1, -1), repeat=count), key=lambda signs: signs.count(-1))
         for places in permutations(range(count + 1))
     ]
-    plain = [change for change in signed if change[-1][-1] != 0]
-    yield from plain
+    affine_changes = [change for change in signed if change[-1][-1] != 0]
+    yield from affine_changes
     rational = [component for component in components if component.is_rational_point][:_MAX_POINTS]
     points = [(*(component.values or {}).values(), fmpq(1)) for component in rational]
-    for change, point in product(plain, points):
-        start = _times(change, points[0])
-        yield tuple((*row[:-1], row[-1] + y - x) for row, x, y in zip(change, start, point, strict=True))
-        if all(start) and all(point):
-            yield tuple(tuple(y / x * c for c in row) for row, x, y in zip(change, start, point, strict=True))
+    for change, point in product(affine_changes, points):
+        image = _times(change, points[0])
+        yield tuple((*row[:-1], row[-1] + y - x) for row, x, y in zip(change, image, point, strict=True))
+        if all(image) and all(point):
+            yield tuple(tuple(y / x * c for c in row) for row, x, y in zip(change, image, point, strict=True))
     if count > 1:
         yield from signed
 
@@ -140,8 +140,8 @@ def _generate_group(generators: Sequence[Change], count: int) -> set[Change]:
         scale = next(c for c in rows[-1] if c != 0)
         return tuple(tuple(c / scale for c in row) for row in rows)
 
-    known = new = {tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))}
-    while new and len(known) < 2000:
-        new = {compose(change, generator) for change in new for generator in generators} - known
-        known = known | new
-    return known
+    group = new = {tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))}
+    while new and len(group) < 2000:
+        new = {compose(change, generator) for change in new for generator in generators} - group
+        group = group | new
+    return group

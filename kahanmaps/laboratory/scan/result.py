@@ -164,15 +164,16 @@ class Scan(PrintableResult):
             tried = counted(len(self.sweeps), "prime")
             return f"conditions need members modulo three primes, and those modulo {tried} were tried"
         complete, lines, planes = (_abbreviate([str(sweep.prime) for sweep in sweeps]) for sweeps in self._kinds)
-        parts = [f"all members with parameters modulo {complete}"] if complete else []
-        for width, what, primes in ((1, "lines", lines), (2, "planes", planes)):
+        phrases = [f"all members with parameters modulo {complete}"] if complete else []
+        for width, subspaces, primes in ((1, "lines", lines), (2, "planes", planes)):
             if primes:
                 count = round(min(sweep.measured / sweep.prime**width for sweep in self._kinds[width]))
-                parts.append(
-                    f"{'those' if parts else 'members'} on {count} random {what} of parameter space modulo {primes}"
-                )
-        small = "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
-        kinds = [small] if complete else []
+                members = "those" if phrases else "members"
+                phrases.append(f"{members} on {count} random {subspaces} of parameter space modulo {primes}")
+        small_components = (
+            "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
+        )
+        kinds = [small_components] if complete else []
         if len(self.over) > 1:
             kinds.append(f"hypersurfaces of a total degree up to {self.degree} for each sequence of degrees")
         where = f"where one of the first {len(self.generic)} degrees is smaller"
@@ -180,18 +181,18 @@ class Scan(PrintableResult):
             kinds.append("affine spaces of codimension 2, and hypersurfaces of affine spaces that have codimension 2")
         if not complete:
             kinds.append("nothing of smaller dimension, which would need all members")
-        fields = []
+        over_fields = []
         if complete:
-            fields.append(
+            over_fields.append(
                 f"points over number fields of degree d up to {MAX_FIELD_DEGREE}, with coefficients up to H where "
                 f"2^{SPARE_BITS // len(self.over)} (2 H + 1)^(d + 1) is below the product of the primes modulo which "
                 "they have residues"
             )
         if len(self.over) > 1:
-            fields.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
+            over_fields.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
         return (
-            f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
-            f"denominators up to {self.height}; {', and '.join(fields)}"
+            f"{', and '.join(phrases)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
+            f"denominators up to {self.height}; {', and '.join(over_fields)}"
         )
 
     @property
@@ -210,8 +211,10 @@ class Scan(PrintableResult):
         for degrees, components in self.classes:
             growth = growth_on(components)
             sequence = ", ".join("none" if d < 0 else str(d) for d in degrees)
-            known = "" if growth is None or growth.recurrence is None else f", {growth.known}"
-            lines.append(("degrees", sequence + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
+            certainty_text = "" if growth is None or growth.recurrence is None else f", {growth.known}"
+            lines.append(
+                ("degrees", sequence + (f"\t{growth.kind_text}{certainty_text}" if growth is not None else ""))
+            )
             for label, separator, is_point in (("where", "; ", False), (f"at {names} =", ", ", True)):
                 for mark, is_confirmed in (("", True), ("\tnot confirmed", False)):
                     texts = [

@@ -61,33 +61,24 @@ _LINE_PRIMES = (107, 131, 139, 193, 241, 281)
 _LINES = {2: (24, 12), 3: (32, 16)}  # by the number of parameters, the preferred number of lines and a smaller one
 _LINE_FACTOR = 4  # factor for the number of lines if hypersurfaces were missed
 _MANY_LINES = (150, 60)
-_PLANES, _PLANE_PRIMES = (
-    24,
-    (19, 23, 29, 31),
-)  # the number of random planes, for components that lines do not meet, and the primes
+# The number of random planes, for components that lines do not meet, and the primes.
+_PLANES, _PLANE_PRIMES = 24, (19, 23, 29, 31)
 _SWEEP_SHARE = 0.3  # the share of the budget for measuring all members on their first line
-_STAGE_ENDS = (
-    0.6,
-    0.75,
-    0.85,
-    0.9,
-)  # the shares of the budget at which sweeps, conditions, confirmation and growth end
-_DEFAULT_ROOM, _DEFAULT_ROOM_OF_MANY = (
-    260,
-    220,
-)  # bounds of degrees before cancellation: for up to 2 parameters, and for more
-_MAX_ROOM = 4096
+# The shares of the budget at which sweeps, conditions, confirmation and growth end.
+_STAGE_ENDS = (0.6, 0.75, 0.85, 0.9)
+# Numbers of coefficients of polynomials before cancellation: for up to 2 parameters, and for more.
+_DEFAULT_LENGTH, _DEFAULT_LENGTH_OF_MANY = 260, 220
+_MAX_LENGTH = 4096
 _TRIAL_PRIME = 8179  # so large that hardly any member is special
 _MAX_TERMS = 7
 _CONFIRMING_MEMBERS = 3  # random members measured to confirm a component
 _TRIES = 20  # to find a rational member
 _GROWTH_UNITS, _GROWTH_ATTEMPTS = 30e6, 2  # units and attempts for the growth at a member
-_FITTED_TERMS, _MAX_FITTED_DEGREE = (
-    26,
-    1000,
-)  # without a rational member: how many degrees are measured, and their bound
+# Without a rational member: how many degrees are measured, and their bound.
+_FITTED_TERMS, _MAX_FITTED_DEGREE = 26, 1000
 _COMPARED_DEGREE = 100  # degrees are compared at least up to this value
-_MEASURED_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
+# Growths that components with the same degrees do not share.
+_MEASURED_ON_EACH = (Growth.LINEAR, Growth.QUADRATIC, Growth.POLYNOMIAL)
 
 
 def scan(
@@ -160,29 +151,31 @@ def scan(
     if composite:
         raise InputError(f"found {composite[0]} among the primes to scan modulo, expected a prime number")
     if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
-        given = ", ".join(map(str, primes))
-        raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
-    rng = random.Random(start := f"scan {derive_seed(seed, names, map_.subject, exact)}")
-    terms, room, cost = _choose_terms(map_, len(names), exact, terms, rng)
+        primes_text = ", ".join(map(str, primes))
+        raise InputError(f"found the primes {primes_text}, expected at least three different ones, from 5 on")
+    rng = random.Random(seed_prefix := f"scan {derive_seed(seed, names, map_.subject, exact)}")
+    terms, max_length, cost = _choose_terms(map_, len(names), exact, terms, rng)
     jobs, budget = jobs or processors(), effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS))
-    most = _SWEEP_SHARE * budget.units / cost
-    run = _ScanRun(family, start, {"terms": terms, "room": room, "jobs": jobs}, budget, cost, progress)
-    run.sweep(_choose_plan(len(names), primes, most))
-    known, missed = run.components(rng)
+    max_members = _SWEEP_SHARE * budget.units / cost
+    run = _ScanRun(
+        family, seed_prefix, {"terms": terms, "max_length": max_length, "jobs": jobs}, budget, cost, progress
+    )
+    run.sweep(_choose_plan(len(names), primes, max_members))
+    components, missed = run.components(rng)
     for plan_more in (run.more_lines, run.more_primes):
-        if not (missed or run.omitted) and (plan := plan_more(known, primes, most)):
+        if not (missed or run.omitted) and (plan := plan_more(components, primes, max_members)):
             run.sweep(plan)
-            known, missed = run.components(rng)
+            components, missed = run.components(rng)
     run.omit(missed, f"all conditions for {counted(missed, 'sequence')} of degrees")
-    candidates = known
-    known, missed = run.apply(
+    candidates = components
+    components, missed = run.apply(
         candidates,
         "confirms component",
         _STAGE_ENDS[2],
         lambda component, check: _confirm(component, family, candidates, rng, check),
     )
     run.omit(missed, f"the confirmation of {counted(missed, 'component')}")
-    known.sort(key=lambda component: component.degrees[::-1])
+    components.sort(key=lambda component: component.degrees[::-1])
     # Growth that is measured on one component only; others with the same degrees share it if more degrees agree.
     shared: dict[Degrees, DegreeGrowth] = {}
 
@@ -190,17 +183,19 @@ def scan(
         if component.degrees[-1] < 0 or _continues_as(component, shared.get(component.degrees), family):
             return component
         growth = _measure_growth(component, family, budget)
-        if growth is not None and growth.growth not in _MEASURED_EACH:
+        if growth is not None and growth.growth not in _MEASURED_ON_EACH:
             shared[component.degrees] = growth
         return replace(component, growth=growth)
 
-    known, missed = run.apply(known, "growth on component", 1 if analysis is None else _STAGE_ENDS[3], with_growth)
+    components, missed = run.apply(
+        components, "growth on component", 1 if analysis is None else _STAGE_ENDS[3], with_growth
+    )
     run.omit(missed, f"the growth on {missed} components")
-    kinds = {component.degrees: Growth.UNKNOWN for component in known}
+    kinds = {component.degrees: Growth.UNKNOWN for component in components}
     kinds |= {
-        component.degrees: component.growth.growth for component in reversed(known) if component.growth is not None
+        component.degrees: component.growth.growth for component in reversed(components) if component.growth is not None
     }
-    known.sort(key=lambda c: (OF_DEGREES.index(kinds[c.degrees]), c.degrees[::-1], c.text))
+    components.sort(key=lambda c: (OF_DEGREES.index(kinds[c.degrees]), c.degrees[::-1], c.text))
     if analysis is not None:
         analyzed: set[Degrees] = set()  # the degrees of points that were analyzed
 
@@ -214,20 +209,20 @@ def scan(
             result = analyze(member, eps=eps_of_member, effort=analysis, seed=family.seed)
             return replace(component, verdict=result.conclusion)
 
-        known, missed = run.apply(known, "analysis of a member on component", 1, with_verdict)
+        components, missed = run.apply(components, "analysis of a member on component", 1, with_verdict)
         run.omit(missed, f"{missed} verdicts")
     sweeps = tuple(run.sweeps)
-    unassigned = tuple(_count_unassigned(result, known) for result in sweeps)
+    unassigned = tuple(_count_unassigned(result, components) for result in sweeps)
     symmetric: tuple[tuple[str, ...], ...] = ()
     try:
-        symmetric = tuple(symmetries(sweeps, known, names))
+        symmetric = tuple(symmetries(sweeps, components, names))
     except TimeLimit:
         run.is_interrupted = True
         run.omit(1, "changes of parameters that permute the special members")
     ended = "interrupted" if run.is_interrupted else "budget" if run.omitted else "complete"
     generic = sweeps[0].generic if sweeps else ()
     omitted = tuple(run.omitted)
-    return Scan(file, names, exact, seed, generic, tuple(known), sweeps, unassigned, symmetric, ended, omitted)
+    return Scan(file, names, exact, seed, generic, tuple(components), sweeps, unassigned, symmetric, ended, omitted)
 
 
 @dataclass
@@ -235,20 +230,20 @@ class _ScanRun:
     """The state of one scan: its sweeps so far, its budget, and what was omitted."""
 
     family: Scanned
-    start: str  # prefix of all seeds
-    measured: dict[str, Any]
+    seed_prefix: str  # of all random choices
+    sweep_options: dict[str, Any]
     budget: Budget
     cost: float  # units of work for one member
     progress: Progress
     sweeps: list[Sweep] = field(default_factory=list)
     omitted: list[str] = field(default_factory=list)
-    doing: str = "scan"
+    stage: str = "scan"
     is_interrupted: bool = False
-    total: int = 0
+    planned_members: int = 0
 
     def report(self, sentence: str) -> None:
         """Report the current stage."""
-        self.doing = sentence
+        self.stage = sentence
         if self.is_interrupted:
             raise TimeOver
         try:
@@ -257,27 +252,29 @@ class _ScanRun:
             self.is_interrupted = True
             raise
 
-    def check_until(self, part: float) -> Callable[[], None]:
+    def check_until(self, share: float) -> Callable[[], None]:
         """Return a function that raises TimeOver when this share of the budget is spent."""
 
         def check() -> None:
-            self.report(self.doing)
-            if self.budget.spent > part * self.budget.units:
+            self.report(self.stage)
+            if self.budget.spent > share * self.budget.units:
                 raise TimeOver
 
         return check
 
-    def omit(self, missed: int, what: str) -> None:
+    def omit(self, missed: int, text: str) -> None:
         """Record what was omitted, if `missed` is not 0."""
         if missed:
-            self.omitted.append(what)
+            self.omitted.append(text)
 
     def sweep(self, plan: list[Choice]) -> None:
         """Sweep modulo the primes of a plan, and drop sweeps whose generic degrees are not the largest ones."""
-        self.total += _count_members(len(self.family.names), plan)
+        self.planned_members += _count_members(len(self.family.names), plan)
 
         def on_progress(done: int, _: int) -> None:
-            self.report(f"scan: {done + sum(sweep.measured for sweep in self.sweeps)} of {self.total} members")
+            self.report(
+                f"scan: {done + sum(sweep.measured for sweep in self.sweeps)} of {self.planned_members} members"
+            )
 
         for k, (p, lines, width) in enumerate(plan):
             try:
@@ -288,68 +285,74 @@ class _ScanRun:
                     self.family.eps,
                     on=None if lines is None else (lines, width),
                     units=self.cost,
-                    seed=f"{self.start} {p} {lines} {width}",
+                    seed=f"{self.seed_prefix} {p} {lines} {width}",
                     check=self.check_until(_STAGE_ENDS[0]),
                     progress=on_progress,
-                    **self.measured,
+                    **self.sweep_options,
                 )
                 self.sweeps.append(result)
             except BadPrime:
                 continue
-            except (TimeOver, TimeLimit) as end:
-                self.is_interrupted |= isinstance(end, TimeLimit)
+            except (TimeOver, TimeLimit) as stop:
+                self.is_interrupted |= isinstance(stop, TimeLimit)
                 self.omit(1, f"members modulo {', '.join(str(p) for p, *_ in plan[k:])}")
                 break
         generic = max((sweep.generic for sweep in self.sweeps), default=())
         self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
-    def more_lines(self, known: Sequence[Component], _: Sequence[int] | None, most: float) -> list[Choice]:
+    def more_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
         """Plan more random lines in place of the present ones, if a hypersurface was probably missed on these.
 
         A hypersurface is missed if the unassigned members are as many as it has. The plan is empty if none was, or if
-        it needs more than `most` members.
+        it needs more than `max_members` members.
         """
         lines = [sweep for sweep in self.sweeps if sweep.on_lines]
         plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in lines]
-        is_lacking = any(_count_unassigned(sweep, known) >= 0.5 * sweep.measured / sweep.prime for sweep in lines)
-        if not is_lacking or _count_members(len(self.family.names), plan) > most:
+        is_lacking = any(_count_unassigned(sweep, components) >= 0.5 * sweep.measured / sweep.prime for sweep in lines)
+        if not is_lacking or _count_members(len(self.family.names), plan) > max_members:
             return []
         self.sweeps[:] = [sweep for sweep in self.sweeps if not sweep.on_lines]
         return plan
 
-    def more_primes(self, known: Sequence[Component], primes: Sequence[int] | None, most: float) -> list[Choice]:
-        """Plan further primes if points were probably missed, with at most `most` members in total.
+    def more_primes(
+        self, components: Sequence[Component], primes: Sequence[int] | None, max_members: float
+    ) -> list[Choice]:
+        """Plan further primes if points were probably missed, with at most `max_members` members in total.
 
         Points are missed if there are unassigned members, but fewer than a curve has, or a hypersurface on random
         lines. The plan is empty if none were, or if the user gave the primes.
         """
         sizes = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
-        if primes is not None or not any(0 < _count_unassigned(sweep, known) < 0.5 * size for sweep, size in sizes):
+        if primes is not None or not any(
+            0 < _count_unassigned(sweep, components) < 0.5 * size for sweep, size in sizes
+        ):
             return []
         plan: list[Choice] = [(p, None, 1) for p in _FURTHER_PRIMES.get(len(self.family.names), ())]
-        totals = accumulate((_count_members(len(self.family.names), [choice]) for choice in plan), initial=self.total)
-        return [choice for choice, total in zip(plan, islice(totals, 1, None), strict=True) if total <= most]
+        totals = accumulate(
+            (_count_members(len(self.family.names), [choice]) for choice in plan), initial=self.planned_members
+        )
+        return [choice for choice, total in zip(plan, islice(totals, 1, None), strict=True) if total <= max_members]
 
     def apply(
         self,
         items: Sequence[Any],
-        what: str,
-        part: float,
-        work: Callable[..., Any],
+        stage_text: str,
+        share: float,
+        function: Callable[..., Any],
         fallback: Callable[[Any], Any] = lambda item: item,
     ) -> tuple[list[Any], int]:
-        """Apply `work` to each item until this share of the budget is spent, and then `fallback`.
+        """Apply `function` to each item until this share of the budget is spent, and then `fallback`.
 
         Returns the results and the number of items for which `fallback` was used.
         """
-        results, missed, check = [], 0, self.check_until(part)
+        results, missed, check = [], 0, self.check_until(share)
         for k, item in enumerate(items):
             try:
-                self.doing = f"scan: {what} {k + 1} of {len(items)}"
+                self.stage = f"scan: {stage_text} {k + 1} of {len(items)}"
                 check()
-                results.append(work(item, check))
-            except (TimeOver, TimeLimit) as end:
-                self.is_interrupted |= isinstance(end, TimeLimit)
+                results.append(function(item, check))
+            except (TimeOver, TimeLimit) as stop:
+                self.is_interrupted |= isinstance(stop, TimeLimit)
                 missed += 1
                 results.append(fallback(item))
         return results, missed
@@ -369,11 +372,11 @@ class _ScanRun:
 
 def _measure_growth(component: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:
     """Return the growth at a rational member; if there is none or it is special, the growth fitted to more degrees."""
-    known = None
+    growth = None
     if component.values is not None:
         member, eps_of_member = family.member(component.values)
         for attempt in range(_GROWTH_ATTEMPTS):  # singularities are traced at a random eps, which may be special
-            known = degree_growth(
+            growth = degree_growth(
                 member.map,
                 eps_of_member,
                 seed=family.seed + attempt,
@@ -381,57 +384,59 @@ def _measure_growth(component: Component, family: Scanned, budget: Budget) -> De
                 steps=STEPS,
                 enclosed=False,
             )
-            if known.growth is not Growth.UNKNOWN:
+            if growth.growth is not Growth.UNKNOWN:
                 break
-    is_typical = known is not None and _agree(known.degrees, (1, *component.degrees))
-    return known if is_typical else _fit_growth(component, family)
+    is_typical = growth is not None and _agree(growth.degrees, (1, *component.degrees))
+    return growth if is_typical else _fit_growth(component, family)
 
 
-def _fit_growth(component: Component, family: Scanned, most: int = _MAX_FITTED_DEGREE) -> DegreeGrowth | None:
+def _fit_growth(component: Component, family: Scanned, max_degree: int = _MAX_FITTED_DEGREE) -> DegreeGrowth | None:
     """Return the growth fitted to more degrees, measured modulo a prime; None if no member was found."""
-    start = [component.degrees[-1]] * _FITTED_TERMS
-    degrees = family.degrees_on(component.equations, start, random.Random(family.seed), most)
+    like = [component.degrees[-1]] * _FITTED_TERMS
+    degrees = family.degrees_on(component.equations, like, random.Random(family.seed), max_degree)
     if degrees is None:
         return None
     message = f"{len(degrees)} iterates measured"
     return DegreeGrowth((1, *degrees), family.eps, Ended.TERMS, message, family.seed, (), ())
 
 
-def _continues_as(component: Component, known: DegreeGrowth | None, family: Scanned) -> bool:
+def _continues_as(component: Component, other_growth: DegreeGrowth | None, family: Scanned) -> bool:
     """Return whether more degrees agree with those at a member of another component with the same first degrees."""
-    if known is None:
+    if other_growth is None:
         return False
     growth = _fit_growth(component, family, max(_COMPARED_DEGREE, 2 * component.degrees[-1]))
-    return growth is not None and _agree(growth.degrees, known.degrees)
+    return growth is not None and _agree(growth.degrees, other_growth.degrees)
 
 
 def _agree(first: Degrees, second: Degrees) -> bool:
     return all(a == b for a, b in zip(first, second, strict=False))
 
 
-def _choose_plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:
+def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members: float) -> list[Choice]:
     """Choose primes, each with the number of random lines or planes in parameter space, or None for all members.
 
-    The first of the plans, largest first, with at most `most` members.
+    The first of the plans, largest first, with at most `max_members` members.
     """
     plans: list[list[Choice]]
-    lines: list[list[Choice]] = [[(p, n, 1) for p in _LINE_PRIMES] for n in _LINES.get(count, _MANY_LINES)]
-    if count in _PRIMES:
+    lines: list[list[Choice]] = [[(p, n, 1) for p in _LINE_PRIMES] for n in _LINES.get(parameter_count, _MANY_LINES)]
+    if parameter_count in _PRIMES:
         complete: list[list[Choice]] = [
-            [(p, None, 1) for p in choices] for choices in (_PRIMES[count] if primes is None else (primes,))
+            [(p, None, 1) for p in choices] for choices in (_PRIMES[parameter_count] if primes is None else (primes,))
         ]
-        plans = [[*first, *(second if count > 1 else ())] for first, second in product(complete, [*lines, []])]
+        plans = [
+            [*first, *(second if parameter_count > 1 else ())] for first, second in product(complete, [*lines, []])
+        ]
     else:
         planes: list[Choice] = [(p, _PLANES, 2) for p in _PLANE_PRIMES]
         plans = [[*first, *planes] for first in lines] + lines
         plans = plans if primes is None else [[(p, n, 1) for p in primes] for n in _MANY_LINES[:1]]
-    return next((plan for plan in plans if _count_members(count, plan) <= most), plans[-1])
+    return next((plan for plan in plans if _count_members(parameter_count, plan) <= max_members), plans[-1])
 
 
 def _choose_terms(
-    map_: MapFamily, count: int, eps: fmpq | None, terms: int | None, rng: random.Random
+    map_: MapFamily, parameter_count: int, eps: fmpq | None, terms: int | None, rng: random.Random
 ) -> tuple[int, int, float]:
-    """Return how many iterates are measured, a bound of their degrees before cancellation, and the units per member.
+    """Return how many iterates are measured, a bound of the lengths of polynomials, and the units per member.
 
     They are determined from a few members modulo a larger prime.
     """
@@ -442,19 +447,19 @@ def _choose_terms(
     if terms is not None and not 1 <= terms <= 2 * _MAX_TERMS:
         raise InputError(f"found {terms} terms, expected 1 to {2 * _MAX_TERMS}")
     family = Family(map_, _TRIAL_PRIME)
-    members = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(8)])
-    usual = _DEFAULT_ROOM if count <= 2 else _DEFAULT_ROOM_OF_MANY
-    room = usual if terms is None else _MAX_ROOM
-    degrees = family.degrees(members, eps, terms or _MAX_TERMS, room, rng).max(axis=0).tolist()
+    members = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(parameter_count)] for _ in range(8)])
+    default_length = _DEFAULT_LENGTH if parameter_count <= 2 else _DEFAULT_LENGTH_OF_MANY
+    max_length = default_length if terms is None else _MAX_LENGTH
+    degrees = family.degrees(members, eps, terms or _MAX_TERMS, max_length, rng).max(axis=0).tolist()
     if degrees[0] == NOWHERE:
         raise InputError("the map is not defined at any point, for all parameters")
     measured = sum(degree >= 0 for degree in degrees)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
-    room = max(family.dim * family.degree * d + 1 for d in [1, *degrees[: measured - 1]])
+    max_length = max(family.dim * family.degree * d + 1 for d in [1, *degrees[: measured - 1]])
     # Compile the kernel now: there are no results yet that Ctrl-C could interrupt.
-    family.degrees(np.resize(members, (LONG, count)), eps, 1, room, random.Random(0))
-    return measured, room, family.units([1, *degrees[:measured]])
+    family.degrees(np.resize(members, (LONG, parameter_count)), eps, 1, max_length, random.Random(0))
+    return measured, max_length, family.units([1, *degrees[:measured]])
 
 
 def _confirm(
@@ -465,11 +470,11 @@ def _confirm(
     check: Callable[[], None] = lambda: None,
 ) -> Component:
     """Measure random members on a component, and search for a rational member that is on no smaller component."""
-    measured, names = [], family.names
+    sequences, names = [], family.names
     for _ in range(_CONFIRMING_MEMBERS):
         check()
-        measured.append(family.degrees_on(component.equations, component.degrees, rng))
-    known = [degrees for degrees in measured if degrees is not None]
+        sequences.append(family.degrees_on(component.equations, component.degrees, rng))
+    defined = [degrees for degrees in sequences if degrees is not None]
     values = None
     for _ in range(_TRIES):
         point = point_on(component.equations, len(names), QQ, rng)
@@ -480,7 +485,7 @@ def _confirm(
         if not any(other.dimension < component.dimension and other.contains(point) for other in others):
             values = dict(zip(names, point, strict=True))
             break
-    return replace(component, tried=len(known), confirmed=known.count(component.degrees), values=values)
+    return replace(component, tried=len(defined), confirmed=defined.count(component.degrees), values=values)
 
 
 def _count_unassigned(sweep: Sweep, components: Sequence[Component]) -> int:

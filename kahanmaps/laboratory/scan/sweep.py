@@ -67,9 +67,9 @@ def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.R
     subspaces, width = on
     for _ in range(subspaces):
         base, *directions = ([rng.randrange(prime) for _ in range(count)] for _ in range(1 + width))
-        for slopes in product(range(prime), repeat=width):
+        for multipliers in product(range(prime), repeat=width):
             yield tuple(
-                (b + sum(s * d for s, d in zip(slopes, direction, strict=True))) % prime
+                (b + sum(s * d for s, d in zip(multipliers, direction, strict=True))) % prime
                 for b, *direction in zip(base, *directions, strict=True)
             )
 
@@ -80,7 +80,7 @@ def sweep(
     prime: int,
     eps: fmpq | None,
     terms: int,
-    room: int,
+    max_length: int,
     *,
     on: tuple[int, int] | None = None,
     units: float = 0,
@@ -97,7 +97,7 @@ def sweep(
         prime: the prime.
         eps: half the time step (exact), or None for generic eps, taken from GF(p^2).
         terms: the number of degrees.
-        room: as for `Family.degrees`.
+        max_length: as for `Family.degrees`.
         on: the number and the dimension of random affine subspaces of parameter space whose members are measured, or
             None for all members.
         units: the units of work that are counted for one member.
@@ -107,7 +107,7 @@ def sweep(
         progress: called with the number of members done and their total.
 
     Raises:
-        InputError: if the map is nowhere defined, or degrees need more room.
+        InputError: if the map is nowhere defined, or the degrees are too large.
     """
     import numpy as np
 
@@ -120,7 +120,7 @@ def sweep(
         for start in range(0, len(points), _BATCH_SIZE):
             check()
             batch = np.array(points[start : start + _BATCH_SIZE], dtype=np.int64)
-            batches.append(family.degrees(batch, eps, terms, room, rng, jobs=jobs))
+            batches.append(family.degrees(batch, eps, terms, max_length, rng, jobs=jobs))
             count_work(units * len(batch))
             on_progress(start + len(batch), len(points))
         return np.concatenate(batches)
@@ -139,11 +139,11 @@ def sweep(
         if not len(special):
             break
         # The degree of an iterate is the largest on any line; a line in special position can only lower it.
-        before, again = degrees[special], measure([points[i] for i in special])
-        degrees[special] = np.maximum(before, again)
+        earlier, on_new_line = degrees[special], measure([points[i] for i in special])
+        degrees[special] = np.maximum(earlier, on_new_line)
         still_special = special[(degrees[special] != generic).any(axis=1)]
         false_alarms += len(special) - len(still_special)
-        if line >= _MIN_LINES and (before == degrees[special]).all():
+        if line >= _MIN_LINES and (earlier == degrees[special]).all():
             break
         special = still_special
     classes: dict[Degrees, list[Point]] = {}

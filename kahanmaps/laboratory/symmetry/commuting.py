@@ -40,7 +40,7 @@ from kahanmaps.display_protocols import PrintableResult, ResultPart
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.tensor import GENERATOR, over_algebra
 from kahanmaps.laboratory.defaults import budget_for
-from kahanmaps.laboratory.symmetry.commuting_proofs import affine, certify_family, certify_field
+from kahanmaps.laboratory.symmetry.commuting_proofs import certify_family, certify_field, proof_by_affine_lemma
 from kahanmaps.laboratory.symmetry.commuting_space import (
     MAX_UNKNOWNS,
     SHAPES,
@@ -268,23 +268,27 @@ class _Search:
             self.space = commuting_space(f, result.shape, self.settings.seed, self.C)
             result.basis = list(self.space.fields)
             result.dimension = len(result.basis) if len(result.basis) == self.space.dimension else None
-            size = self.space.dimension
+            dimension = self.space.dimension
             everything = SolutionComponent(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
             # If f is affine, the space may be large, and often all of it commutes: this is proved without equations.
-            if result.dimension is not None and f.degree <= 1 and affine(f, self.space.fields) is not None:
+            if (
+                result.dimension is not None
+                and f.degree <= 1
+                and proof_by_affine_lemma(f, self.space.fields) is not None
+            ):
                 self._add_family(everything, certify_family(f, self.space, everything, self.settings))
-            elif size > MAX_SPACE:
+            elif dimension > MAX_SPACE:
                 result.undecided.append(
-                    f"the fields g with [f, g] = 0 have dimension {'up to ' * (result.dimension is None)}{size}, "
+                    f"the fields g with [f, g] = 0 have dimension {'up to ' * (result.dimension is None)}{dimension}, "
                     f"and equations are solved up to {MAX_SPACE}"
                 )
             else:
                 self._solve(everything, 0)
         zeros = [fmpq(0)] * (len(self.space.fields) - 1)
         trivial = [(fmpq(first), *zeros) for first in (0, 1, -1)]
-        single = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
+        isolated = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
         # g and -g follow each other in the list, as 1 and -1 times the same integers.
-        signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in single if p not in trivial}
+        signs = {p: 1 if next(w for w in p if w != 0) > 0 else -1 for p in isolated if p not in trivial}
         others = sorted(signs, key=lambda p: (*map(abs, p), *(w * signs[p] for w in p), signs[p] < 0))
         for k, weights in enumerate([*trivial, *others]):
             if self.budget.is_spent and weights not in trivial:
@@ -320,9 +324,11 @@ class _Search:
         T = decoupling(equations, len(gens))
         if T is not None and level == 0:
             zero = gens[0].context().constant(0)
-            moved = [sum((y * T[i, j] for j, y in enumerate(gens) if T[i, j] != 0), zero) for i in range(len(gens))]
-            equations = [p.compose(*moved, ctx=zero.context()) for p in equations]
-            part = SolutionComponent(tuple(v.compose(*moved, ctx=zero.context()) for v in part.values))
+            old_coordinates = [
+                sum((y * T[i, j] for j, y in enumerate(gens) if T[i, j] != 0), zero) for i in range(len(gens))
+            ]
+            equations = [p.compose(*old_coordinates, ctx=zero.context()) for p in equations]
+            part = SolutionComponent(tuple(v.compose(*old_coordinates, ctx=zero.context()) for v in part.values))
         solutions = solve_system(equations, part.values, self.budget)
         result.irrational += [text for text in solutions.irrational if text not in result.irrational]
         self.points += [component for component in solutions.components if not component.free]
@@ -370,12 +376,12 @@ class _Search:
         self.families = [*(self.families[k] for k in kept), family]
         self.result.families = [self.result.families[k] for k in kept]
         # Reduced directions, and as the base the member with zeros at their pivots.
-        slopes, _ = fmpq_mat([family.slopes(i) for i in family.free]).rref()
+        direction_matrix, _ = fmpq_mat([family.direction(i) for i in family.free]).rref()
         base = list(family.point)
-        for row in slopes.tolist():
+        for row in direction_matrix.tolist():
             lead = next(k for k, entry in enumerate(row) if entry != 0)
             base = [b - base[lead] * entry for b, entry in zip(base, row, strict=True)]
-        directions = [tuple(fmpq(e) for e in primitive_integers(tuple(row))) for row in slopes.tolist()]
+        directions = [tuple(fmpq(e) for e in primitive_integers(tuple(row))) for row in direction_matrix.tolist()]
         self.result.families.append(
             CommutingFamily(self._field(base, finding), tuple(self._field(d, finding) for d in directions), finding)
         )
@@ -413,28 +419,28 @@ def find_commuting(
     [[['x^2*a', 'y^2'], ['2*x^2', '0'], ['x^2*a', '0'], ['0', 'y^2*a']]]
     """
     options: dict[str, Any] = {"seed": seed, "error_bits": error_bits, "effort": effort, "progress": progress}
-    given = as_map(system)
-    kahan = given.given if isinstance(given, AlgebraicMap) else given
+    map_ = as_map(system)
+    kahan = map_.given if isinstance(map_, AlgebraicMap) else map_
     if not isinstance(kahan, KahanFamily) or "eps" in kahan.system.symbols:
         raise InputError(f"found {kahan.kind}, expected a quadratic vector field without eps")
-    if not isinstance(given, AlgebraicMap):
+    if not isinstance(map_, AlgebraicMap):
         return commuting_systems(kahan.system, shape, **options, on_result=on_result)
-    f, chi = kahan.system, given.root.polynomial
+    f, minimal_polynomial = kahan.system, map_.root.polynomial
     if GENERATOR in f.variables:
         raise InputError(f"found a variable {GENERATOR}, expected another name: this one denotes the algebraic number")
-    letters = ring((*f.variables, GENERATOR)).gens()
-    over_t = QuadraticSystem(tuple(p.compose(*letters, ctx=letters[0].context()) for p in f.rhs), (GENERATOR,))
-    m, times_t = given.root.degree, given.root.number_field.generator.matrix
+    gens = ring((*f.variables, GENERATOR)).gens()
+    over_t = QuadraticSystem(tuple(p.compose(*gens, ctx=gens[0].context()) for p in f.rhs), (GENERATOR,))
+    m, times_t = map_.root.degree, map_.root.number_field.generator.matrix
     C = fmpq_mat(f.dim * m, f.dim * m)  # t times a point
     for k, i, j in itertools.product(range(f.dim), range(m), range(m)):
         C[k * m + i, k * m + j] = times_t[i, j]
     *x, a = ring((*f.variables, *f.symbols)).gens()
-    at = [x[k // m] if k % m == 0 else 0 * a for k in range(f.dim * m)]
+    rational_point = [x[k // m] if k % m == 0 else 0 * a for k in range(f.dim * m)]
 
     def descend(G: QuadraticSystem) -> QuadraticSystem:
         """Return the system over K for a system over Q; its values at points of Q^n determine it."""
-        parts = [p.compose(*at, ctx=a.context()) for p in G.rhs]
-        rhs = (sum((parts[i * m + j] * a**j for j in range(m)), 0 * a) for i in range(f.dim))
+        coordinates = [p.compose(*rational_point, ctx=a.context()) for p in G.rhs]
+        rhs = (sum((coordinates[i * m + j] * a**j for j in range(m)), 0 * a) for i in range(f.dim))
         return QuadraticSystem(tuple(rhs), f.symbols)
 
     def over_field(g: CommutingField) -> CommutingField:
@@ -452,8 +458,8 @@ def find_commuting(
                 for family in result.families
             ],
             irrational=[],  # such solutions are not over the field either, but over its extensions
-            root=str(given.root),
+            root=str(map_.root),
         )
 
     options["on_result"] = lambda result: on_result(descended(result))
-    return descended(commuting_systems(over_algebra(over_t, chi), shape or "linear", **options, C=C))
+    return descended(commuting_systems(over_algebra(over_t, minimal_polynomial), shape or "linear", **options, C=C))

@@ -50,20 +50,20 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
             return Finding(claim, theorems.PROVED, Evidence(theorems.METHOD, why), formula=_FORMULA)
     count(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))
-    proof = theorems.commuting_by_splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
+    proof = theorems.commuting_by_splitting(f, g) or proof_by_affine_lemma(f, [g]) or _in_dimension_one(f, g)
     return certify(claim, identity, settings, proof, formula=_FORMULA)
 
 
 def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
     """Certify that the Kahan maps of f and of every member of a linear family commute, for every eps."""
     count(2_000 + 350 * f.dim**2 * len(family.free))
-    members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
-    proof = affine(f, members) or _in_dimension_one(f, f)
+    members = [field_at(space, family.point), *(field_at(space, family.direction(i)) for i in family.free)]
+    proof = proof_by_affine_lemma(f, members) or _in_dimension_one(f, f)
     claim = "the Kahan maps of f and of every member g of the family commute"
     return certify(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
 
 
-def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
+def proof_by_affine_lemma(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
     """Return evidence by the lemma of affine maps if f or the only g is affine; None if neither is."""
     if f.degree <= 1:
         name, pairs = "f", [(f, g) for g in fields]

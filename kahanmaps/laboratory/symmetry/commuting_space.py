@@ -92,8 +92,8 @@ def commutator_equations(
     [b^3 - b]
     """
     n = f.dim
-    of_f = _Terms(coefficients_of(f), n)
-    of_g = _Terms(combination(basis, weights, weights[0].context().constant(0)), n)
+    of_f = _SeriesMap(coefficients_of(f), n)
+    of_g = _SeriesMap(combination(basis, weights, weights[0].context().constant(0)), n)
     equations: list[fmpq_mpoly] = []
     idle = 0
     while idle < 2 and not budget.is_spent:
@@ -107,8 +107,8 @@ def commutator_equations(
     return equations
 
 
-class _Terms:
-    """A quadratic field given by its coefficients (numbers, or polynomials in b), as steps of power series in eps."""
+class _SeriesMap:
+    """The Kahan map of a field given by its coefficients (numbers, or polynomials in b), on power series in eps."""
 
     def __init__(self, rows: Sequence[Sequence[Any]], n: int) -> None:
         # With 1 as a further coordinate all terms are quadratic.
@@ -116,7 +116,7 @@ class _Terms:
         self._terms = [[(c, j, k) for c, (j, k) in zip(row, pairs, strict=True) if c != 0] for row in rows]
 
     def step(self, y: Series) -> Series:
-        """y + 2 eps v with v = g(y) + eps g'(y) v, order by order."""
+        """Return the image y + 2 eps v with v = g(y) + eps g'(y) v, computed order by order."""
         # A further coordinate 1 makes g homogeneous. In eps g'(y) v only lower orders of v occur, so that v is computed
         # without solving a linear system.
         y = [[*row, fmpq(order == 0)] for order, row in enumerate(y)]
@@ -136,8 +136,8 @@ class _Terms:
                         if product != 0:
                             value[i] = value[i] + c * product
             v.append(value)
-        moved = [y[0], *([a + 2 * b for a, b in zip(y[k], v[k - 1], strict=True)] for k in range(1, len(y)))]
-        return [row[:-1] for row in moved]
+        image = [y[0], *([a + 2 * b for a, b in zip(y[k], v[k - 1], strict=True)] for k in range(1, len(y)))]
+        return [row[:-1] for row in image]
 
 
 @dataclass(frozen=True)
@@ -175,19 +175,19 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
     x' = x^2, y' = 0
     """
     n = f.dim
-    local = f.over(QQ)
+    over_Q = f.over(QQ)
     columns = _independent_components(f)
     rng = random.Random(f"commuting space {seed}")
     rows: list[list[fmpq]] = []
-    needed = unknowns(f, shape)
+    row_count = unknowns(f, shape)
     while True:
-        while len(rows) < needed + 2 * n:
+        while len(rows) < row_count + 2 * n:
             point = [fmpq(rng.randint(-9, 9)) for _ in range(n)]
-            value, jacobian = local.value(point), local.jacobian(point)
+            value, jacobian = over_Q.value(point), over_Q.jacobian(point)
             # For each unknown scalar function phi: phi(x) and its derivative along f.
             if shape == "linear":
-                along = (sum((jacobian[j, k] * value[k] for k in range(n)), fmpq(0)) for j in columns)
-                scalars = [*zip((value[j] for j in columns), along, strict=True)]
+                derivatives = (sum((jacobian[j, k] * value[k] for k in range(n)), fmpq(0)) for j in columns)
+                scalars = [*zip((value[j] for j in columns), derivatives, strict=True)]
             else:
                 pairs = itertools.combinations_with_replacement(range(n), 2)
                 scalars = [(point[j] * point[k], value[j] * point[k] + point[j] * value[k]) for j, k in pairs]
@@ -196,8 +196,8 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
                 # the component i of f' (phi e_k) - e_k (grad phi . f), for all k and phi
                 rows.append(
                     [
-                        jacobian[i, k] * phi - (slope if i == k else 0)
-                        for k, (phi, slope) in itertools.product(range(n), scalars)
+                        jacobian[i, k] * phi - (derivative if i == k else 0)
+                        for k, (phi, derivative) in itertools.product(range(n), scalars)
                     ]
                 )
         count(500 + len(rows) * len(rows[0]) * (2 + len(rows[0]) / 400))
@@ -236,7 +236,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
             identity = [QQ.identity(n)] if matrices else []
             basis = (f, *(fields[k] for k in other_indices))
             return CommutingSpace(basis, (*identity, *(matrices[k] for k in other_indices if matrices)), len(basis))
-        needed = len(rows) + 2 * n
+        row_count = len(rows) + 2 * n
 
 
 def bracket_vanishes(f: QuadraticSystem, g: QuadraticSystem) -> bool:

@@ -185,7 +185,7 @@ def linear_symmetries(
     The search covers the Lie algebra of affine symmetries, and a scaling; signed permutations, also of scaled
     variables, with a translation where needed (dimension at most 12); in dimension at most 3, where that algebra has no
     linear element, all rational matrices. The result is exact and proved. Each increase of `effort` by 1 doubles the
-    work that the search may take. `on_result` is called with the result before each stage, which fills it.
+    work that the search may take. `on_result` is called once, with the result that the stages then fill.
     Source: cmoq-2013.
 
     >>> symmetries = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
@@ -302,10 +302,10 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
     waiting = [QQ.identity(n)]
     group = {_key(waiting[0])}
     while waiting:
-        known = waiting.pop()
+        element = waiting.pop()
         for matrix in matrices:
             count(5 + n**2)
-            product = known * matrix
+            product = element * matrix
             if _key(product) not in group:
                 group.add(_key(product))
                 waiting.append(product)
@@ -327,7 +327,7 @@ def _add_general(symmetries: Symmetries, budget: Budget) -> None:
     context = ring([f"s{i + 1}{j + 1}" for i in range(n) for j in range(n)])
     gens = context.gens()
     matrix = [list(gens[i * n : (i + 1) * n]) for i in range(n)]
-    known = {_key(t.S) for t in symmetries.signed if not any(e != 0 for e in t.r)}
+    known_matrices = {_key(t.S) for t in symmetries.signed if not any(e != 0 for e in t.r)}
     complete = True
     for sign in (1, -1):
         equations = matrix_equations(f, matrix, sign)
@@ -335,10 +335,10 @@ def _add_general(symmetries: Symmetries, budget: Budget) -> None:
         for component in solved.components:
             # In a family of solutions all are singular: invertible ones would be a group with infinitesimal symmetries.
             S = fmpq_mat(n, n, list(component.point))
-            if not component.free and S.det() != 0 and _key(S) not in known:
+            if not component.free and S.det() != 0 and _key(S) not in known_matrices:
                 symmetries.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
-        left = [part for part in solved.unsolved if not is_singular(part, n)]
-        if left:
+        unsolved = [part for part in solved.unsolved if not is_singular(part, n)]
+        if unsolved:
             complete = False
             symmetries.undecided.append(
                 f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solved.reason}"
@@ -386,8 +386,8 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
         return zero
     # f''(S x, r) + B S x = sign S B x is linear in r, with one equation for each entry of a matrix.
     missing = (S * f.B * fmpq(sign) - f.B * S).entries()
-    slopes = [(form * S * fmpq(2)).transpose() for form in f.Q]
-    rows = [[*(slopes[i][j, k] for k in range(n)), -missing[i * n + j]] for i in range(n) for j in range(n)]
+    derivatives = [(form * S * fmpq(2)).transpose() for form in f.Q]
+    rows = [[*(derivatives[i][j, k] for k in range(n)), -missing[i * n + j]] for i in range(n) for j in range(n)]
     solutions = nullspace(QQ, fmpq_mat(rows))
     if not any(v[-1] != 0 for v in solutions):
         return None
@@ -425,13 +425,13 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
     images = [sum((s[i * n + j] * x[j] for j in range(n)), joint.constant(0)) for i in range(n)]
     *at_x, divergence = (p.compose(*x, ctx=joint) * fmpq(sign) for p in (*f.rhs, f.divergence))
     sides = [sum((s[i * n + a] * at_x[a] for a in range(n)), joint.constant(0)) for i in range(n)]
-    parts = [
+    differences = [
         p.compose(*images, ctx=joint) - side
         for p, side in zip((*f.rhs, f.divergence), (*sides, divergence), strict=True)
     ]
     context = entries[0].context()
-    back = [context.constant(0)] * n + entries
-    return [c.compose(*back, ctx=context) for part in parts for c in coefficients_in(part, n)]
+    values = [context.constant(0)] * n + entries
+    return [c.compose(*values, ctx=context) for difference in differences for c in coefficients_in(difference, n)]
 
 
 def is_singular(part: SolutionComponent, n: int) -> bool:

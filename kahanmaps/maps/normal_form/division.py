@@ -78,8 +78,8 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
 
     def product(n: int, indices: tuple[int, ...]) -> fmpz_poly:
         """The product of psi at these indices, as a term of psi_n: with gamma for each three cube roots too many."""
-        excess = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
-        value = _GAMMA ** (excess // 3)
+        cube_roots = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
+        value = _GAMMA ** (cube_roots // 3)
         for k in indices:
             value = value * psi[k]
         return value

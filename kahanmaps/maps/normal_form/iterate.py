@@ -84,16 +84,16 @@ class NthIterate:
                 if balls:
                     raise PrecisionLost("the orbit meets special positions that balls cannot decide") from None
         from kahanmaps.maps.normal_form.planar_block import same_point
-        from kahanmaps.maps.normal_form.rational_iterate import stepped_over
+        from kahanmaps.maps.normal_form.rational_iterate import point_by_steps
 
         # Over a small finite field orbits soon close or meet a pole.
         point = start
         for k in range(1, n + 1):
             if k > _CYCLE:
                 raise InputError(f"the iterate {n} cannot be reached directly here: use fewer steps or another prime")
-            point = stepped_over(block, point, 1)
+            point = point_by_steps(block, point, 1)
             if same_point(point, start):
-                return stepped_over(block, start, n % k)
+                return point_by_steps(block, start, n % k)
         return point
 
 

@@ -69,17 +69,17 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
 
     m is written as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
     """
-    babies, step = isqrt(radius) + 2, curve.multiple(unit, curve.T)
+    baby_steps, step = isqrt(radius) + 2, curve.multiple(unit, curve.T)
     index: dict[Any, tuple[int, Any]] = {}
     point = step
-    for j in range(1, babies + 1):
+    for j in range(1, baby_steps + 1):
         if point is None:
             return unit * j
         index.setdefault(point[0], (unit * j, point[1]))
         point = curve.add(point, step)
-    stride = (2 * babies + 1) * unit
-    leap, upward = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
-    backward, downward = curve.negative(leap), upward
+    stride = (2 * baby_steps + 1) * unit
+    giant_step, upward = curve.multiple(stride, curve.T), curve.multiple(middle, curve.T)
+    negative_giant_step, downward = curve.negative(giant_step), upward
     for i in range(radius * unit // stride + 3):
         for k, point in ((middle + i * stride, upward), (middle - i * stride, downward)):
             if point is None:
@@ -87,7 +87,7 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
             if point[0] in index:
                 j, y = index[point[0]]  # k T = +-j T
                 return abs(k - j if point[1] == y else k + j)
-        upward, downward = curve.add(upward, leap), curve.add(downward, backward)
+        upward, downward = curve.add(upward, giant_step), curve.add(downward, negative_giant_step)
     raise AssertionError("no multiple of T in the Hasse interval is zero: it would be a mistake of ours")
 
 
@@ -104,12 +104,12 @@ class LevelCubic:
     def gradient(self, P: Triple) -> Triple:
         """Return the three derivatives at P of F = denominator h - numerator W (W^2 + D)."""
         (U, V, W), (p, q, r), block = P, self.block.D, self.block
-        along = self.numerator * W
+        factor = self.numerator * W
         return (
             self.denominator * ((3 * block.a * U + 2 * block.b * V) * U + block.c * V * V)
-            - along * (2 * p * U + q * V),
+            - factor * (2 * p * U + q * V),
             self.denominator * (block.b * U * U + (2 * block.c * U + 3 * block.d * V) * V)
-            - along * (q * U + 2 * r * V),
+            - factor * (q * U + 2 * r * V),
             -self.numerator * (3 * W * W + p * U * U + q * U * V + r * V * V),
         )
 
@@ -121,8 +121,8 @@ class LevelCubic:
             s, t = _dot(self.gradient(P), Q), _dot(self.gradient(Q), P)
             return t * P[0] - s * Q[0], t * P[1] - s * Q[1], t * P[2] - s * Q[2]
         a, b, c = self.gradient(P)
-        nought = 0 * a
-        candidates = [(b, -a, nought), (c, nought, -a), (nought, c, -b)]
+        zero = 0 * a
+        candidates = [(b, -a, zero), (c, zero, -a), (zero, c, -b)]
         X = next(X for X in candidates if any(entry != 0 for entry in X) and not same_point(X, P))
         gradient = self.gradient(X)
         s, t = _dot(gradient, P), _dot(gradient, X) / 3
@@ -158,29 +158,29 @@ class LevelCubic:
         points = -(-(q + 1 - radius) // order) * order
         if points + order <= q + 1 + radius:
             return None
-        unknown = False
+        is_unknown = False
         for factor, exponent in fmpz(order).factor():
             prime, power = int(factor), int(factor) ** int(exponent)
             if points // order % prime != 0:
                 continue
             if prime > _MAX_DIGIT:
-                unknown = True
+                is_unknown = True
                 continue
             # The logarithm of the part of P for that of T, whose order is `power`, digit by digit (Pohlig and Hellman).
-            part, base = self.multiple(order // power, P), self.multiple(order // power, T)
-            top, unit = self.multiple(power // prime, base), 1
+            P_part, T_part = self.multiple(order // power, P), self.multiple(order // power, T)
+            generator, unit = self.multiple(power // prime, T_part), 1
             while unit < power:
-                # `part` is reduced by the digits found so far; `step` runs through the multiples of `top`.
-                cofactor, digit, step = self.multiple(power // prime // unit, part), 0, self.zero
-                while not same_point(cofactor, step):
-                    digit, step = digit + 1, self.add(step, top)
+                # `P_part` is reduced by the digits found so far; `multiple` runs through the multiples of `generator`.
+                cofactor, digit, multiple = self.multiple(power // prime // unit, P_part), 0, self.zero
+                while not same_point(cofactor, multiple):
+                    digit, multiple = digit + 1, self.add(multiple, generator)
                     if digit == prime:
                         return False
-                part = self.subtract(part, self.multiple(digit * unit, base))
+                P_part = self.subtract(P_part, self.multiple(digit * unit, T_part))
                 unit *= prime
-            if not self.is_zero(part):
+            if not self.is_zero(P_part):
                 return False
-        return None if unknown else True
+        return None if is_unknown else True
 
 
 def _dot(P: Triple, Q: Triple) -> Any:

@@ -74,8 +74,8 @@ class PlanePeriod:
     @property
     def text(self) -> str:
         """A line of text."""
-        what = f"period {self.period}" if self.period is not None else self.status
-        return f"{self.name}: {what} ({self.kind}{'; ' + self.reason if self.reason else ''})"
+        result = f"period {self.period}" if self.period is not None else self.status
+        return f"{self.name}: {result} ({self.kind}{'; ' + self.reason if self.reason else ''})"
 
 
 @dataclass(frozen=True)
@@ -162,16 +162,16 @@ def plane_period(
     """
     q = prime if context is None else int(context.order())
     if prime <= 3:  # the theory of the level cubic excludes 2 and 3: iterate in homogeneous coordinates, through poles
-        kind, image, passed = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
+        kind, image, met_pole = PeriodKind.STEPPED, point, bool(block.level(point)[1] == 0)
         for step in range(1, min(q * q + q + 1, _MAX_WALK) + 1):
             image = block.image(image)
             if all(entry == 0 for entry in image):
                 return PlanePeriod(name, q, kind, "undefined", None, True, f"not defined after {step} steps")
-            passed = passed or bool(image[2] == 0)
+            met_pole = met_pole or bool(image[2] == 0)
             if same_point(image, point):
-                return PlanePeriod(name, q, kind, "periodic", step, passed)
+                return PlanePeriod(name, q, kind, "periodic", step, met_pole)
         reason = f"no return to the initial point within {_MAX_WALK} steps"
-        return PlanePeriod(name, q, kind, "undecided", None, passed or None, reason)
+        return PlanePeriod(name, q, kind, "undecided", None, met_pole or None, reason)
     kind, gamma = classify(block, point)
     if kind in _KNOWN:
         return PlanePeriod(name, q, kind, *_KNOWN[kind])
@@ -191,8 +191,8 @@ def plane_period(
                 if pow(-8, order // int(factor), prime) != 1:
                     break
                 order //= int(factor)
-        met = _walk_meets_pole(block, point, 3 * order) if at_infinity else False
-        return PlanePeriod(name, q, kind, "periodic", 3 * order, met)
+        meets_pole_at = _walk_meets_pole(block, point, 3 * order) if at_infinity else False
+        return PlanePeriod(name, q, kind, "periodic", 3 * order, meets_pole_at)
     if q > largest:
         size, bound = (str(n) if n < 10**6 else f"about 2^{n.bit_length() - 1}" for n in (q, largest))
         reason = f"its field has {size} elements, more than {bound}"
@@ -227,8 +227,8 @@ def classify(block: PlanarBlock, point: Triple) -> tuple[PeriodKind, Any]:
         for _ in range(3):
             image = block.image(image)
         # (0, 0, 0) is no point, but `same_point` would accept it: it is the image of a base point, never of a vertex.
-        vertex = any(entry != 0 for entry in image) and same_point(image, point)
-        return (PeriodKind.VERTEX if vertex else PeriodKind.TRIANGLE), None
+        is_vertex = any(entry != 0 for entry in image) and same_point(image, point)
+        return (PeriodKind.VERTEX if is_vertex else PeriodKind.TRIANGLE), None
     return PeriodKind.SMOOTH, gamma
 
 
@@ -320,8 +320,8 @@ def period(
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
     'aperiodic'
     """
-    given = normal_form_and_start(system, resolve_eps(eps, time_step, h), either(start=start, x0=x0))
-    return period_of(*given, None if prime is None else integer(prime, "prime"))
+    arguments = normal_form_and_start(system, resolve_eps(eps, time_step, h), either(start=start, x0=x0))
+    return period_of(*arguments, None if prime is None else integer(prime, "prime"))
 
 
 def normal_form_and_start(system: SystemLike, eps: Any, start: Any) -> tuple[SystemNormalForm, Any, Sequence[Any]]:
@@ -376,21 +376,21 @@ def torsion_order(gamma: Any) -> tuple[int | None, str]:
     >>> torsion_order(fmpq(32, 27)), torsion_order(fmpq(3))
     ((5, '5 T = 0'), (None, 'T has the orders 54 and 88 modulo 101 and 103'))
     """
-    seen: list[tuple[int, str]] = []
+    orders: list[tuple[int, str]] = []
     for prime, residue, context in _reductions(gamma):
         if residue == 0 or residue == 1:
             continue
         prime_name = f"{prime}" if context is None else f"a prime over {prime}"
-        seen.append(
+        orders.append(
             (translation_order(residue, prime if context is None else int(context.order()), context), prime_name)
         )
-        (first, first_order), (last, last_order) = seen[0], seen[-1]
-        if first != last:
-            return None, f"T has the orders {first} and {last} modulo {first_order} and {last_order}"
-        if len(seen) == _AGREEMENTS:
+        (first_order, first_prime), (last_order, last_prime) = orders[0], orders[-1]
+        if first_order != last_order:
+            return None, f"T has the orders {first_order} and {last_order} modulo {first_prime} and {last_prime}"
+        if len(orders) == _AGREEMENTS:
             curve = Jacobian(gamma)
-            if curve.multiple(first, curve.T) is None:
-                return first, f"{first} T = 0"
+            if curve.multiple(first_order, curve.T) is None:
+                return first_order, f"{first_order} T = 0"
     raise AssertionError("there are infinitely many primes")
 
 

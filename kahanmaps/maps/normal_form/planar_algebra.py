@@ -100,12 +100,12 @@ class AlgebraBlock(LevelBlock):
             norm += entry * shifted.polynomial[0]
             shifted = shifted * algebra.generator
         numerators = [entry.p for z in (U, V) for entry in (z * cofactor).coefficients]
-        coprime_part, part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
+        coprime_part, other_part = split_by_primes(content(entry.p for entry in cofactor.coefficients), self.bad**3)
         # One common factor for all coordinates: reducing each fraction on its own would cost as many gcds.
-        common = common_part([norm.p, *numerators], self.bad**4 * part)
+        common = common_part([norm.p, *numerators], self.bad**4 * other_part)
         return [entry // common for entry in numerators], norm.p // common, coprime_part
 
-    def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
+    def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
         """Return a number whose primes are those at which form and denominator may cancel; None if all primes may.
 
         The form is Tr((alpha U + beta V)/(W g'(t))) for elements alpha and beta of K: the elements of the dual basis of
@@ -165,7 +165,7 @@ class ShortElements:
         return (value, self._algebra.one) if multiplier is None else (value * multiplier, 1 / multiplier)
 
     @staticmethod
-    def divisor(value: EtaleElement) -> EtaleElement:
+    def prepared_divisor(value: EtaleElement) -> EtaleElement:
         """Return 1/value: `difference` and `combined` divide by multiplying with it."""
         return 1 / value
 
@@ -220,18 +220,20 @@ class ShortElements:
         degree, denominator = self._algebra.degree, value.polynomial.denom()
         integers = [(entry * denominator).p for entry in value.coefficients]
         residue = self._algebra.convert(fmpq_poly([entry % self._power for entry in integers]))
-        part = self._power.gcd(self._algebra.norm(residue).p % self._power)
+        bad_part = self._power.gcd(self._algebra.norm(residue).p % self._power)
         # Midpoints suffice: the lengths only weight the lattice, and the result is multiplied exactly.
         smallest = max(abs(entry) for entry in integers) * _LEAST
         sums = (sum(c * power for c, power in zip(integers, powers, strict=True)) for powers in self._powers)
         lengths = [max(smallest, abs(value).mid()) for value in sums]
-        if denominator == 1 and part < _SHORT and max(lengths) < _SHORT * min(lengths):
+        if denominator == 1 and bad_part < _SHORT and max(lengths) < _SHORT * min(lengths):
             return None
-        # All b with b value = 0 modulo `part`.
-        rows = (residue.matrix.transpose() if part != 1 else residue.matrix).numer_denom()[0].tolist()
-        big = [[entry % part for entry in row] + [int(i == j) for j in range(degree)] for i, row in enumerate(rows)]
-        big += [[part * int(i == j) for j in range(degree)] + [0] * degree for i in range(degree)]
-        lattice = fmpz_mat([row[degree:] for row in fmpz_mat(big).hnf().tolist()[degree:]])
+        # All b with b value = 0 modulo `bad_part`.
+        rows = (residue.matrix.transpose() if bad_part != 1 else residue.matrix).numer_denom()[0].tolist()
+        augmented = [
+            [entry % bad_part for entry in row] + [int(i == j) for j in range(degree)] for i, row in enumerate(rows)
+        ]
+        augmented += [[bad_part * int(i == j) for j in range(degree)] + [0] * degree for i in range(degree)]
+        lattice = fmpz_mat([row[degree:] for row in fmpz_mat(augmented).hnf().tolist()[degree:]])
         scale = [2.0**60 * max((length / max(lengths)).mid(), _LEAST) for length in lengths]
         real_approximation: list[Any] = [
             [
@@ -247,7 +249,7 @@ class ShortElements:
             row = [sum((s * row[k] for s, row in zip(signs, rows, strict=True)), fmpz(0)) for k in range(degree)]
             short = self._algebra.convert(fmpq_poly(row))
             if without(self._algebra.norm(short).p, self._power) in (1, -1):
-                return short * fmpq(denominator, part)
+                return short * fmpq(denominator, bad_part)
         return None if denominator == 1 else self._algebra.convert(denominator)
 
 

@@ -134,8 +134,11 @@ class IntegerBlock(LevelBlock):
         """Return the numerators of U/W and V/W, the denominator, and 1."""
         return [triple[0], triple[1]], triple[2], fmpz(1)
 
-    def fixed(self, form: Sequence[fmpz]) -> fmpz | None:
-        """A number with the primes at which alpha U + beta V and W may have a common factor; None: they may at all."""
+    def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
+        """Return a number whose primes are those at which alpha U + beta V and W may have a common factor.
+
+        None if that may be any prime.
+        """
         alpha, beta = form
         value = self.block.h(beta, -alpha)
         return None if value == 0 else value
@@ -173,12 +176,12 @@ class PlaneIntegers(Integers):
     ) -> IntegerTriple:
         """The primitive triple of the sum of scale times term times lift, which the divisor divides."""
         factors, _ = over_one(scales)
-        raw = [
+        undivided = [
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
         ]
         # The divisor has none of the bad primes.
-        U, V, W = divide_exactly(raw, common_part(raw[::-1], self.power) * divisor)
+        U, V, W = divide_exactly(undivided, common_part(undivided[::-1], self.power) * divisor)
         return U, V, W
 
 

@@ -41,7 +41,7 @@ class _Row:
     support: tuple[int, ...]
     forms: tuple[tuple[fmpz, ...], ...]
     denominator: fmpz
-    fixed: fmpz
+    fixed_number: fmpz  # its primes may be in numerator and denominator
     dividing: tuple[int, ...]  # the planes whose h the form divides
 
 
@@ -69,19 +69,19 @@ class Assembly:
                 factors.append(content(form))
                 if block.level is not None:
                     factors += block.primes
-                value = None if block.level is None else block.fixed(form)
+                value = None if block.level is None else block.fixed_number(form)
                 if value is None:
                     dividing.append(i)
                 else:
                     factors.append(value)
             self.rows.append(_Row(support, tuple(integers), denominator, radical(*factors), tuple(dividing)))
-        self.fixed = radical(*(row.fixed for row in self.rows))
-        # The numbers of the rows with the same support, and the integers of their forms.
+        self.fixed_number = radical(*(row.fixed_number for row in self.rows))
+        # The indices of the rows with the same support, and the integers of their forms.
         self.by_support: dict[tuple[int, ...], tuple[list[int], fmpz_mat]] = {}
         for support in dict.fromkeys(row.support for row in self.rows):
-            numbers = [k for k, row in enumerate(self.rows) if row.support == support]
-            table = [list(chain(*self.rows[k].forms)) for k in numbers]
-            self.by_support[support] = numbers, fmpz_mat(len(table), len(table[0]), list(chain(*table)))
+            row_indices = [k for k, row in enumerate(self.rows) if row.support == support]
+            table = [list(chain(*self.rows[k].forms)) for k in row_indices]
+            self.by_support[support] = row_indices, fmpz_mat(len(table), len(table[0]), list(chain(*table)))
         self.denominator = reduce(fmpz.lcm, (row.denominator for row in self.rows), fmpz(1))
         zeros = [[fmpz(0)] * len(matrix[0]) for matrix in matrices]
         table_rows = []
@@ -91,8 +91,8 @@ class Assembly:
         self.forms = fmpz_mat(self.dim, len(table_rows) // self.dim, table_rows)  # of all rows, over one denominator
         # Bits by which numerators may be longer than the products of the triples from which they are computed.
         largest = max(map(abs, table_rows))
-        self.excess = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
-        self.excess += sum(block.slack for block in blocks)
+        self.extra_bits = int(max(self.denominator.bit_length(), (self.dim * largest).bit_length()))
+        self.extra_bits += sum(block.slack for block in blocks)
 
 
 class PlanesPoint:
@@ -130,7 +130,7 @@ class PlanesPoint:
 
     def exceeding(self, limit: int) -> int:
         """Return the height if it exceeds the limit, otherwise 0; a gcd is computed only if it is needed to decide."""
-        if self.bits + self._assembly.excess <= limit:
+        if self.bits + self._assembly.extra_bits <= limit:
             return 0
         return self.height if self.height > limit else 0
 
@@ -161,7 +161,7 @@ class PlanesPoint:
                 product = product * number
         for _, _, primes in self._fractions:
             suspects = suspects * primes
-        modulus = (self._assembly.fixed * suspects) ** _POWER
+        modulus = (self._assembly.fixed_number * suspects) ** _POWER
         residues = [([entry % modulus for entry in numerator], W % modulus) for numerator, W in planes]
         fractions, reduced = self._fractions_of(planes), self._fractions_of(residues)
         divisors: dict[tuple[int, ...], fmpz] = {}  # one gcd for all rows with the same form
@@ -214,7 +214,7 @@ def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fm
     """The numerators of planes, each times the W of the others, in one column; and the product of all W."""
     *products_before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
     products_after = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
-    others = (some * after for some, after in zip(products_before, products_after, strict=True))
+    others = (before * after for before, after in zip(products_before, products_after, strict=True))
     column = [entry * other for (numerators, _), other in zip(planes, others, strict=True) for entry in numerators]
     return fmpz_mat(len(column), 1, column), product
 

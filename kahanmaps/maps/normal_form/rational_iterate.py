@@ -59,35 +59,37 @@ class OrbitInPlanes:
         self._blocks, self._assembly = steps.blocks(x)
         triples = steps.splitting.triples(x)
         self._planes = [_Plane(plane.block, P) for plane, P in zip(steps.splitting.planes, triples, strict=True)]
-        self._is_lazy = all(plane.lazy for plane in self._planes)
+        self._numbers_stay_short = all(plane.numbers_stay_short for plane in self._planes)
         self._limit = _MAX_BITS if max_bits is None else max_bits
         self._end: SingularStep | OverBudget | None = None
         self._period: int | None = None
-        self._walked: list[PlanesPoint] = []  # the first steps, exactly
+        self._first_points: list[PlanesPoint] = []  # the first steps, exactly
         for step, value in enumerate(steps.points(x)):
             bits = value.exceeding(self._limit)
             if step == 0 or not bits:
-                self._walked.append(value)  # not charged to the budget, since the initial point is given
+                self._first_points.append(value)  # not charged to the budget, since the initial point is given
             if bits:
                 self._end = OverBudget(step, bits)
                 break
-            if step > 0 and value == self._walked[0]:
+            if step > 0 and value == self._first_points[0]:
                 self._period = step
                 break
             if step == _EXACT_STEPS or value.bits > _EXACT_BITS:
                 break
         else:
-            self._end = _undefined_step(len(self._walked) - 1)
-        self._far = len(self._walked) - 1  # the last step that is known to be within the budget and before all poles
+            self._end = _undefined_step(len(self._first_points) - 1)
+        self._reachable = (
+            len(self._first_points) - 1
+        )  # the last step that is known to be within the budget and before all poles
 
     def value(self, n: int) -> PlanesPoint:
         """Return Phi^n(start). Raises SingularStep or OverBudget, whichever occurs at an earlier step."""
-        if n < len(self._walked):
-            return self._walked[n]
+        if n < len(self._first_points):
+            return self._first_points[n]
         if self._end is not None:
             raise self._end
         if self._period is not None:
-            return self._walked[n % self._period]
+            return self._first_points[n % self._period]
         step, value, bits = self._step_within_budget(n)
         pole = self._first_pole(step, value)
         if pole is not None:
@@ -99,7 +101,7 @@ class OrbitInPlanes:
             raise OverBudget(step, bits)
         if value is None:
             raise ArithmeticError("an iterate at a pole that no prime shows: please report this")
-        self._far = max(self._far, n)
+        self._reachable = max(self._reachable, n)
         return value
 
     def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
@@ -107,8 +109,8 @@ class OrbitInPlanes:
 
         The value is None if it was not computed, or is at a pole.
         """
-        step = max(1, min(self._far, n - 1))
-        target = n if self._is_lazy else _halved(n, step)
+        step = max(1, min(self._reachable, n - 1))
+        target = n if self._numbers_stay_short else _halved(n, step)
         previous: tuple[int, int] | None = None
         while True:
             try:
@@ -121,16 +123,19 @@ class OrbitInPlanes:
             current = target, value.bits
             if previous is not None and current[0] - previous[0] >= _RISE and current[1] > previous[1]:
                 # Linear extrapolation: at four times the budget it is certainly exceeded.
-                beyond = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
-                if beyond <= min(n - target, _MAX_MODULAR_STEPS):
-                    return target + beyond, None, None
+                surely_exceeded_after = 1 + 4 * self._limit * (current[0] - previous[0]) // (current[1] - previous[1])
+                if surely_exceeded_after <= min(n - target, _MAX_MODULAR_STEPS):
+                    return target + surely_exceeded_after, None, None
             previous = current
             # Heights may grow like n^2: the step is doubled only if four times the size is within the limit.
             target = _halved(n, target) if 4 * current[1] <= self._limit else min(n, target + target // 2)
 
     def _point(self, n: int) -> PlanesPoint:
         """Return Phi^n(start), ignoring poles at earlier steps. Raises SingularStep if step n is a pole."""
-        triples = [_reached(block, plane.reduced(n)) for block, plane in zip(self._blocks, self._planes, strict=True)]
+        triples = [
+            _point_in_plane(block, plane.reduced_step(n))
+            for block, plane in zip(self._blocks, self._planes, strict=True)
+        ]
         if any(W == 0 for _, _, W in triples):
             raise _undefined_step(n - 1)
         return PlanesPoint(self._assembly, triples)
@@ -138,7 +143,7 @@ class OrbitInPlanes:
     def _first_pole(self, n: int, value: PlanesPoint | None) -> int | None:
         """Return the first undefined step up to n; `value` is the n-th point, to be compared modulo a prime."""
         known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
-        undecided_planes = [i for i, plane in enumerate(self._planes) if not plane.lazy]
+        undecided_planes = [i for i, plane in enumerate(self._planes) if not plane.numbers_stay_short]
         generator = random.Random()
         for _ in range(_PRIMES):
             poles: list[int] = []
@@ -152,7 +157,7 @@ class OrbitInPlanes:
                         raise ArithmeticError("the iterate disagrees with the orbit modulo a prime: please report this")
                     continue
                 try:
-                    is_pole = _reached(block, pole)[2] == 0
+                    is_pole = _point_in_plane(block, pole)[2] == 0
                 except SingularStep:
                     is_pole = True
                 if not is_pole:  # over Q: the prime divides W there
@@ -175,16 +180,19 @@ def _undefined_step(step: int) -> SingularStep:
 
 
 class _Plane:
-    """The data of the orbit in one plane for all steps: whether it is lazy, its period and its pole.
+    """The data of the orbit in one plane for all steps: whether its numbers stay short, its period and its pole.
 
-    Lazy means that its numbers stay short: it returns after `period` steps, or its level is parabolic (`period` is
-    None). `pole` is the first step then that is not defined, None for none.
+    They stay short if the orbit returns after `period` steps, or if its level is parabolic (`period` is None). `pole`
+    is the first step then that is not defined, None for none.
     """
 
     def __init__(self, block: PlanarBlock, start: Triple) -> None:
         period = plane_period_over_rationals(block, start)
         self.period = period.period
-        self.lazy = period.period is not None or period.kind in (PeriodKind.ADDITIVE, PeriodKind.UNDEFINED)
+        self.numbers_stay_short = period.period is not None or period.kind in (
+            PeriodKind.ADDITIVE,
+            PeriodKind.UNDEFINED,
+        )
         self.pole: int | None = None
         if period.kind is PeriodKind.UNDEFINED:
             self.pole = 1
@@ -195,11 +203,11 @@ class _Plane:
             self.pole = int(r.p) if r is not None and r.q == 1 and r > 0 else None
         elif period.period is not None and period.meets_pole is not False:
             try:
-                stepped_over(block, start, period.period)
+                point_by_steps(block, start, period.period)
             except _Pole as pole:
                 self.pole = pole.step
 
-    def reduced(self, n: int) -> int:
+    def reduced_step(self, n: int) -> int:
         """Return a smaller step with the same point."""
         return n if self.period is None else n % self.period
 
@@ -212,7 +220,7 @@ class _Pole(SingularStep):
         super().__init__(f"the map is not defined at step {step - 1}")
 
 
-def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
+def point_by_steps(block: PlanarBlock, start: Triple, n: int) -> Triple:
     """Return P_n over a field, computed step by step. Raises _Pole."""
     point = start
     for k in range(n):
@@ -223,7 +231,7 @@ def stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
     return point
 
 
-def _reached(block: Block, n: int) -> Triple:
+def _point_in_plane(block: Block, n: int) -> Triple:
     """Return P_n, ignoring poles at earlier steps; where steps are needed, a pole raises SingularStep."""
     if n <= _SINGLE_STEPS or block.is_constant or block.level is None:
         points = list(islice(tau.triples(block), n + 1))
@@ -238,7 +246,7 @@ def _reached(block: Block, n: int) -> Triple:
     try:
         triple = translation.iterate(over_field, start, n, lambda element: element == 0)
     except translation.NoTranslation:
-        triple = stepped_over(over_field, start, n)
+        triple = point_by_steps(over_field, start, n)
     return block.integral(triple)
 
 

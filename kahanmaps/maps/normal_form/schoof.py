@@ -73,8 +73,8 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
     x = ring([0, 1])  # type: ignore[arg-type]
     c = x * x * x + A * x + B
     divisions = _DivisionPolynomials(x, c, A, B)
-    odd = (pow(x, q, c) - x).gcd(c).degree() == 0
-    trace, modulus, prime = int(odd), 2, 2
+    is_odd = (pow(x, q, c) - x).gcd(c).degree() == 0
+    trace, modulus, prime = int(is_odd), 2, 2
     while modulus < bound:
         prime = next(n for n in range(prime + 1, 2 * prime) if fmpz(n).is_prime())
         if q % prime == 0:
@@ -83,12 +83,12 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
         while residue is None:
             torsion = _Torsion(f, c, A)  # find the trace that fits on the torsion points with f = 0
             try:
-                once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
-                twice = (pow(once[0], q, f), once[1] * pow(once[1], q, f) % f)
-                target = torsion.add(twice, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1)))
+                frobenius = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
+                frobenius_squared = (pow(frobenius[0], q, f), frobenius[1] * pow(frobenius[1], q, f) % f)
+                target = torsion.add(frobenius_squared, by_doublings(torsion.add, None, q % prime, (x % f, 0 * x + 1)))
                 image: Point = None
                 for t in range(1, prime // 2 + 1) if target else ():
-                    image = torsion.add(image, once)
+                    image = torsion.add(image, frobenius)
                     if image is not None and target is not None and image[0] == target[0]:
                         residue = t if image[1] == target[1] else prime - t
                         break

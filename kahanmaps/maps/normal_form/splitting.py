@@ -59,9 +59,9 @@ class Splitting:
             self._inverse = field.convert_matrix(S.inv())
             # The planes, and for each the coefficients in K of the elements that its own coefficients stand for.
             if field is QQ or isinstance(field, PrimeField):
-                planes, lifts = _by_factors(form, field)
+                planes, bases = _by_factors(form, field)
             elif isinstance(field, BallField):
-                planes, lifts = _over_balls(form, field)
+                planes, bases = _over_balls(form, field)
             else:
                 raise InputError(f"found the field {field}, expected QQ, GF(p) or real balls")
             self.planes: tuple[Plane, ...] = tuple(planes)
@@ -69,10 +69,10 @@ class Splitting:
             m = form.m
             # x = sum over planes of `matrix` times the coefficients of u, then those of v.
             self._matrices = []
-            for lift in lifts:
+            for basis in bases:
                 columns = []
                 for half in (0, m):
-                    for column in lift:
+                    for column in basis:
                         pairs = [zip(row[half : half + m], column, strict=True) for row in rows]
                         columns.append([sum((a * b for a, b in pair), field.zero) for pair in pairs])
                 self._matrices.append(columns)
@@ -163,12 +163,15 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
 
         else:
             # The generator is a multiple of t that is integral.
-            common = factor.denom()
-            over, generator = fmpq_poly([0, fmpq(1, common)]), fmpq_poly([0, common])
-            algebra, name = EtaleAlgebra(factor(over) * common**degree), f"{format_univariate(factor)} = 0"
+            denominator = factor.denom()
+            t_by_generator, generator = fmpq_poly([0, fmpq(1, denominator)]), fmpq_poly([0, denominator])
+            algebra, name = (
+                EtaleAlgebra(factor(t_by_generator) * denominator**degree),
+                f"{format_univariate(factor)} = 0",
+            )
 
             def residue(z: Sequence[Any]) -> Any:
-                return algebra.convert(fmpq_poly(list(z))(over))
+                return algebra.convert(fmpq_poly(list(z))(t_by_generator))
 
             def coefficients(value: Any) -> Any:
                 return value.coefficients
@@ -177,11 +180,11 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
         others = chi // factor
         unit = others * others.xgcd(factor)[1] % chi
         powers = [unit * generator**k % chi for k in range(degree)]
-        lift = [[field.convert(int(f[i]) if p else f[i]) for i in range(form.m)] for f in powers]
-        return Plane(name, degree, block, residue, coefficients, context), lift
+        basis = [[field.convert(int(f[i]) if p else f[i]) for i in range(form.m)] for f in powers]
+        return Plane(name, degree, block, residue, coefficients, context), basis
 
-    planes, lifts = zip(*map(planes_of, factors), strict=True)
-    return list(planes), list(lifts)
+    planes, bases = zip(*map(planes_of, factors), strict=True)
+    return list(planes), list(bases)
 
 
 def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
@@ -191,36 +194,36 @@ def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
 
 
 def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:
-    planes, lifts = [], []
-    slope = form.chi.derivative()
+    planes, bases = [], []
+    chi_derivative = form.chi.derivative()
     for complex_root in form.chi.complex_roots():
         root: Any = complex_root[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
         if root.imag < 0:
             continue
-        real = bool(root.imag == 0)
-        at: Any = root.real if real else root
+        is_real = bool(root.imag == 0)
+        root_ball: Any = root.real if is_real else root
 
-        def value_at(coefficients: Sequence[Any], at: Any = at) -> Any:
-            total = at * 0
+        def value_at(coefficients: Sequence[Any], root_ball: Any = root_ball) -> Any:
+            total = root_ball * 0
             for coefficient in reversed(coefficients):
-                total = total * at + coefficient
+                total = total * root_ball + coefficient
             return total
 
         block = PlanarBlock(*(value_at(_balls(c, field)) for c in form.coefficients))
         # chi / (t - root) by Horner's rule; divided by chi'(root) it is 1 at the root and 0 at the others.
-        chi, denominator = _balls(form.chi, field), value_at(_balls(slope, field))
+        chi, denominator = _balls(form.chi, field), value_at(_balls(chi_derivative, field))
         quotient = [chi[-1]]
         for coefficient in chi[-2:0:-1]:
-            quotient.append(quotient[-1] * at + coefficient)
+            quotient.append(quotient[-1] * root_ball + coefficient)
         unit = [entry / denominator for entry in reversed(quotient)]
-        if real:
-            planes.append(Plane(f"t = {at.str(8, radius=False)}", 1, block, value_at, lambda value: [value]))
-            lifts.append([unit])
+        if is_real:
+            planes.append(Plane(f"t = {root_ball.str(8, radius=False)}", 1, block, value_at, lambda value: [value]))
+            bases.append([unit])
         else:
-            name = f"t = {acb(at).str(8, radius=False)} and its conjugate"
+            name = f"t = {acb(root_ball).str(8, radius=False)} and its conjugate"
             planes.append(Plane(name, 2, block, value_at, lambda value: [value.real, value.imag]))
-            lifts.append([[2 * acb(e).real for e in unit], [-2 * acb(e).imag for e in unit]])
-    return planes, lifts
+            bases.append([[2 * acb(e).real for e in unit], [-2 * acb(e).imag for e in unit]])
+    return planes, bases
 
 
 def _balls(element: fmpq_poly, field: BallField) -> list[Any]:

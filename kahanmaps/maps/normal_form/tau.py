@@ -115,7 +115,7 @@ class TauTable:
         self.chi = Terms([chi[n] for n in (1, 2, 3, 4)], self._numbers, self.psi, gamma)
         # The three points of which all others are combinations, times the constant factors of the formula.
         self._lifts = self._numbers.lifts([tuple(-2 * entry for entry in P[0]), P[1], P[-1]])
-        self._divisor = self._numbers.divisor(self._numbers.split(chi[0])[0])
+        self._divisor = self._numbers.prepared_divisor(self._numbers.split(chi[0])[0])
         self._product: tuple[int, Any] = (0, None)  # n and psi_{n-1} psi_n of the next point
 
     def points(self) -> Iterator[Triple]:
@@ -131,13 +131,17 @@ class TauTable:
     def point(self, n: int) -> Triple:
         """Return P_n for n >= 2, primitive over Q."""
         psi, chi = self.psi, self.chi
-        before, here, after = (psi.integer(n + k) for k in (-1, 0, 1))
-        behind = self._product[1] if self._product[0] == n else before * here
-        self._product = n + 1, here * after
-        ahead = self._product[1]
-        terms = [before * after * chi.integer(n), ahead * chi.integer(n - 1), behind * chi.integer(n + 1)]
+        psi_before, psi_n, psi_after = (psi.integer(n + k) for k in (-1, 0, 1))
+        product_before = self._product[1] if self._product[0] == n else psi_before * psi_n
+        self._product = n + 1, psi_n * psi_after
+        product_after = self._product[1]
+        terms = [
+            psi_before * psi_after * chi.integer(n),
+            product_after * chi.integer(n - 1),
+            product_before * chi.integer(n + 1),
+        ]
         # Scales, over that of the first term.
-        ratio = chi.ratio(n)
-        scales = [self._one, chi.part(n) / ratio, ratio / psi.part(n)]
+        ratio = chi.mixed_quotient(n)
+        scales = [self._one, chi.own_quotient(n) / ratio, ratio / psi.own_quotient(n)]
         point: Triple = self._numbers.combined(scales, terms, self._lifts, self._divisor)
         return point

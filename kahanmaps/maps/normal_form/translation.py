@@ -105,8 +105,8 @@ def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
         return u, v, W / W
     complement, denominator = r - n, r * r - 1
     factor = complement * (complement * complement - 1)
-    parts = [(z, (z * r * (r + 1) - w * denominator) / (3 * r)) for z, w in zip(point, image, strict=True)]
-    u, v = ((z - double) * r * denominator + double * factor for z, double in parts)
+    pairs = [(z, (z * r * (r + 1) - w * denominator) / (3 * r)) for z, w in zip(point, image, strict=True)]
+    u, v = ((z - double) * r * denominator + double * factor for z, double in pairs)
     return u, v, complement * denominator
 
 
@@ -169,12 +169,12 @@ def _by_curve(points: Sequence[Triple], gamma: Any, n: int, is_zero: Callable[[A
     x, Y = Q
     ratio = 1 / (chi[0] * chi[2] * chi[-1])
     x_u = -4 * chi[-1] * chi[1] * (ratio * chi[2] * chi[-1]) * (ratio * chi[2] * chi[-1])
-    eight = 8 * gamma
-    Y_u = -(chi[1] * chi[0] * chi[0] * ratio * x_u * (3 * gamma + x_u) + 3 * x_u + eight)
-    along, rise = x - x_u, Y - Y_u
-    slope = along / x_u
-    A, B = chi[0] * x * along, chi[-1] * (rise - (Y_u + eight) * slope)
-    C = -chi[1] * (rise - (Y_u - eight) * slope)
+    eight_gamma = 8 * gamma
+    Y_u = -(chi[1] * chi[0] * chi[0] * ratio * x_u * (3 * gamma + x_u) + 3 * x_u + eight_gamma)
+    dx, dY = x - x_u, Y - Y_u
+    slope = dx / x_u
+    A, B = chi[0] * x * dx, chi[-1] * (dY - (Y_u + eight_gamma) * slope)
+    C = -chi[1] * (dY - (Y_u - eight_gamma) * slope)
     U, V, W = (A * p + B * q + C * r for p, q, r in zip(P[0], P[1], P[-1], strict=True))
     return None if all(map(is_zero, (U, V, W))) else (U, V, W)
 
@@ -192,13 +192,13 @@ def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[
             point = x, y
         else:
             X, Y = point
-            run, rise = x - X, y - Y
-            if not is_zero(run):
-                slope = rise / run
+            dx, dy = x - X, y - Y
+            if not is_zero(dx):
+                slope = dy / dx
                 X = slope * slope - X - x
                 point = X, slope * (x - X) - y
             else:
-                point = _times_power(x, y, c, 1) if is_zero(rise) else None
+                point = _times_power(x, y, c, 1) if is_zero(dy) else None
         if point is not None:
             point = _times_power(*point, c, zeros)
     return None if point is None else (point[0] - shift, point[1])
@@ -252,34 +252,40 @@ def _doubled(
     inverse = {k: one / chi[k] for k in (-2, -1, 0, 1)}
     # psi_{-2}, ..., psi_5 and chi_0, chi_1, chi_2 are those around 1.
     window = [*(k * one for k in range(-2, 5)), 32 * one - 27 * gamma]
-    middle, centre = [chi[k] for k in range(3)], 1
+    chi_values, centre = [chi[k] for k in range(3)], 1
     for digit in f"{n:b}"[1:]:
         # The windows around 2 centre + digit from those around `centre`.
         first = centre - 3
         squares = [value * value for value in window]
         neighbours = [None, *(window[k + 1] * window[k - 1] for k in range(1, 7)), None]
         # Squares for a partner whose index is, or is not, divisible by 3.
-        special = [gamma * s if (first + k) % 3 == 0 else s for k, s in enumerate(squares)]
+        squares_by_index = [gamma * s if (first + k) % 3 == 0 else s for k, s in enumerate(squares)]
         shift = 2 * centre + int(digit) - 3
         window = []
         for m in range(shift, shift + 8):
             k = m // 2 - first
             a, b = (k + 1, k) if m % 2 else (k + 1, k - 1)
-            # Of two indices at distance 1 or 2 at most one is divisible by 3, so `special` is right for both.
-            value = neighbours[a] * special[b] - neighbours[b] * special[a]
+            # Of two indices at distance 1 or 2 at most one is divisible by 3, so `squares_by_index` is right for both.
+            value = neighbours[a] * squares_by_index[b] - neighbours[b] * squares_by_index[a]
             window.append(value if m % 2 else value * half)
-        around, square = middle[0] * middle[2], middle[1] * middle[1]
-        by_three, middle = centre % 3 == 0, []
+        neighbour_product, square = chi_values[0] * chi_values[2], chi_values[1] * chi_values[1]
+        centre_is_divisible, chi_values = centre % 3 == 0, []
         for m in (shift + 2, shift + 3, shift + 4):
             b = m - centre
             k = b - first
-            if by_three and b % 3 == 0:
-                value = around * squares[k] - neighbours[k] * square
+            if centre_is_divisible and b % 3 == 0:
+                value = neighbour_product * squares[k] - neighbours[k] * square
             else:
-                value = around * special[k] - neighbours[k] * (gamma * square if by_three else square)
-            middle.append(value * inverse[centre - b])
+                value = neighbour_product * squares_by_index[k] - neighbours[k] * (
+                    gamma * square if centre_is_divisible else square
+                )
+            chi_values.append(value * inverse[centre - b])
         centre = 2 * centre + int(digit)
-    before, here, after = window[2:5]
-    A, B, C = -2 * (before * after * middle[1]), here * after * middle[0], before * here * middle[2]
+    psi_before, psi_n, psi_after = window[2:5]
+    A, B, C = (
+        -2 * (psi_before * psi_after * chi_values[1]),
+        psi_n * psi_after * chi_values[0],
+        psi_before * psi_n * chi_values[2],
+    )
     U, V, W = (A * p + B * q + C * r for p, q, r in zip(P[0], P[1], P[-1], strict=True))
     return U, V, W

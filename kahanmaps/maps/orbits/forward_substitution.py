@@ -45,10 +45,10 @@ class _Row:
             p, q = solved[k]
             common = entry.gcd(q)
             p, q = entry // common * p, q // common
-            shared = denominator.gcd(q)
-            numerator = numerator * (q // shared) - p * (denominator // shared)
-            common_again = numerator.gcd(shared)
-            numerator, denominator = numerator // common_again, denominator // shared * (q // common_again)
+            common_denominator = denominator.gcd(q)
+            numerator = numerator * (q // common_denominator) - p * (denominator // common_denominator)
+            common_again = numerator.gcd(common_denominator)
+            numerator, denominator = numerator // common_again, denominator // common_denominator * (q // common_again)
         common = numerator.gcd(denominator_form) if denominator_form > 0 else -numerator.gcd(denominator_form)
         return numerator // common, denominator * (denominator_form // common)
 
@@ -83,12 +83,12 @@ def forward_substitution(exponents: Exponents, forms: fmpz_mat, n: int) -> Forwa
     # The first row with a single new unknown is always a good choice: a row that is solvable now stays solvable.
     while remaining:
         solved_unknowns = {row.unknown for row in solved}
-        used = {i: [j for j in range(n) if any(rows[i][j])] for i in remaining}
-        i = next((i for i in remaining if len(set(used[i]) - solved_unknowns) == 1), None)
+        occurring = {i: [j for j in range(n) if any(rows[i][j])] for i in remaining}
+        i = next((i for i in remaining if len(set(occurring[i]) - solved_unknowns) == 1), None)
         if i is None:
             return None
-        unknown = next(j for j in used[i] if j not in solved_unknowns)
-        others = tuple(j for j in used[i] if j in solved_unknowns)
+        unknown = next(j for j in occurring[i] if j not in solved_unknowns)
+        others = tuple(j for j in occurring[i] if j in solved_unknowns)
         entries = [rows[i][j] for j in (unknown, *others, n)]
         terms = [k for k in range(len(exponents)) if any(entry[k] for entry in entries)]
         min_exponents = [min(exponents[k][x] for k in terms) for x in range(n)]

@@ -175,7 +175,7 @@ def by_determinants(matrix: fmpz_mat, rhs: fmpz_mat) -> tuple[list[fmpz], fmpz]:
 
 
 def _solved(matrix: fmpz_mat, rhs: fmpz_mat) -> IntegerPoint | None:
-    """The solution of matrix x = right in lowest terms; None where the matrix is singular."""
+    """Return the solution of matrix x = rhs in lowest terms; None where the matrix is singular."""
     try:
         solution: fmpq_mat = matrix.solve(rhs)  # type: ignore[assignment]  # the stub promises less
     except ZeroDivisionError:
@@ -210,32 +210,37 @@ class ConstantRows:
         self._columns = [next(j for j in range(n) if reduced[i, j] != 0) for i in range(rank)]
         self._other_rows = [i for i in range(n) if i not in self._rows]
         self._free = [j for j in range(n) if j not in self._columns]
-        solved = fmpq_mat([[A[i, j] for j in self._columns] for i in row_indices]).inv()
-        both = [[*solved.tolist()[i], *(reduced[i, j] for j in self._free)] for i in row_indices]
-        integers, self._denominator = fmpq_mat(both).numer_denom()
-        self._solved = _part(integers, row_indices, row_indices)
-        self._free_part = _part(integers, row_indices, range(len(row_indices), n))
+        inverse = fmpq_mat([[A[i, j] for j in self._columns] for i in row_indices]).inv()
+        augmented = [[*inverse.tolist()[i], *(reduced[i, j] for j in self._free)] for i in row_indices]
+        integers, self._denominator = fmpq_mat(augmented).numer_denom()
+        self._inverse = _submatrix(integers, row_indices, row_indices)
+        self._free_part = _submatrix(integers, row_indices, range(len(row_indices), n))
 
     def reduce(self, matrix: fmpz_mat, rhs: fmpz_mat, scale: fmpz) -> tuple[fmpz_mat, fmpz_mat]:
         """Return the Schur complement and its right side: a system for `scale` times the other coordinates.
 
         `scale` is the factor in front of A in the matrix. The system may be empty.
         """
-        constant_part = self._solved * _part(rhs, self._rows, [0])
-        bound, free = _part(matrix, self._other_rows, self._columns), _part(matrix, self._other_rows, self._free)
-        reduced_rhs = _part(rhs, self._other_rows, [0]) * (scale * self._denominator) - bound * constant_part
-        return free * self._denominator - bound * self._free_part, reduced_rhs
+        constant_part = self._inverse * _submatrix(rhs, self._rows, [0])
+        of_eliminated, of_free = (
+            _submatrix(matrix, self._other_rows, self._columns),
+            _submatrix(matrix, self._other_rows, self._free),
+        )
+        reduced_rhs = (
+            _submatrix(rhs, self._other_rows, [0]) * (scale * self._denominator) - of_eliminated * constant_part
+        )
+        return of_free * self._denominator - of_eliminated * self._free_part, reduced_rhs
 
     def extend(
         self, rhs: fmpz_mat, scale: fmpz, numerators: Sequence[fmpz], denominator: fmpz
     ) -> tuple[list[fmpz], fmpz]:
         """Return numerators and denominator of the full solution, perhaps with a common factor."""
         free = fmpz_mat(len(numerators), 1, list(numerators))
-        bound = self._solved * _part(rhs, self._rows, [0]) * denominator - self._free_part * free
-        values_by_column = dict(zip(self._columns, bound.entries(), strict=True))
+        eliminated = self._inverse * _submatrix(rhs, self._rows, [0]) * denominator - self._free_part * free
+        values_by_column = dict(zip(self._columns, eliminated.entries(), strict=True))
         values_by_column |= {j: entry * self._denominator for j, entry in zip(self._free, numerators, strict=True)}
         return [values_by_column[j] for j in range(len(values_by_column))], scale * denominator * self._denominator
 
 
-def _part(matrix: fmpz_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpz_mat:
+def _submatrix(matrix: fmpz_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpz_mat:
     return fmpz_mat(len(rows), len(columns), [matrix[i, j] for i in rows for j in columns])

@@ -174,20 +174,20 @@ class Orbit(HtmlDisplay):
         self.backward = backward
         self.max_digits = max_digits
         self.normal_form = normal_form
-        self._wanted = is_requested
-        self._jump: NthIterate | None = None
+        self._is_requested = is_requested
+        self._nth_iterate: NthIterate | None = None
         if normal_form is not None and (at is not None or isinstance(self.map.field, BallField)):
             from kahanmaps.maps.normal_form.iterate import NthIterate
 
-            self._jump = NthIterate(normal_form, self.map.eps, self.map.field)
+            self._nth_iterate = NthIterate(normal_form, self.map.eps, self.map.field)
         elif at is not None:
             raise InputError("at= requires a normal form, by which iterates are computed directly")
         self.end: OrbitEnd | None = None
         self.first: list[OrbitPoint] = []  # at most FIRST_POINTS
         self.last: OrbitPoint | None = None
         self._interrupted = False
-        self._busy_in: int | None = None  # the thread that computes an iterate directly
-        self._walk: RationalOrbit | None = None
+        self._busy_thread: int | None = None  # the thread that computes an iterate directly
+        self._rational_orbit: RationalOrbit | None = None
 
     def __repr__(self) -> str:
         state = "no point computed yet" if self.last is None else f"computed to step {self.last.step}"
@@ -196,7 +196,7 @@ class Orbit(HtmlDisplay):
     @property
     def relations(self) -> str | None:
         """The relations between points of the orbit that are in use, and since which step; None if there are none."""
-        walk = self._walk
+        walk = self._rational_orbit
         return None if walk is None or walk.relations is None else f"{walk.relations.name} from step {walk.since} on"
 
     def interrupt(self) -> None:
@@ -205,7 +205,7 @@ class Orbit(HtmlDisplay):
         The direct computation of an iterate, which may take long, is abandoned.
         """
         self._interrupted = True
-        if self._busy_in == get_ident():
+        if self._busy_thread == get_ident():
             raise _IterateInterrupted
 
     def __iter__(self) -> Iterator[OrbitPoint]:
@@ -219,7 +219,7 @@ class Orbit(HtmlDisplay):
         except _IterateInterrupted:
             self._end_interrupted(0 if self.last is None else self.last.step)
         finally:
-            self._busy_in = None
+            self._busy_thread = None
 
     def _end_interrupted(self, step: int, period: int | None = None) -> None:
         self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}", period)
@@ -230,7 +230,7 @@ class Orbit(HtmlDisplay):
         value = start = next(images)
         step, period = 0, None
         yield OrbitPoint(0, field, value)  # delivered even if it exceeds the budget
-        if bits := self._excess(value):
+        if bits := self._bits_over_budget(value):
             self.end = OrbitEnd("budget", 0, _budget_text(0, bits, self.max_digits))
             return
         while self.steps is None or step < self.steps:
@@ -249,7 +249,7 @@ class Orbit(HtmlDisplay):
             if value is None:  # skipped, since it is not requested
                 step += 1
                 continue
-            if bits := self._excess(value):
+            if bits := self._bits_over_budget(value):
                 self.end = OrbitEnd("budget", step, _budget_text(step + 1, bits, self.max_digits))
                 return
             step += 1
@@ -268,18 +268,18 @@ class Orbit(HtmlDisplay):
             from kahanmaps.maps.normal_form.planes_point import NormalSteps
 
             yield from NormalSteps(self.normal_form, self.map.eps).points(self.start)
-        elif self._jump is not None:
+        elif self._nth_iterate is not None:
             value: Any = self.start
             yield value
             for step in count(1):
                 try:
-                    value = self._jump.value(self.start, step)
+                    value = self._nth_iterate.value(self.start, step)
                 except PrecisionLost:  # for very small eps a step from the last point may need fewer bits
                     value = self.map.step(value)
                 yield value
         elif field is QQ:
             start = IntegerPoint.from_rationals(self.start)
-            walk = self._walk = RationalOrbit(self.map, start, _bits(self.max_digits), self._wanted)
+            walk = self._rational_orbit = RationalOrbit(self.map, start, _bits(self.max_digits), self._is_requested)
             yield from walk
         else:
             value = self.start
@@ -287,7 +287,7 @@ class Orbit(HtmlDisplay):
                 yield value
                 value = self.map.step(value)
 
-    def _excess(self, value: Any) -> int:
+    def _bits_over_budget(self, value: Any) -> int:
         """Return the bit length of a point that exceeds the budget, otherwise 0."""
         limit = _bits(self.max_digits)
         if limit is None:
@@ -304,29 +304,29 @@ class Orbit(HtmlDisplay):
         """Yield each of these iterates, computed directly."""
         from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 
-        assert self._jump is not None
-        done = 0
+        assert self._nth_iterate is not None
+        last_step = 0
         for step in at:
             if self._interrupted:
-                self._end_interrupted(done)
+                self._end_interrupted(last_step)
                 return
             try:
-                self._busy_in = get_ident()
-                value = self._jump.value(self.start, step, _bits(self.max_digits))
+                self._busy_thread = get_ident()
+                value = self._nth_iterate.value(self.start, step, _bits(self.max_digits))
             except SingularStep as error:
-                self.end = OrbitEnd("singular", done, f"step {step} cannot be reached: {error}")
+                self.end = OrbitEnd("singular", last_step, f"step {step} cannot be reached: {error}")
                 return
             except PrecisionLost as error:
-                self.end = OrbitEnd("precision", done, f"step {step} cannot be decided: {error}")
+                self.end = OrbitEnd("precision", last_step, f"step {step} cannot be decided: {error}")
                 return
             except OverBudget as error:
-                self.end = OrbitEnd("budget", done, _budget_text(error.step, error.bits, self.max_digits, step))
+                self.end = OrbitEnd("budget", last_step, _budget_text(error.step, error.bits, self.max_digits, step))
                 return
             finally:
-                self._busy_in = None
-            done = step
+                self._busy_thread = None
+            last_step = step
             yield OrbitPoint(step, self.map.field, value)
-        self.end = OrbitEnd("completed", done, f"{counted(len(at), 'iterate')} computed directly")
+        self.end = OrbitEnd("completed", last_step, f"{counted(len(at), 'iterate')} computed directly")
 
 
 def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | None) -> None:
@@ -352,8 +352,10 @@ def _bits(max_digits: int | None) -> int | None:
 def _budget_text(step: int, bits: int | None, max_digits: int | None, requested: int | None = None) -> str:
     """Describe how a step exceeds the budget, perhaps one before the requested step."""
     limit = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
-    excess = "would have longer numbers" if bits is None else f"has numbers of {counted(_digits(bits), 'digit')}, more"
-    text = f"step {step} {excess} than {limit}"
+    size_text = (
+        "would have longer numbers" if bits is None else f"has numbers of {counted(_digits(bits), 'digit')}, more"
+    )
+    text = f"step {step} {size_text} than {limit}"
     return text if requested is None or requested == step else f"step {requested} cannot be reached: {text}"
 
 

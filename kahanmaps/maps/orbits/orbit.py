@@ -177,15 +177,17 @@ def orbit(
             f"step {last_step} is too large for single steps (at most {_MAX_SINGLE_STEPS:.0e}), "
             f"and no other method is available: {chosen.reason}"
         )
-    used = normal_form if chosen.name != "generic" and isinstance(normal_form, SystemNormalForm) else None
+    used_form = normal_form if chosen.name != "generic" and isinstance(normal_form, SystemNormalForm) else None
     remark = ""
     if arithmetic == Arithmetic("ball"):
         try:
-            bits = bits_for(lambda bits: request.by(chosen.name, used, Arithmetic("ball", bits)), accuracy, progress)
+            bits = bits_for(
+                lambda bits: request.points_by(chosen.name, used_form, Arithmetic("ball", bits)), accuracy, progress
+            )
         except NotAccurate as error:
             bits, remark = _FALLBACK_BITS, str(error)
         arithmetic = Arithmetic("ball", bits)
-    return Trajectory(request.by(chosen.name, used, arithmetic), request, arithmetic, chosen, remark)
+    return Trajectory(request.points_by(chosen.name, used_form, arithmetic), request, arithmetic, chosen, remark)
 
 
 class OrbitRequest(NamedTuple):
@@ -205,22 +207,22 @@ class OrbitRequest(NamedTuple):
         """Return whether the point of this step is requested."""
         return step in self.at if self.at is not None else step % self.every == 0
 
-    def by(self, method: str, normal_form: SystemNormalForm | None, numbers: Arithmetic) -> Any:
+    def points_by(self, method: str, normal_form: SystemNormalForm | None, arithmetic: Arithmetic) -> Any:
         """Return the iterator over the points by a method, in an arithmetic."""
-        if numbers.kind == "float":
+        if arithmetic.kind == "float":
             from kahanmaps.maps.floats.float_orbit import FloatOrbit
 
             every = self.every if self.at is None else max(1, math.gcd(*self.at))
             form = None if normal_form is None else normal_form.form
             arguments = (self.map.real_approximation, self.eps, self.start, self.steps)
             return FloatOrbit(*arguments, backward=self.backward, form=form, kernel=self.kernel, every=every)
-        over = self.map.at(self.eps, numbers.field)
+        map_at_eps = self.map.at(self.eps, arithmetic.field)
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and normal_form is not None:
-            return Orbit(over, self.start, at=self.at or (), normal_form=normal_form, **limits)
+            return Orbit(map_at_eps, self.start, at=self.at or (), normal_form=normal_form, **limits)
         normal = normal_form if method == "normal-form" else None
         is_requested = self.is_requested if self.at is not None or self.every > 1 else None
-        return Orbit(over, self.start, self.steps, normal_form=normal, is_requested=is_requested, **limits)
+        return Orbit(map_at_eps, self.start, self.steps, normal_form=normal, is_requested=is_requested, **limits)
 
 
 class Trajectory(HtmlDisplay):
@@ -447,7 +449,7 @@ class Trajectory(HtmlDisplay):
         return {**header, "kernel": self.orbit.kernel} if self.arithmetic.kind == "float" else header
 
     def _ended(self, end: OrbitEnd) -> tuple[OrbitEnd, dict[str, Any]]:
-        """Return how the orbit ended, for a float orbit with its drift and near-singular steps."""
+        """Return how the orbit ended, and the drift and near-singular steps of a float orbit."""
         if self.arithmetic.kind != "float":
             return end, {}
         message, extra = end.message, {"near_singular": self.orbit.near_singular}
@@ -482,8 +484,8 @@ class Trajectory(HtmlDisplay):
         kind = np.dtype(default if dtype is None else dtype)
         if kind.kind == "O":
             table = np.empty((len(rows), len(self.variables)), dtype=object)
-            for at in np.ndindex(table.shape):
-                table[at] = rows[at[0]][at[1]]
+            for index in np.ndindex(table.shape):
+                table[index] = rows[index[0]][index[1]]
             return table
         if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
             raise InputError(

@@ -83,15 +83,15 @@ def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: flo
     u, v = a[0, length_a - 1], a[1, length_a - 1]
     c0 = (u * inverse[0] + nu * v * inverse[1]) % p
     c1 = (u * inverse[1] + v * inverse[0]) % p
-    first, d, r = length_a - length_b, nu * c1, 1.0 / p
+    shift, d, r = length_a - length_b, nu * c1, 1.0 / p
     b0, b1, x, y = b[0], b[1], a[0], a[1]
     # s mod p without a division: s is an integer, so that (s + 1/2)/p is at least 1/(2p) away from all integers, more
     # than the rounding error. Without the 1/2 a multiple of p could be rounded below its quotient.
     for j in range(length_b - 1):
-        s = x[first + j] - c0 * b0[j] - d * b1[j]
-        t = y[first + j] - c0 * b1[j] - c1 * b0[j]
-        x[first + j] = s - p * np.floor((s + 0.5) * r)
-        y[first + j] = t - p * np.floor((t + 0.5) * r)
+        s = x[shift + j] - c0 * b0[j] - d * b1[j]
+        t = y[shift + j] - c0 * b1[j] - c1 * b0[j]
+        x[shift + j] = s - p * np.floor((s + 0.5) * r)
+        y[shift + j] = t - p * np.floor((t + 0.5) * r)
     a[0, length_a - 1] = a[1, length_a - 1] = 0.0
     return c0, c1
 
@@ -132,11 +132,11 @@ def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: fl
     Each row of `terms` is (i, j, k, place): entry (i, j) has monomial k with the coefficient values[place].
     """
     power = exponents[0].sum()
-    top = power * (length - 1) + 1
+    entry_length = power * (length - 1) + 1
     for i in range(M.shape[0]):
         for j in range(M.shape[1]):
-            _clear(M[i, j], top)
-    product, other = np.empty((2, top)), np.empty((2, top))
+            _clear(M[i, j], entry_length)
+    product, other = np.empty((2, entry_length)), np.empty((2, entry_length))
     for k in range(len(exponents)):
         product[0, 0], product[1, 0], size = 1.0, 0.0, 1
         for variable in range(exponents.shape[1]):
@@ -152,8 +152,8 @@ def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: fl
                              1.0, nu)  # fmt: skip
     for i in range(M.shape[0]):
         for j in range(M.shape[1]):
-            _reduce(M[i, j], top, p)
-    return int(top)
+            _reduce(M[i, j], entry_length, p)
+    return int(entry_length)
 
 
 def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
@@ -214,22 +214,22 @@ def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: floa
 
 
 def walk(
-    start: Any, exponents: Any, terms: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
-    degrees: Any,
+    start: Any, exponents: Any, terms: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float,
+    max_length: int, degrees: Any,
 ) -> None:  # fmt: skip
     """degrees[m, s] becomes the degree of the image of the line start[m] by s + 1 steps of map m.
 
     start[m, j] are the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
-    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials longer than `room`, and with degrees
-    -1 where the iterate exists nowhere.
+    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials longer than `max_length`, and with
+    degrees -1 where the iterate exists nowhere.
     """
     n = start.shape[1] - 1
     power = exponents[0].sum()
-    X = np.zeros((n + 1, 2, room))
-    M = np.zeros((n, n + 1, 2, room))
-    minors = np.zeros((1 << (n + 1), 2, room))
-    work = np.zeros((4, 2, room))
-    full = (1 << (n + 1)) - 1
+    X = np.zeros((n + 1, 2, max_length))
+    M = np.zeros((n, n + 1, 2, max_length))
+    minors = np.zeros((1 << (n + 1), 2, max_length))
+    work = np.zeros((4, 2, max_length))
+    all_columns = (1 << (n + 1)) - 1
     one = np.zeros((2, 1))
     one[0, 0] = 1.0
     for m in range(start.shape[0]):
@@ -237,15 +237,15 @@ def walk(
             _copy(start[m, j], X[j], 2)
         length = 2
         for step in range(degrees.shape[1]):
-            if n * power * (length - 1) + 1 > room:
+            if n * power * (length - 1) + 1 > max_length:
                 break
             size = _entries(X, length, exponents, terms, values[m], p, nu, M)
-            top = _minors(M, size, minors, p, nu)
+            minor_length = _minors(M, size, minors, p, nu)
             for j in range(n + 1):  # with the sign (-1)^j
-                _clear(X[j], top)
-                _add_product(X[j], one, 1, minors[full ^ 1 << j], top, 1.0 - 2.0 * (j % 2), nu)
-                _reduce(X[j], top, p)
-            length = _without_common_factor(X, top, weights[step], p, nu, inverses, work)
+                _clear(X[j], minor_length)
+                _add_product(X[j], one, 1, minors[all_columns ^ 1 << j], minor_length, 1.0 - 2.0 * (j % 2), nu)
+                _reduce(X[j], minor_length, p)
+            length = _without_common_factor(X, minor_length, weights[step], p, nu, inverses, work)
             degrees[m, step] = length - 1
             if length == 0:
                 degrees[m, step:] = -1

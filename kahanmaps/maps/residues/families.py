@@ -71,7 +71,7 @@ class Family:
         members: Members,
         eps: fmpq | None,
         terms: int,
-        room: int,
+        max_length: int,
         rng: random.Random,
         *,
         kernel: str | None = None,
@@ -80,17 +80,17 @@ class Family:
         """The degrees d_1, ..., d_terms of each member, one a row, on one random line each.
 
         `members` are residues of the symbols, one member a row; one more column is that of eps. Else `eps` is an exact
-        number, or None for a random element of GF(p^2) for each member. `room` is the largest degree that is worked out
-        before common factors are removed; beyond it degrees are -2 (TOO_LARGE), and -1 (NOWHERE) where the iterate
-        exists nowhere. The `kernel` is "numpy" or "numba", `jobs` are threads.
+        number, or None for a random element of GF(p^2) for each member. `max_length` is the largest number of
+        coefficients that a polynomial may have before common factors are removed; beyond it degrees are -2 (TOO_LARGE),
+        and -1 (NOWHERE) where the iterate exists nowhere. The `kernel` is "numpy" or "numba", `jobs` are threads.
         """
-        draw = np.random.default_rng(rng.getrandbits(64))
+        generator = np.random.default_rng(rng.getrandbits(64))
         p, count = self.prime, len(members)
-        values = self.coefficients(members, eps, draw)
-        start = draw.integers(0, p, (count, self.dim + 1, 2, 2)).astype(float)
+        values = self.coefficients(members, eps, generator)
+        start = generator.integers(0, p, (count, self.dim + 1, 2, 2)).astype(float)
         start[:, -1] = 0.0
         start[:, -1, 0, 0] = 1.0
-        weights = draw.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
+        weights = generator.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
         degrees = np.full((count, terms), TOO_LARGE, dtype=np.int64)
         walk = _walk_in_flint
         if choose_kernel(kernel, is_long=count >= LONG) == "numba":
@@ -100,14 +100,14 @@ class Family:
         exponents = np.array(self.exponents, dtype=np.int64)
         layout = np.array(self.terms, dtype=np.int64)
 
-        def part(low: int) -> None:
+        def measure_chunk(low: int) -> None:
             chunk = slice(low, low + _CHUNK)
             walk(start[chunk], exponents, layout, values[chunk], weights, self._inverses, float(p), float(self._nu),
-                 room, degrees[chunk])  # fmt: skip
+                 max_length, degrees[chunk])  # fmt: skip
 
-        part(count)  # no members: compiles in this thread, which Ctrl-C can end; the pool waits for its own
+        measure_chunk(count)  # no members: compiles in this thread, which Ctrl-C can end; the pool waits for its own
         with ThreadPoolExecutor(jobs) as pool:
-            for _ in pool.map(part, range(0, count, _CHUNK)):
+            for _ in pool.map(measure_chunk, range(0, count, _CHUNK)):
                 pass
         return degrees
 
@@ -119,24 +119,24 @@ class Family:
         lengths = (self.dim * self.degree * d + 1 for d in degrees[:-1])
         return sum(2 + length / 2 + self.dim * length**2 / 400 for length in lengths)
 
-    def coefficients(self, members: Members, eps: fmpq | None, draw: np.random.Generator) -> NDArray[np.float64]:
+    def coefficients(self, members: Members, eps: fmpq | None, generator: np.random.Generator) -> NDArray[np.float64]:
         """The coefficients of the equation, an array (members, 2, places)."""
         p, count = self.prime, len(members)
         if members.shape[1] > len(self.symbols):
-            step = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
+            eps_values = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
         elif eps is None:
-            step = draw.integers(0, p, (2, count))
-            step[0, ~step.any(axis=0)] = 1  # eps = 0 would be the identity
+            eps_values = generator.integers(0, p, (2, count))
+            eps_values[0, ~eps_values.any(axis=0)] = 1  # eps = 0 would be the identity
         else:
-            step = np.zeros((2, count), dtype=np.int64)
-            step[0] = int(GF(p).convert(eps))
-        powers = [np.array([[1], [0]]) + 0 * step]
+            eps_values = np.zeros((2, count), dtype=np.int64)
+            eps_values[0] = int(GF(p).convert(eps))
+        powers = [np.array([[1], [0]]) + 0 * eps_values]
         coefficients = np.zeros((count, 2, len(self._values)))
         for position, polynomial in enumerate(self._values):
             total = np.zeros((2, count), dtype=np.int64)
             for exponents, coefficient in polynomial:
                 while len(powers) <= exponents[-1]:
-                    a, b = powers[-1], step
+                    a, b = powers[-1], eps_values
                     powers.append(np.stack([a[0] * b[0] + self._nu * a[1] % p * b[1], a[0] * b[1] + a[1] * b[0]]) % p)
                 term = np.full(count, coefficient)
                 for k, exponent in enumerate(exponents[:-1]):
@@ -148,8 +148,8 @@ class Family:
 
 
 def _walk_in_flint(
-    start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
-    degrees: Any,
+    start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float,
+    max_length: int, degrees: Any,
 ) -> None:  # fmt: skip
     """Measure degrees as `walk` of curve_kernel.py does, without numba."""
     modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
@@ -164,7 +164,7 @@ def _walk_in_flint(
         X = [polynomial(entry) for entry in start[m]]
         for step in range(degrees.shape[1]):
             n = len(X) - 1
-            if n * power * max(entry.degree() for entry in X) + 1 > room:
+            if n * power * max(entry.degree() for entry in X) + 1 > max_length:
                 break
             rows: list[list[Any]] = [[None] * (n + 1) for _ in range(n)]
             monomials = [prod((x**e for x, e in zip(X, row, strict=True)), start=one) for row in exponents.tolist()]

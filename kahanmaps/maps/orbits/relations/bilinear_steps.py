@@ -112,15 +112,15 @@ class _Search:
         # columns, where g is a linear form in the coordinates whose divisor shares no component with the last one.
         unknowns = len(values[0])
         zeros, rows = [0] * unknowns, []
-        for row, *ends in zip(values, images, earliest, strict=True):
-            g, h = (sum((k * k + 2) * entry for k, entry in enumerate(end)) for end in ends)
+        for row, *endpoints in zip(values, images, earliest, strict=True):
+            g, h = (sum((k * k + 2) * entry for k, entry in enumerate(endpoint)) for endpoint in endpoints)
             rows.append([*row, *zeros, *(-g * entry % prime for entry in row)])
             rows.append([*zeros, *row, *(-h * entry % prime for entry in row)])
-        used = list(range(3 * unknowns)) if self._used is None else self._used
-        relations = kernel(*matrix([[row[k] for k in used] for row in rows], prime).rref())
+        columns = list(range(3 * unknowns)) if self._used is None else self._used
+        relations = kernel(*matrix([[row[k] for k in columns] for row in rows], prime).rref())
         if len(relations) != 1:
             return None
-        weights = dict(zip(used, relations[0], strict=True))
+        weights = dict(zip(columns, relations[0], strict=True))
         self._used = [k for k, weight in weights.items() if weight]
         factors = [sum(weights.get(2 * unknowns + k, 0) * x for k, x in enumerate(row)) % prime for row in values]
         # The combinations of the columns that are f_n times the coordinates of the next point.

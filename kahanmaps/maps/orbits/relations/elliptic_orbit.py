@@ -58,8 +58,8 @@ def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSte
     )
     max_primes = min(_MAX_PRIMES, bits // _BITS_PER_PRIME)
     start_point: IntegerPoint | None = start
-    for left_out in (0, _SKIPPED_STEPS) if len(period) <= _MAX_FACTORS else ():
-        for _ in range(left_out):
+    for skipped in (0, _SKIPPED_STEPS) if len(period) <= _MAX_FACTORS else ():
+        for _ in range(skipped):
             start_point = start_point and map_over.integer_step(start_point)
         if start_point is None:
             break
@@ -73,7 +73,7 @@ def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSte
                 is_special = True
                 continue
             if exact is not None and _is_proved(start_point, search, exact.steps(map_over)):
-                return exact.steps(map_over, left_out)
+                return exact.steps(map_over, skipped)
             if search.sections:  # there are curves, but their coefficients are too long
                 if max_primes < _MAX_PRIMES:
                     raise TooLongRelation
@@ -137,12 +137,12 @@ class _Search:
 
     def _modulo(self, prime: int) -> list[list[int]] | None:
         size, known_sections = len(self.groups[0]), self.sections
-        for needed in (
+        for point_count in (
             [max(factor.points_used for factor in known_sections.values())] if known_sections else points_needed(size)
         ):
             points: Rows = []  # from the initial point on, one for each step of a factor
             point = self._start.residues(prime)
-            for factor in islice(cycle(self.factors), self.stride * needed):
+            for factor in islice(cycle(self.factors), self.stride * point_count):
                 if point is None:
                     return None
                 points.append(point)
@@ -159,7 +159,7 @@ class _Search:
                     self.sections = {key: factor.sections for key, factor in curves.items()}
                     return [group for factor in curves.values() for group in factor.numbers]
             except ArithmeticError:
-                if known_sections or needed == points_needed(size)[-1]:
+                if known_sections or point_count == points_needed(size)[-1]:
                     raise
         return None
 
@@ -233,8 +233,8 @@ class _Exact:
             bound = common_primes(search.sections[key].degree, self._tables[key], self._W, U)
             self._all_primes[key] = self._primes.lcm(bound.p).lcm(bound.q)
 
-    def steps(self, map_over: Map, left_out: int = 0) -> EllipticSteps:
-        """Return the steps; the first `left_out` points of the orbit are not counted in the numbers of steps."""
+    def steps(self, map_over: Map, skipped: int = 0) -> EllipticSteps:
+        """Return the steps; the first `skipped` points of the orbit are not counted in the numbers of steps."""
         numbers, sections = Integers(self._primes), self._search.sections
         W = Terms(self._W, numbers)
         new = {
@@ -245,4 +245,4 @@ class _Exact:
             [new[k, g] if copied is None else copied for g, copied in enumerate(row)]
             for k, row in enumerate(self._search.earlier)
         ]
-        return EllipticSteps(map_over, rows, self._search.first, left_out)
+        return EllipticSteps(map_over, rows, self._search.first, skipped)

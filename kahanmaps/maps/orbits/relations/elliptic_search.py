@@ -100,10 +100,10 @@ def _tries(points: Rows, prime: int) -> Iterator[Sections]:
     coordinates = tuple(pivots(echelon(points[: len(points[0]) + _EXTRA_POINTS], prime)))
     for count, lag in product(_POINTS, _LAGS):
         size = len(coordinates) ** count
-        used = size + _EXTRA_POINTS + (count - 1) * lag
-        if len(points) < used:
+        point_count = size + _EXTRA_POINTS + (count - 1) * lag
+        if len(points) < point_count:
             continue
-        products = pivots(echelon(_table(points[:used], coordinates, count, lag, prime), prime))
+        products = pivots(echelon(_table(points[:point_count], coordinates, count, lag, prime), prime))
         if len(products) > count * _MAX_DEGREE:
             return
         degree, remainder = divmod(len(products), count)
@@ -125,14 +125,14 @@ def _all_sections(points: Rows, sections: Sections, prime: int) -> Rows | None:
         [(1, sum((j + 2) ** 3 * x for j, x in enumerate(earlier))) for earlier in points_before]
         for _, *points_before in _together(points, count, lag)[: sections.rows]
     ]
-    weighed = []
+    weighted_checks = []
     for chosen in list(product((0, 1), repeat=count - 1))[1:]:
         g = [
             prod(earlier[i] for earlier, i in zip(points_before, chosen, strict=True)) % prime
             for points_before in factors
         ]
-        weighed += [[c and c * x % prime for c, x in zip(check, g, strict=True)] for check in checks]
-    kernel_rows = kernel(*(matrix(weighed, prime) * sums).rref())
+        weighted_checks += [[c and c * x % prime for c, x in zip(check, g, strict=True)] for check in checks]
+    kernel_rows = kernel(*(matrix(weighted_checks, prime) * sums).rref())
     if len(kernel_rows) != sections.degree:
         return None
     return integers(matrix(values, prime) * matrix(kernel_rows, prime).transpose())
@@ -167,8 +167,8 @@ def _numbers(points: Rows, sections: Sections, values: Rows, prime: int) -> list
     for u in range(min(y), 2, -1):
         y[u - 1] = H / (y[u + 1] * y[u] * (1 - y[u]))
     length = (sections.degree * len(points[0])) // (len(points[0]) - 1) + _EXTRA_POINTS
-    multiples, others = first_terms(H, y[2], y[3])
-    W, U = around(multiples, length + 2), around(others, length + 2, multiples)
+    first_of_W, first_of_U = first_terms(H, y[2], y[3])
+    W, U = around(first_of_W, length + 2), around(first_of_U, length + 2, first_of_W)
     # The coefficients of the coordinates, up to a common factor.
     last, rows = len(points[0]) - 1, []
     for n, point in zip(range(2, length), points[2:], strict=False):
@@ -207,7 +207,7 @@ def _sequence(z: Sequence[nmod], prime: int) -> tuple[nmod, dict[int, nmod]] | N
     if K * K != K_squared:
         return None
     y = odd | {m: 1 - K * value for m, value in even.items()}
-    run = range(min(even), max(even) + 1)
-    if any(y[m - 1] * y[m] * (1 - y[m]) * y[m + 1] != H for m in run[1:-1]):
+    indices = range(min(even), max(even) + 1)
+    if any(y[m - 1] * y[m] * (1 - y[m]) * y[m + 1] != H for m in indices[1:-1]):
         return None
-    return H, {m: y[m] for m in run}
+    return H, {m: y[m] for m in indices}

@@ -26,23 +26,23 @@ class EllipticSteps:
 
     `groups` contains, for the curves in turn, a row with the Coordinates of each group, or the index of the group one
     step before of which it is a copy. The forms are used from `first` steps of factors on. The sequences begin after
-    the first `left_out` points of the orbit.
+    the first `skipped` points of the orbit.
     """
 
     name = "Somos sequences along the orbit"
 
     def __init__(
-        self, map_over: Map, groups: Sequence[Sequence[Coordinates | int]], first: int, left_out: int = 0
+        self, map_over: Map, groups: Sequence[Sequence[Coordinates | int]], first: int, skipped: int = 0
     ) -> None:
-        self._map, self._places, self._first, self._left_out = map_over, groups, first, left_out
+        self._map, self._groups, self._first, self._skipped = map_over, groups, first, skipped
         self._residue: list[int] | None = None
-        self._known: dict[tuple[int, int], list[fmpz]] = {}
+        self._values: dict[tuple[int, int], list[fmpz]] = {}
 
     @property
     def multiples(self) -> Terms:
         """The sequence W of the multiples of T."""
         return next(
-            coordinates.W for row in self._places for coordinates in row if isinstance(coordinates, Coordinates)
+            coordinates.W for row in self._groups for coordinates in row if isinstance(coordinates, Coordinates)
         )
 
     @property
@@ -70,13 +70,13 @@ class EllipticSteps:
 
     def point(self, number: int) -> IntegerPoint | None:
         """Return the point with this number, None if the forms do not give it; discard terms no longer needed."""
-        factor_steps = (number - self._left_out) * len(self._map.factors)
-        n = factor_steps // len(self._places)
+        factor_steps = (number - self._skipped) * len(self._map.factors)
+        n = factor_steps // len(self._groups)
         for key in [
-            key for key in self._known if key[0] < factor_steps - len(self._map.factors) * len(self._places[0])
+            key for key in self._values if key[0] < factor_steps - len(self._map.factors) * len(self._groups[0])
         ]:
-            del self._known[key]
-        for row in self._places:
+            del self._values[key]
+        for row in self._groups:
             for coordinates in row:
                 if isinstance(coordinates, Coordinates):
                     coordinates.forget(n // 2 - 4)
@@ -87,7 +87,7 @@ class EllipticSteps:
         if number < self._first:
             return None
         try:
-            values = [self._value(number, g) for g in range(len(self._places[0]))]
+            values = [self._value(number, g) for g in range(len(self._groups[0]))]
         except ArithmeticError:
             return None
         if len(values) == 1:
@@ -97,11 +97,11 @@ class EllipticSteps:
     def _value(self, number: int, group: int) -> list[fmpz]:
         """Return numerators and denominator of a group. Raises ArithmeticError if the denominator is 0."""
         key = number, group
-        if key not in self._known:
-            n, k = divmod(number, len(self._places))
-            source = self._places[k][group]
-            self._known[key] = self._value(number - 1, source) if isinstance(source, int) else source.at(n)
-        return self._known[key]
+        if key not in self._values:
+            n, k = divmod(number, len(self._groups))
+            source = self._groups[k][group]
+            self._values[key] = self._value(number - 1, source) if isinstance(source, int) else source.at(n)
+        return self._values[key]
 
 
 class Coordinates:
@@ -117,7 +117,7 @@ class Coordinates:
     def at(self, n: int) -> list[fmpz]:
         """Return numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError if the latter is 0."""
         W, U = self.W, self._U
-        ratio, part = U.ratio(n), W.part(n)
+        ratio, part = U.mixed_quotient(n), W.own_quotient(n)
         weights = primitive_integers(
             tuple(g * ratio**k * part**j for g, (k, _, j) in zip(self._common, self._exponents, strict=True))
         )

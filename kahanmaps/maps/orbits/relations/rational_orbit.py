@@ -16,9 +16,9 @@ from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elli
 # The search for relations starts when the steps so far took about as long as it will (which depends on the bit length
 # of the points), provided that the length grows by a factor below _SLOW_GROWTH per step: otherwise there are none. The
 # coefficients of relations are about as long as the initial point, so points must be longer than that. If the
-# coefficients turn out to be longer, the search is repeated when points are _AGAIN times as long.
+# coefficients turn out to be longer, the search is repeated when points are _RETRY_FACTOR times as long.
 _MIN_BITS, _MIN_BITS_BY_COORDINATES = 4500, 300  # the second times the square of (dimension + 1)
-_AGAIN = 4
+_RETRY_FACTOR = 4
 _LONGER_THAN_START = 8
 _SLOW_GROWTH = 1.5
 
@@ -53,7 +53,7 @@ class RationalOrbit:
         max_bits: int | None = None,
         is_requested: Callable[[int], bool] | None = None,
     ) -> None:
-        self.map, self.start, self.max_bits, self._wanted = map_over, start, max_bits, is_requested
+        self.map, self.start, self.max_bits, self._is_requested = map_over, start, max_bits, is_requested
         self.relations: Relations | None = None
         self.since: int | None = None
 
@@ -64,7 +64,7 @@ class RationalOrbit:
         latest_bits = inf if self.max_bits is None else self.max_bits / 2  # later, few steps remain: bits grow like n^2
         yield self.start
         for number in count(1):
-            if self.relations is not None and self._wanted is not None and not self._wanted(number):
+            if self.relations is not None and self._is_requested is not None and not self._is_requested(number):
                 # A point that is not requested is skipped, unless it may exceed the budget.
                 is_short = self.max_bits is None or 2 * last[-1].bits * number**2 < self.max_bits * reached**2
                 if is_short and self.relations.skip(number):
@@ -104,7 +104,7 @@ class RationalOrbit:
                     self.relations = relations(self.map, self.start, image)
                     search_bits = inf
                 except TooLongRelation:
-                    search_bits = _AGAIN * image.bits
+                    search_bits = _RETRY_FACTOR * image.bits
                 self.since = None if self.relations is None else number + 1
 
 
