@@ -281,7 +281,7 @@ def associated(
 
     If a factor g of chi is irreducible of degree 2 or more, the list also contains those over Q[t]/g that have the
     other sign only at one root t of g: systems with the parameter t, "root of g". All other associated systems are
-    conjugates of these and products of them.
+    conjugates of these, or belong to products of their matrices B_s.
     """
     file, member = _member(system, parameters)
     written: dict[str, lib.SystemFile] = {}

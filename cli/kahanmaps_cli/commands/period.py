@@ -51,8 +51,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     Modulo P this order is computed; over Q the orbit is proved periodic or aperiodic.
 
     The command also recognizes systems of the family that are not declared as such. The translation is defined at
-    indeterminacy points of the map too: if the orbit meets one, the period is that of the continued orbit, and the
-    output says so.
+    indeterminacy points of the map too: if the orbit meets one, the output says so, and gives the period under the
+    translation.
 
     --levels N prints the polynomial psi_N: its roots gamma = 1 - disc(h) level^2 are the levels whose period is N or a
     divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps also these levels in each plane

@@ -123,8 +123,8 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
       kahanmaps heights weierstrass --json | kahanmaps plot heights --from - \\
           -o heights.svg
 
-    The height of a point is the bit length of its largest numerator or
-    denominator. Each eps has a color; marks are heights, lines are fits. Results
+    The height of a point is the bit length of the largest integer in its
+    coordinates over a common denominator. Each eps has a color; marks are heights, lines are fits. Results
     read by --from contain the heights at the steps 0, 1, 2, 4, 8, ... only.
 
     Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
