@@ -73,7 +73,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 a recurrence was found, or all requested terms were measured, or the iterates become undefined or
     constant; 2 usage error; 3 undecided, or stopped early.
     """
-    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         growth = measure(file, eps, options, search)

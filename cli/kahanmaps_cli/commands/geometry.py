@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.options import eps_options, load_system, output_options, requested_eps, system_options
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import print_stdout
@@ -43,7 +43,7 @@ def command(system: str | None, as_json: bool, quiet: bool, start: Any, **option
     if isinstance(normal_form, lib.NoNormalForm):
         reason = normal_form.reason if file.is_quadratic else "it is not the Kahan map of a quadratic system"
         raise lib.InputError(f"the geometry of {file.name} cannot be computed: {reason}")
-    eps = the_eps(options["eps"], options["time_step"])
+    eps = requested_eps(options["eps"], options["time_step"])
     file.map.at(eps, lib.QQ).point(start)
     result = lib.geometry_of(normal_form, eps, start)
     if as_json:

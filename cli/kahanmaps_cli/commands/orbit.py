@@ -91,7 +91,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 
     Exit status: 0 done, 2 usage error, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
-    _require_sense(options)
+    _require_consistent(options)
     output = None if output == "-" else output
     form = _form(options, output)
     options["quiet"] = quiet
@@ -163,7 +163,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     return 3 if is_unread else _STATUS.get(end.status, 3)
 
 
-def _require_sense(options: dict[str, Any]) -> None:
+def _require_consistent(options: dict[str, Any]) -> None:
     """Raise UsageError for options that contradict each other."""
     steps, at = options["steps"], options["at"]
     if (steps is None) == (at is None):

@@ -110,7 +110,7 @@ def command(system: str | None, **options: Any) -> int:
             # Without SYSTEM, verify and the options of a random member need a member of the family.
             draws = not is_named and (is_drawn or options["source"] == "verify")
             file = drawn_file(options) if draws else opt.load_system(system, options)
-            eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+            eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
             settings = lib.Settings(eps=eps, seed=options["seed"], progress=search)
             left_out: list[str] = []
             if options["source"] == "verify":

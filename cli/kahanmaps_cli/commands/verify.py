@@ -126,7 +126,7 @@ def command(system: str | None, **options: Any) -> int:
         raise click.UsageError("found -p without SYSTEM: a random member has no parameters")
     with Progress(options["quiet"]) as progress:
         settings = lib.Settings(
-            eps=opt.the_eps(options["eps"], options["time_step"], required=False),
+            eps=opt.requested_eps(options["eps"], options["time_step"], required=False),
             seed=options["seed"],
             error_bits=options["error_bits"],
             progress=progress,

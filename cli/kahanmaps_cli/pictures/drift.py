@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import eps_options, integral_option, load_system, seed_option, system_options, the_eps
+from kahanmaps_cli.options import eps_options, integral_option, load_system, requested_eps, seed_option, system_options
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawing, picture
 from kahanmaps_cli.screen.progress import Progress
@@ -68,7 +68,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     file = load_system(options["system"], options)
     real_approximation = file.real_approximation
     system = real_approximation.system  # a vector field, since the other methods need one
-    eps = the_eps(options["eps"], options["time_step"])
+    eps = requested_eps(options["eps"], options["time_step"])
     if eps == 0:
         raise lib.InputError("found eps = 0, expected another number: at eps = 0 every map is the identity")
     messages: list[str] = []

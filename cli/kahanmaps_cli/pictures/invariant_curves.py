@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
+from kahanmaps_cli.options import eps_options, load_system, requested_eps, system_options
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawing, picture, two_variables
 from kahanmaps_cli.screen.progress import Progress
@@ -59,7 +59,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     orbit up to there).
     """
     file = load_system(options["system"], options)
-    eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
+    eps = requested_eps(options["eps"], options["time_step"], required=file.is_quadratic)
     original = two_variables("--original", options["original"], file.variables)
     curves = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
     texts = [lib.format_point(start) for start in options["starts"]]

@@ -258,12 +258,12 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} may not be written to: change its permissions, or work on a copy")
         address = f"{self.path.as_uri()}?mode={mode}"
         self._connection = sqlite3.connect(address, timeout=_BUSY_SECONDS, isolation_level=None, uri=True)
-        self._is_made(create)  # before locking: no lock file beside a file that is not ours
+        self._is_initialized(create)  # before locking: no lock file beside a file that is not ours
         if not self._is_readonly:
             self._take_lock()
             self._execute(f"PRAGMA cache_size = -{_CACHE}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
-            if not self._is_made(create):  # again, under the lock: another process may have created it meanwhile
+            if not self._is_initialized(create):  # again, under the lock: another process may have created it meanwhile
                 with self._transaction():
                     for statement in SCHEMA.split(";"):  # executescript would commit
                         self._execute(statement)
@@ -272,7 +272,7 @@ class Store(HtmlDisplay):
         if self._is_readonly:
             self._execute("PRAGMA query_only = ON")
 
-    def _is_made(self, create: bool) -> bool:
+    def _is_initialized(self, create: bool) -> bool:
         """Return False for an empty file if `create`. Raises StoreError for a file that is not ours."""
         # The schema first: pragmas succeed even for files that SQLite cannot read.
         queries = ("SELECT count(*) FROM sqlite_master", "PRAGMA application_id", "PRAGMA user_version")
