@@ -164,33 +164,33 @@ def run_orbit(
 
 def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
     """Try an identity at every point of an exact orbit."""
-    tried = poles = 0
+    tried = undefined = 0
     number_fields = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]
     ground = number_fields[0] if number_fields else identity.ground
     for exact in run.points:
         point, eps = tuple(map(ground.convert, exact)), ground.convert(run.eps)
         sides = identity.at(ground, point, eps)
         if sides is None:
-            poles += 1
+            undefined += 1
             continue
         tried += 1
         witness = witness_of(identity, ground, point, eps, sides)
         if witness is not None:
-            text = f"fails at step {tried + poles - 1} of an exact orbit"
-            return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), witness
+            text = f"fails at step {tried + undefined - 1} of an exact orbit"
+            return Evidence("exact orbit", text, _orbit_data(run, tried, undefined)), witness
     at = f", eps = {format_number(run.eps)}" if identity.has_eps else ""
     text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit{at}"
     if not tried:
         text = f"could not be tried at any point of an orbit{at}"
-    if poles:
-        text += f", undefined at {poles}"
+    if undefined:
+        text += f", undefined at {undefined}"
     if not run.end.is_complete:
         text += f" ({run.end.message})"
-    return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), None
+    return Evidence("exact orbit", text, _orbit_data(run, tried, undefined)), None
 
 
-def _orbit_data(run: OrbitRun, tried: int, poles: int) -> Mapping[str, Any]:
-    return {"points": tried, "undefined_at": poles, "eps": format_number(run.eps)}
+def _orbit_data(run: OrbitRun, tried: int, undefined: int) -> Mapping[str, Any]:
+    return {"points": tried, "undefined_at": undefined, "eps": format_number(run.eps)}
 
 
 # ---- claims as the user writes them: formulas as text or SymPy expressions ----------------------------------------

@@ -561,11 +561,11 @@ class Store(HtmlDisplay):
         for record in records:  # values that JSON cannot represent raise an error here
             if not math.isfinite(record.seconds):
                 raise ValueError(f"a record cannot have taken {record.seconds} seconds")
-            kept = {name: getattr(record, name) for name in _COLUMNS}  # not asdict, which copies results
+            columns = {name: getattr(record, name) for name in _COLUMNS}  # not asdict, which copies results
             for name in ("result", "versions"):
-                kept[name] = None if kept[name] is None else canonical(dict(kept[name]))
-            kept |= {name: kept[name] and encodable(kept[name]) for name in ("verdict", "message", "stderr")}
-            rows.append([*{**kept, "outcome": str(record.outcome), "seconds": float(record.seconds)}.values()])
+                columns[name] = None if columns[name] is None else canonical(dict(columns[name]))
+            columns |= {name: columns[name] and encodable(columns[name]) for name in ("verdict", "message", "stderr")}
+            rows.append([*{**columns, "outcome": str(record.outcome), "seconds": float(record.seconds)}.values()])
         with self._transaction():
             for record, row in zip(records, rows, strict=True):
                 stored = self._find_result(record.key)
