@@ -74,7 +74,7 @@ from .experiments.registry import task_kinds as task_kinds
 from .experiments.results.export import write_csv as write_csv
 from .experiments.results.export import write_jsonl as write_jsonl
 from .experiments.results.export import write_parquet as write_parquet
-from .experiments.results.records import KEPT as KEPT
+from .experiments.results.records import STORED_OUTCOMES as STORED_OUTCOMES
 from .experiments.results.records import VERDICTS as VERDICTS
 from .experiments.results.records import Record as Record
 from .experiments.results.records import option_words as option_words

@@ -217,7 +217,7 @@ def given(options: Mapping[str, Any], *names: str, **others: str) -> dict[str, A
     return {name: options[name] for name in names} | {other: options[name] for other, name in others.items()}
 
 
-def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
+def requested_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
     """Return eps from --eps or --time-step; None if neither is given and neither is `required`."""
     if eps is not None and time_step is not None:
         raise click.UsageError("give --eps or --time-step, not both (the time step is 2 eps)")
@@ -230,7 +230,7 @@ def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
 
 def eps_of(file: lib.SystemFile, options: Mapping[str, Any]) -> Any:
     """Return eps from --eps or --time-step, required if the map depends on eps; None if it does not."""
-    eps = the_eps(options["eps"], options["time_step"], required=file.map.has_eps)
+    eps = requested_eps(options["eps"], options["time_step"], required=file.map.has_eps)
     return eps if file.map.has_eps else None
 
 
@@ -354,13 +354,13 @@ def load_with_start(
     # The parameters of a system on standard input are not known yet.
     known |= {name for name in roots if "-" in references or re.search(rf"\b{name}\b", inline)}
     of_start = {name: root for name, root in roots.items() if root is not None and name not in known}
-    made = load({**options, "parameters": [pair for pair in options["parameters"] if pair[0] not in of_start]})
+    loaded = load({**options, "parameters": [pair for pair in options["parameters"] if pair[0] not in of_start]})
     constants = dict[str, Any]()
-    for file in made if isinstance(made, tuple) else (made,):
+    for file in loaded if isinstance(loaded, tuple) else (loaded,):
         if file is not None:
             constants |= file.parameters
             of_start |= dict.fromkeys(file.claim_names[file.dim : -1], file.map.root)
-    return made, lib.parse_algebraic_point(text, of_start, constants)
+    return loaded, lib.parse_algebraic_point(text, of_start, constants)
 
 
 def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemFile:
@@ -392,7 +392,7 @@ def settings_from(options: dict[str, Any], progress: Callable[[str], None], star
     if isinstance(start, lib.AlgebraicPoint):
         start = start.over(start.root.number_field)
     return lib.Settings(
-        eps=the_eps(options["eps"], options["time_step"], required=False),
+        eps=requested_eps(options["eps"], options["time_step"], required=False),
         start=start,
         steps=10 if steps is None else steps,
         seed=options["seed"],

@@ -40,7 +40,7 @@ def raise_interrupt(signum: int, frame: Any) -> None:
 
 
 def end_interrupts() -> None:
-    """Call it where KeyboardInterrupt has arrived."""
+    """Stop raising KeyboardInterrupt: to be called where it has been caught."""
     signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 
 

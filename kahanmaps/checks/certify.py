@@ -72,12 +72,12 @@ def certify(
         if verdict is Certainty.PROVED:
             also.append(_without_bound(decision.evidence))
     if orbit is not None:
-        experience, failure = along(identity, orbit)
-        also.append(experience)
-        if failure is not None and verdict is not Certainty.REFUTED:
+        orbit_evidence, orbit_witness = along(identity, orbit)
+        also.append(orbit_evidence)
+        if orbit_witness is not None and verdict is not Certainty.REFUTED:
             if verdict is Certainty.PROVED:
-                raise Contradiction(f"{claim}: {evidence.summary}, but it {experience.summary} {failure}")
-            verdict, evidence, witness = Certainty.REFUTED, experience, failure
+                raise Contradiction(f"{claim}: {evidence.summary}, but it {orbit_evidence.summary} {orbit_witness}")
+            verdict, evidence, witness = Certainty.REFUTED, orbit_evidence, orbit_witness
     return Finding(claim, verdict, evidence, tuple(also), witness, formula, source, control)
 
 

@@ -19,8 +19,8 @@ from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, ResultPart
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
     """How certain a claim is. Its truth value is `holds`; `bool` of a certainty is an error.
 
-    Checks give one of the first four. DERIVED is what follows exactly from the measured singularity
-    patterns; NOTE stands where certainty is not the question.
+    Checks give one of the first four. DERIVED: the statement follows exactly from the measured singularity patterns.
+    NOTE: a remark, which has no certainty.
     """
 
     PROVED = "proved"

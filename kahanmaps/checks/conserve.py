@@ -45,7 +45,7 @@ _TRIED_IN_HIGH_DIMENSION = 2  # above dimension 16, where one integral takes man
 def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, eps: fmpq | None) -> Identity:
     """Return I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
     map_, labels = as_map(system), ("I(x~)", "I(x)")
-    last: list[Any] = []  # a cache: along an orbit I(x~) at one point is I(x) at the next
+    cached: list[Any] = []  # a cache: along an orbit I(x~) at one point is I(x) at the next
     in_iterates = integral if isinstance(integral, ClaimedFunction) and integral.iterates else None
     if in_iterates is not None:  # x is the middle one of the points that the identity contains
         labels = ("I on the orbit of x, a step later", "I on the orbit of x")
@@ -56,10 +56,10 @@ def conservation(system: QuadraticSystem | MapFamily, integral: PhaseFunction, e
             value_before, after = (in_iterates.on(field, eps_value, points[k:]) for k in (0, 1))
             return None if after is None or value_before is None else ([after], [value_before])
         image = map_.at(eps_value, field).step(point)
-        is_cached = last and last[0] is field and last[1] == eps_value and last[2] == point
-        value_before = last[3] if is_cached else integral.value(field, eps_value, point)
+        is_cached = cached and cached[0] is field and cached[1] == eps_value and cached[2] == point
+        value_before = cached[3] if is_cached else integral.value(field, eps_value, point)
         after = integral.value(field, eps_value, image)
-        last[:] = [field, eps_value, image, after]
+        cached[:] = [field, eps_value, image, after]
         return None if after is None or value_before is None else ([after], [value_before])
 
     subject = (map_.subject, integral.subject)
@@ -135,9 +135,10 @@ def functions_along(
         else:
             short = " ".join(text.split()) if len(text) <= 30 else f"I{k}"
             claims = {name or short: claimed_function(file, text)}
-        if in_floats and (moved := [name for name, function in claims.items() if iterates_in(*function.names)]):
+        if in_floats and (in_iterates := [name for name, function in claims.items() if iterates_in(*function.names)]):
+            named = ", ".join(in_iterates)
             raise InputError(
-                f"found {', '.join(moved)} with x~ in it, which needs exact, mod:P or ball:BITS arithmetic, not float"
+                f"found {named} with x~ in it, which needs exact, mod:P or ball:BITS arithmetic, not float"
             )
         functions += [ClaimedFunction(name, function, file.map.root, file.map) for name, function in claims.items()]
     names = [*taken, *(function.name for function in functions)]
@@ -220,8 +221,8 @@ def check_integrals(
         elif proof is not None and k >= tried and file.dim > 16:
             finding = Finding(f"{integral.name} is conserved", Certainty.PROVED, proof, **details)
         else:
-            identity, walked = conservation(file.map, integral, settings.eps), k < tried or proof is None
-            finding = certify(claim, identity, settings, proof, orbit if walked else None, **details)
+            identity, is_tried = conservation(file.map, integral, settings.eps), k < tried or proof is None
+            finding = certify(claim, identity, settings, proof, orbit if is_tried else None, **details)
         findings.append(finding)
     notes = []
     proved = [finding for finding in findings if finding.verdict is Certainty.PROVED]

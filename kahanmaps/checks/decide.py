@@ -36,7 +36,7 @@ METHOD = "random points over GF(p)"
 DEFAULT_ERROR_BITS = 100
 # Rosser and Schoenfeld: at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
-_MAX_POLES = 200
+_MAX_UNDEFINED_POINTS = 200
 _WITNESS_TRIES = 400
 _HIGH_TRIES = 20  # further tries with long numbers, at which a nonzero function hardly ever vanishes
 _HIGH_BITS = 62
@@ -94,7 +94,7 @@ class Identity:
     # The interface Decidable.
 
     name = "identity"
-    max_failures = _MAX_POLES
+    max_failures = _MAX_UNDEFINED_POINTS
 
     @property
     def conjugates(self) -> int:
@@ -247,14 +247,14 @@ def _undecided(text: str, **data: Any) -> Decision:
     return Decision(Certainty.UNDECIDED, Evidence(METHOD, text, data))
 
 
-def log2_error(equation: CoefficientSize, poles: int, conjugates: int = 1) -> float:
+def log2_error(equation: CoefficientSize, pole_degree: int, conjugates: int = 1) -> float:
     """Return log2 of the probability that a false polynomial equation holds at a random point over GF(p).
 
-    `poles` is the degree of the product of all denominators. If the coefficients lie in a number field of degree at
-    most `conjugates`, p is random among the primes that split there. It is assumed that there are at least half as many
-    of these as Chebotarev's density predicts; a prime divides a nonzero coefficient only if it divides its norm.
+    `pole_degree` is the degree of the product of all denominators. If the coefficients lie in a number field of degree
+    at most `conjugates`, p is random among the primes that split there. It is assumed that there are at least half as
+    many of these as Chebotarev's density predicts; a prime divides a nonzero coefficient only if it divides its norm.
     """
-    if max(equation.degree, poles) >= 1 << (PRIME_BITS - 2):
+    if max(equation.degree, pole_degree) >= 1 << (PRIME_BITS - 2):
         return 0.0  # no bound: too many points may be roots or poles
     primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
     bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / PRIME_BITS)) - primes_log2)

@@ -44,12 +44,12 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
     map_ = as_map(system)
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        kahan = map_.at(eps_value, field)
-        image = _image(kahan, point)
+        map_at_eps = map_.at(eps_value, field)
+        image = _image(map_at_eps, point)
         density_after, density_before = density.value(field, eps_value, image), density.value(field, eps_value, point)
         if density_after is None or density_before is None:
             return None
-        numerator, denominator = jacobian_determinant_fraction(kahan, point, image)
+        numerator, denominator = jacobian_determinant_fraction(map_at_eps, point, image)
         if field.is_zero(numerator) or field.is_zero(denominator):
             return None  # if the map has no inverse, both sides may vanish, which says nothing about a measure
         return [density_after * denominator], [density_before * numerator]
@@ -64,18 +64,18 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
     return Identity(map_.dim, sides, eps, *labels, undefined_reason=undefined_reason, **properties)
 
 
-def _image(kahan: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
+def _image(map_at_eps: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return x~, after a test that it satisfies the defining equation.
 
     The formula for dPhi follows from this equation. A wrong x~ would not be noticed otherwise: the laws hold at any two
     points x and x~ for phi = det(I - eps f') with Hamiltonian f, and for Pi of the family.
     """
-    image = kahan.step(point)
-    field = kahan.field
-    if not isinstance(kahan, KahanMap) or (field is not QQ and not field.characteristic):
+    image = map_at_eps.step(point)
+    field = map_at_eps.field
+    if not isinstance(map_at_eps, KahanMap) or (field is not QQ and not field.characteristic):
         return image  # no test over other fields: the equation was tested at points, and expanding it takes long
-    factor = field.convert(2) * kahan.eps
-    means = kahan.local.polarised(point, image)
+    factor = field.convert(2) * map_at_eps.eps
+    means = map_at_eps.local.polarised(point, image)
     for x, after, mean in zip(point, image, means, strict=True):
         if not field.equal(after - x, factor * mean):
             raise Contradiction("the point computed for x~ does not satisfy the defining equation of the Kahan map")

@@ -139,17 +139,17 @@ def run_orbit(
     seed = derive_seed(settings.seed, as_map(system).subject, settings.eps, subject)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
-    of_field = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
-    kahan = as_map(system).at(eps, of_field[0] if of_field else QQ)
+    number_fields = [entry.field for entry in settings.start or () if isinstance(entry, EtaleElement)]
+    map_at_eps = as_map(system).at(eps, number_fields[0] if number_fields else QQ)
     # Without a normal form, a claim that contains two more steps multiplies the number of digits by dim^2, and the
     # elimination by dim again; for members of the family it hardly grows from step to step.
-    by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
-    max_digits = by_dimension if settings.max_digits is None else settings.max_digits
-    draws = random_starts(kahan.dim, seed)
+    default_max_digits = 5_000 if is_integrable else max(100, 60_000 // map_at_eps.dim**2)
+    max_digits = default_max_digits if settings.max_digits is None else settings.max_digits
+    random_points = random_starts(map_at_eps.dim, seed)
     attempt = 0
     while True:
-        start = settings.start if settings.start is not None else next(draws)
-        orbit = Orbit(kahan, start, settings.steps, max_digits=max_digits)
+        start = settings.start if settings.start is not None else next(random_points)
+        orbit = Orbit(map_at_eps, start, settings.steps, max_digits=max_digits)
         points = []
         for point in orbit:
             settings.progress(f"orbit: step {point.step} of {settings.steps}")
@@ -164,33 +164,33 @@ def run_orbit(
 
 def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
     """Try an identity at every point of an exact orbit."""
-    tried = poles = 0
-    of_field = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]
-    ground = of_field[0] if of_field else identity.ground
+    tried = undefined = 0
+    number_fields = [entry.field for entry in run.start if isinstance(entry, EtaleElement)]
+    ground = number_fields[0] if number_fields else identity.ground
     for exact in run.points:
         point, eps = tuple(map(ground.convert, exact)), ground.convert(run.eps)
         sides = identity.at(ground, point, eps)
         if sides is None:
-            poles += 1
+            undefined += 1
             continue
         tried += 1
         witness = witness_of(identity, ground, point, eps, sides)
         if witness is not None:
-            text = f"fails at step {tried + poles - 1} of an exact orbit"
-            return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), witness
+            text = f"fails at step {tried + undefined - 1} of an exact orbit"
+            return Evidence("exact orbit", text, _orbit_data(run, tried, undefined)), witness
     at = f", eps = {format_number(run.eps)}" if identity.has_eps else ""
     text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit{at}"
     if not tried:
         text = f"could not be tried at any point of an orbit{at}"
-    if poles:
-        text += f", undefined at {poles}"
+    if undefined:
+        text += f", undefined at {undefined}"
     if not run.end.is_complete:
         text += f" ({run.end.message})"
-    return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), None
+    return Evidence("exact orbit", text, _orbit_data(run, tried, undefined)), None
 
 
-def _orbit_data(run: OrbitRun, tried: int, poles: int) -> Mapping[str, Any]:
-    return {"points": tried, "undefined_at": poles, "eps": format_number(run.eps)}
+def _orbit_data(run: OrbitRun, tried: int, undefined: int) -> Mapping[str, Any]:
+    return {"points": tried, "undefined_at": undefined, "eps": format_number(run.eps)}
 
 
 # ---- claims as the user writes them: formulas as text or SymPy expressions ----------------------------------------

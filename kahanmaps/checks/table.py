@@ -111,15 +111,14 @@ _CHECKS = [
 
         A Hamiltonian system has a known integral, the modified Hamiltonian, in both normalizations of the paper; a
         member of the family also has the K~ of all rational associated systems. The section [integrals] of the file
-        claims further ones. By default all of them are checked, with --integral only the given ones. --integral known
-        stands for all known and claimed ones.
+        claims further ones. By default all of them are checked, with --integral only the given ones.
         """,
         "conserved",
         ClaimOption(
             "--integral",
             "[NAME=]EXPR",
-            "An integral to check: a rational function of x, its images x~, x~~ and eps; the name of one of the file; "
-            "or known.",
+            "An integral to check: a rational function of x, its images x~, x~~ and eps; the name of an integral of "
+            "the file; or known, for all known and claimed ones.",
             many=True,
         ),
     ),
@@ -130,8 +129,9 @@ _CHECKS = [
         "Is the measure dx/phi invariant under the map of SYSTEM?",
         ("paper_m3", "lotka_volterra --eps 1/10", "--vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\\n--density x*y"),
         """
-        Without --eps the measure is checked for every eps. By default phi is both det(I - eps f'(x)), for a Hamiltonian
-        system, and the [density] of the file, where there is one; --density gives another phi instead.
+        Without --eps the measure is checked for every eps. By default two functions phi are checked:
+        det(I - eps f'(x)) if the system is Hamiltonian, and the [density] of the file if there is one. --density gives
+        another phi instead.
         """,
         "invariant",
         ClaimOption("--density", "EXPR", "A claimed density phi: a rational function of the variables and eps."),
@@ -144,7 +144,7 @@ _CHECKS = [
         ("paper_m3", "henon_heiles    # Hamiltonian, and it fails", "lotka_volterra --tensor p.toml"),
         """
         The transformation law dPhi P(x) dPhi^T = P(x~) and the Jacobi identity are both checked. Without --eps they are
-        checked for every eps. Without --tensor P is Pi, for Hamiltonian systems.
+        checked for every eps. Without --tensor P is Pi, and the system has to be Hamiltonian.
         """,
         "it is",
         ClaimOption(

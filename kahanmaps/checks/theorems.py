@@ -55,8 +55,8 @@ def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
     count = len(member.factors)
     if count <= MAX_FACTORS:
         return list(member.associated())
-    flips = [tuple(-1 if i == k else 1 for i in range(count)) for k in range(count)]
-    return [member.associate(signs) for signs in [(1,) * count, *flips]]
+    sign_choices = [tuple(-1 if i == k else 1 for i in range(count)) for k in range(count)]
+    return [member.associate(signs) for signs in [(1,) * count, *sign_choices]]
 
 
 def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
@@ -127,9 +127,9 @@ def cubic_hamiltonian(hamiltonian: CubicHamiltonian) -> Evidence | None:
 def product_density_invariant(system: QuadraticSystem, phi: RationalFunction) -> Evidence | None:
     """For x_i' = x_i (r_i + sum_j a_ij x_j) with a skew matrix a, dx/(x_1 ... x_n) is invariant."""
     x = system.rhs[0].context().gens()[: system.dim]
-    ones = [tuple(map(int, monomial[: system.dim])) for monomial in phi.numerator.monoms()]
+    exponents = [tuple(map(int, monomial[: system.dim])) for monomial in phi.numerator.monoms()]
     hypotheses = [
-        ("phi is a multiple of x_1 ... x_n", phi.is_polynomial and ones == [(1,) * system.dim]),
+        ("phi is a multiple of x_1 ... x_n", phi.is_polynomial and exponents == [(1,) * system.dim]),
         ("x_i divides f_i", all(monomial[i] for i, f in enumerate(system.rhs) for monomial in f.monoms())),
     ]
     proof = evidence("the lemma on Lotka-Volterra systems (docs/mathematics.md)", hypotheses)

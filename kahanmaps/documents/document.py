@@ -49,8 +49,8 @@ def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> KahanFamily:
     return KahanFamily(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in rhs), symbols[:-1]))
 
 
-# What makes a map of right-hand sides (polynomials in the variables, symbols, then eps) and their degree, and the
-# degree: the default and the largest.
+# For each method: the function that makes a map of right-hand sides (polynomials in the variables, the symbols, then
+# eps) and their degree, the default of the degree, and its largest value.
 _DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], MapFamily], int, int]] = {
     "kahan": (_kahan, 2, 2),
     "polarised": (polarised_map, 3, MAX_DEGREE),
@@ -117,7 +117,7 @@ class DocumentReader(PartReader):
             read_structured_facts(catalog, self.variables, self._mistake)
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
-        # With its name and the parameters that hold, long integers as text (JSON needs them so).
+        # The document, with its name and the values of the parameters in use; long integers are text, as JSON needs it.
         document = {key: json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
         document = {"name": name, **document}
         if self.parameters:
@@ -161,7 +161,7 @@ class DocumentReader(PartReader):
             member = self._read_member(section)
             hamiltonian = member.chosen.hamiltonian if member else None
         else:
-            map_ = self._read_given(kind, section)
+            map_ = self._read_map_of_kind(kind, section)
         if hamiltonian is not None:
             map_ = KahanFamily(hamiltonian.system)
         elif map_ is not None:
@@ -170,7 +170,7 @@ class DocumentReader(PartReader):
 
                 def at_number(value: fmpq) -> MapFamily:  # for floats
                     overrides = {**self.overrides, parameter: value}
-                    reader = DocumentReader(self.document, self.where, overrides, self.other)
+                    reader = DocumentReader(self.document, self.where, overrides, self.look_up)
                     parsed_map: MapFamily = reader.read()["map"]
                     return parsed_map
 
@@ -192,12 +192,12 @@ class DocumentReader(PartReader):
         self.symbols = tuple(symbols)
         self.parameters = {name: value for name, value in self.parameters.items() if name not in symbols}
         section = self.document[kind]
-        map_ = self._read_field(section) if kind == "hamiltonian" else self._read_given(kind, section)
+        map_ = self._read_field(section) if kind == "hamiltonian" else self._read_map_of_kind(kind, section)
         if map_ is None or self.mistakes:
             raise SystemFileError(f"{self.where} with {', '.join(symbols)} as symbols", self.mistakes)
         return map_
 
-    def _read_given(self, kind: str, section: Mapping[str, Any]) -> MapFamily | None:
+    def _read_map_of_kind(self, kind: str, section: Mapping[str, Any]) -> MapFamily | None:
         read = {"system": self._read_system, "composition": self._read_composition, "bilinear": self._read_bilinear}
         return read.get(kind, self._read_map)(section)
 
@@ -288,11 +288,11 @@ class DocumentReader(PartReader):
         if type(degree) is not int or not 2 <= degree <= largest:
             return self._refused("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
         formulas = self._required("system", section, "rhs")
-        right_sides = self._each("system.rhs", formulas, lambda path, value: self._polynomial(path, value, degree))
-        rhs = self._list("system", "rhs", formulas, "right-hand side")
-        if rhs is None or right_sides is None or self.variables is None or self.has_bad_parameter:
+        polynomials = self._each("system.rhs", formulas, lambda path, value: self._polynomial(path, value, degree))
+        texts = self._list("system", "rhs", formulas, "right-hand side")
+        if texts is None or polynomials is None or self.variables is None or self.has_bad_parameter:
             return None
-        return self._try_make("system.rhs", make, right_sides, degree)
+        return self._try_make("system.rhs", make, polynomials, degree)
 
     def _read_bilinear(self, section: Mapping[str, Any]) -> MapFamily | None:
         new = section.get("new", [name.upper() for name in self.variables or ()])
@@ -502,7 +502,7 @@ class DocumentReader(PartReader):
         self.parts[0] += 1
         if self.parts[0] > _MAX_FACTORS:
             raise InputError(f"found more than {_MAX_FACTORS} maps in one composition, expected at most {_MAX_FACTORS}")
-        name, name_or_path, other = "map", "", self.other
+        name, name_or_path, look_up = "map", "", self.look_up
         if key == "map":
             if not isinstance(value, dict):
                 raise InputError(f"found {show(value)}, expected a table like a system file")
@@ -511,14 +511,14 @@ class DocumentReader(PartReader):
             document = {"parameters": {**outer, **dict.fromkeys(self.symbols, 1)}, **value}
         elif not isinstance(value, str):
             raise InputError(f"found {show(value)}, expected a name in quotes")
-        elif self.other is None:
+        elif self.look_up is None:
             raise InputError(f"found {quoted(value)}, expected map = {{ ... }}: files are not looked up here")
         else:
             name = value
-            document, name_or_path, other = self.other(key, value)
+            document, name_or_path, look_up = self.look_up(key, value)
             if key == "file" and name_or_path in self.inside:
                 raise InputError(f"found {quoted(name)} as a part of itself")
         document = {part: data for part, data in document.items() if part not in ("catalog", "integrals", "density")}
-        reader = type(self)(document, name, numbers, other)
+        reader = type(self)(document, name, numbers, look_up)
         reader.inside, reader.parts = (*self.inside, name_or_path), self.parts
         return reader

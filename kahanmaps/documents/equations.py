@@ -56,9 +56,9 @@ class _Derivative(NamedTuple):
 def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Replace equations in [system] by a list of right-hand sides and the variables.
 
-    The order of the equations is that of the variables, where these are not given; velocities of equations of second
-    order come last. Other documents come back equal. The notes say which names were made.
-    Raises InputError for equations that are none, or of other variables than those given.
+    If the variables are not given, they are in the order of their equations; velocities of equations of second order
+    come last. Other documents are returned unchanged. The notes list new names. Raises InputError for a text that is
+    not an equation, and for equations of other variables than those given.
 
     >>> without_left_sides({"system": {"rhs": "x' = x*y, dy/dt = -x"}})
     ({'variables': ['x', 'y'], 'system': {'rhs': ['x*y', '-x']}}, [])
@@ -75,11 +75,11 @@ def without_left_sides(document: Mapping[str, Any]) -> tuple[dict[str, Any], lis
     notes: list[str] = []
     if any(token in piece for piece in pieces for token in _EQUALS):
         names, parameters = document.get("variables"), document.get("parameters")
-        right_sides = [str(name) for name in names] if isinstance(names, list) else []
+        given_names = [str(name) for name in names] if isinstance(names, list) else []
         sides, velocities, notes = read_equations(
-            pieces, right_sides, parameters if isinstance(parameters, dict) else ()
+            pieces, given_names, parameters if isinstance(parameters, dict) else ()
         )
-        variables = list(sides) if names is None else [*right_sides, *(v for v in velocities if v not in right_sides)]
+        variables = list(sides) if names is None else [*given_names, *(v for v in velocities if v not in given_names)]
         if set(variables) != set(sides):
             raise InputError(f"found equations for {', '.join(sides)}, expected one for each of the variables")
         document = {"variables": variables, **document}
@@ -157,11 +157,11 @@ def read_equations(
         parameters: names that are taken.
 
     Returns:
-        The right-hand sides by variable, these as they come, then their velocities; the variables that are velocities;
-        and which names were made, in sentences.
+        The right-hand sides by variable, in the order of the equations, then those of the velocities; the names of the
+        velocities; and sentences on new names.
 
     Raises:
-        InputError: for an equation that is none, with what to write instead, and for two of one variable.
+        InputError: for a text that is not an equation, with what to write instead, and for two equations of a variable.
     """
     pieces, notes = _with_plain_names(pieces, parameters)
     orders, formulas = dict[str, int](), dict[str, list[str]]()
@@ -255,12 +255,12 @@ def _formula(name: str, tokens: list[str], orders: Mapping[str, int], velocities
 
 def _velocities(orders: Mapping[str, int], variables: Sequence[str], taken: Collection[str]) -> dict[str, str]:
     """Return the velocity of each variable with an equation of second order: a given name, or vx for x."""
-    second = [name for name, order in orders.items() if order == 2]
-    named = [name for name in variables if name not in orders]
-    if len(named) == len(second):
-        return dict(zip(second, named, strict=True))
+    second_order = [name for name, order in orders.items() if order == 2]
+    extra_names = [name for name in variables if name not in orders]
+    if len(extra_names) == len(second_order):
+        return dict(zip(second_order, extra_names, strict=True))
     velocities = dict[str, str]()
-    for name in second:
+    for name in second_order:
         velocity = f"v{name}"
         while velocity in taken or velocity in velocities.values():
             velocity += "_"
@@ -272,9 +272,9 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
     """Replace x[0] by x0 (or x_0 if x0 is taken); return the pieces and notes."""
     used_names = {*taken, *(token for piece in pieces for token in piece)}
     names = dict[tuple[str, str], str]()
-    made: list[list[str]] = []
+    renamed: list[list[str]] = []
     for piece in pieces:
-        made.append([])
+        renamed.append([])
         k = 0
         while k < len(piece):
             word = piece[k : k + 4]
@@ -284,11 +284,11 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
                 name = f"{word[0]}{word[2]}"
                 while name in used_names:
                     name = f"{word[0]}_{word[2]}" if "_" not in name else f"{name}_"
-                made[-1].append(names.setdefault((word[0], word[2]), name))
+                renamed[-1].append(names.setdefault((word[0], word[2]), name))
             else:
-                made[-1].append(piece[k])
+                renamed[-1].append(piece[k])
             k += 4 if is_indexed else 1
-    return made, [f"{name}[{index}] is called {short}" for (name, index), short in names.items()]
+    return renamed, [f"{name}[{index}] is called {short}" for (name, index), short in names.items()]
 
 
 def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:

@@ -83,7 +83,7 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         terms = [f"{'+' if signs[j] > 0 else '-'} x{j + 1}" for j in sorted(signs, key=lambda j: -signs[j])]
         text = " ".join(terms)
         rows.append(text.removeprefix("+ ") if text.startswith("+ ") else f"-{text.removeprefix('- ')}")
-    cross, is_full = n - 2 * k - 2, n == 2 * k + 1
+    cross_ratios, is_full = n - 2 * k - 2, n == 2 * k + 1
     # Known statements about the flow and the map, each with its status.
     facts = [
         "Classical: the flow is integrable, by k + 1 integrals for n = 2k + 1 and in general by those of LV(2k + 1, k) "
@@ -92,9 +92,9 @@ def lotka_volterra(n: int, k: int) -> dict[str, Any]:
         "(docs/mathematics.md).",
         "Proved: the sum of all x_i is conserved, as every affine integral of the flow is.",
     ]
-    if cross > 0:
+    if cross_ratios > 0:
         facts.append(
-            f"Proved: I2, ..., I{cross + 1} are cross-ratios of x{k + 1}, x{k + 1} + x{k + 2}, ..., conserved."
+            f"Proved: I2, ..., I{cross_ratios + 1} are cross-ratios of x{k + 1}, x{k + 1} + x{k + 2}, ..., conserved."
         )
     if k:
         where = "" if is_full else f" of LV({2 * k + 1},{k}), to which the map projects,"

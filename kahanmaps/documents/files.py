@@ -51,9 +51,9 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 class SystemFile(HtmlDisplay, LatexDisplay):
     """A system or map with the parameters and claims of its file.
 
-    `map` is the map, for a differential equation its Kahan map; `hamiltonian` and `member` are there when
-    the file (or the Python object it was made from) says so. `integrals` and `density` are claims: rational functions
-    in the variables and `eps`. `document` is the file as plain data, parameters not yet inserted.
+    `map` is the map, for a differential equation its Kahan map; `hamiltonian` and `member` are None unless the file (or
+    the Python object it was made from) declares them. `integrals` and `density` are claims: rational functions in the
+    variables and `eps`. `document` is the file as plain data, with names in place of the values of parameters.
     """
 
     name: str
@@ -171,7 +171,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def real_approximation(self) -> SystemFile:
-        """The file for floats: an algebraic parameter is replaced by a rational number close to it.
+        """The file for floating point: an algebraic parameter is replaced by a rational number close to it.
 
         Raises InputError if the number is not real.
         """
@@ -213,8 +213,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     @classmethod
     def from_hamiltonian(cls, hamiltonian: CubicHamiltonian, name: str = "system") -> SystemFile:
         """Return the file of a Hamiltonian system."""
-        normal_form: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
-        section = {"H": format_polynomial(hamiltonian.H), "J": normal_form}
+        structure: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
+        section = {"H": format_polynomial(hamiltonian.H), "J": structure}
         document = {"name": name, "variables": list(hamiltonian.variables), "hamiltonian": section}
         return cls(name, "hamiltonian", {}, KahanFamily(hamiltonian.system), hamiltonian, None, {}, None, document)
 
@@ -244,7 +244,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return parse_system(to_toml(document, ("name", "variables"), _SECTIONS), name)
 
     def to_toml(self) -> str:
-        """Return the file as text, which `parse_system` reads back equal."""
+        """Return the file as text, from which `parse_system` reads an equal file."""
         return to_toml(self.document, ("name", "variables"), _SECTIONS)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -321,9 +321,9 @@ def _decoded(text: str | bytes) -> str:
 def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
     """Look up a part of a composition: a "system" of the catalogue, or a "file" relative to `base`."""
     if key == "system":
-        made = family_member(name)
-        if made is not None:
-            return made[1], made[0], None
+        generated = family_member(name)
+        if generated is not None:
+            return generated[1], generated[0], None
         folder = resources.files("kahanmaps.documents").joinpath("catalog")
         for candidate in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
             if name.isidentifier() and candidate.is_file():
@@ -340,8 +340,8 @@ def _rows(matrix: fmpq_mat) -> list[list[str]]:
 def matched(file: SystemFile, other: SystemFile) -> tuple[MapFamily, str]:
     """Return the second of two maps in the variables of the first, and a note if they differ.
 
-    Variables are matched by name where the names agree, otherwise by position. Raises InputError for two dimensions,
-    and for maps other than Kahan's where variables would have to be exchanged.
+    Variables are matched by name where the names agree, otherwise by position. Raises InputError if the dimensions
+    differ, and for maps other than Kahan's whose variables have the same names in another order.
     """
     f, g = file.map, other.map
     if f.dim != g.dim:

@@ -48,24 +48,24 @@ EXPECTED = {
 }
 
 
-# Gives the document that a part of a composition names, by "file" or "system" and its value, with a name that no other
-# file has, and the same for the parts of it.
-Other = Callable[[str, str], tuple[dict[str, Any], str, Any]]
+# A function of the key ("file" or "system") and the value that name a part of a composition. It returns the document of
+# this part, a name that no other document has, and such a function for the parts of this document.
+LookUp = Callable[[str, str], tuple[dict[str, Any], str, Any]]
 
 
 class PartReader:
     """Reads the parts of a document: holds its names and the mistakes found so far."""
 
     def __init__(
-        self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], other: Other | None = None
+        self, document: dict[str, Any], where: str, overrides: Mapping[str, Any], look_up: LookUp | None = None
     ) -> None:
-        """`other` looks up the parts of compositions that are given by name."""
+        """`look_up` finds the parts of compositions that are given by name."""
         self.document = document
         self.where = where
         self.overrides = overrides
-        self.other = other
+        self.look_up = look_up
         self.inside: tuple[str, ...] = ()  # the files whose compositions this document is part of
-        self.parts = [0]  # how many were read in all
+        self.parts = [0]  # the number of parts read so far, in a list that the readers of all parts share
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
         self.has_bad_parameter = False  # a parameter could not be read: what depends on it is not checked

@@ -71,7 +71,7 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
 def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
     """The functions that "degree <= d" or a list of polynomials stands for, as exact polynomials in `variables`.
 
-    Raises InputError for anything else, for more than 100000 monomials, and for functions that are 0 or stand twice.
+    Raises InputError for anything else, for more than 100000 monomials, and for functions that are 0 or occur twice.
     Source: petrera-pfadler-suris-2009.
 
     >>> relation_functions(["x^2 + y^2", "1"], ["x", "y"])

@@ -67,7 +67,7 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
 
     Raises:
         InputError: for a name that is not a parameter, for right-hand sides that are not polynomials of degree at most
-            2 if the symbols are free, and for a member of the family, whose A and H must fit together at every value.
+            2 if the symbols are free, and for a member of the family, which would have to be one for all values.
 
     >>> from kahanmaps.documents.catalog import load
     >>> with_symbols(load("euler_top"), ["a1"]).rhs

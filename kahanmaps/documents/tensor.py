@@ -17,10 +17,10 @@ from kahanmaps.maps.kahan import SystemLike
 
 
 def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
-    """The system of a file over K = Q[t]/(chi), as a file over Q; a parameter t of the file is the generator of K.
+    """Convert the system of a file over K = Q[t]/(chi) to a file over Q; a parameter t of the file generates K.
 
-    Integrals and density are inherited, but where the file has a parameter t, which they may depend on, or where they
-    are too large to be written out. Raises InputError where the file holds no quadratic system.
+    The integrals and the density are converted as well, unless the file has a parameter t, on which they may depend, or
+    the results are too large. Raises InputError if the file contains no quadratic system.
 
     >>> from kahanmaps.documents.catalog import load
     >>> result = tensor_file(load("euler_top"), fmpq_poly([-2, 0, 1]))

@@ -52,17 +52,17 @@ class BatchCommands(AttributeHints):
 
     def export(self, db: str | Path, path: str | Path) -> None:
         """Write the results to a .csv, .jsonl or .parquet file."""
-        form = Path(path).suffix
-        if form not in (".csv", ".jsonl", ".parquet"):
-            raise InputError(f"found the suffix {form!r} of {path}, expected .csv, .jsonl or .parquet")
+        suffix = Path(path).suffix
+        if suffix not in (".csv", ".jsonl", ".parquet"):
+            raise InputError(f"found the suffix {suffix!r} of {path}, expected .csv, .jsonl or .parquet")
         with Store.open(db, readonly=True) as store:
             rows = partial(store.rows, None)
-            if form == ".parquet":
+            if suffix == ".parquet":
                 write_parquet(rows, str(path))
                 return
             with atomic_write(str(path)) as file:
                 stream: Any = codecs.getwriter("utf-8")(file)
-                if form == ".csv":
+                if suffix == ".csv":
                     write_csv(rows, stream)
                 else:
                     write_jsonl(rows(), stream)

@@ -54,8 +54,8 @@ def _read_digits(value: Any) -> None:
         raise ValueError(f"found {show(value)}, expected a whole number of digits, at least 1")
 
 
-# A shape is a function that raises ValueError; or a tuple of a type, a description, and the shape of the items of a
-# list or table, or a dict of shapes for the only keys of a table.
+# A shape is a function that raises ValueError, or a tuple of a type, a description and, for a list or a table, its
+# parts: either the shape that all items have, or a dict with the shapes of the allowed keys of a table.
 _ON_ERROR = (str, "refuse, or skip for systems that cannot be read")
 _LIMITS = (
     dict,
@@ -368,7 +368,7 @@ class ExperimentReader:
 
     def _read_zips(self, axes: Mapping[str, AxisValues]) -> list[tuple[str, ...]]:
         zips: list[tuple[str, ...]] = []
-        before: set[str] = set()
+        used: set[str] = set()
         given = {name for name, _, _ in self.entries("axes")}
         for number, names in enumerate(self._written_zips(), start=1):
             key = f"zip[{number}]"
@@ -378,14 +378,14 @@ class ExperimentReader:
             for name in unknown:
                 if name not in given:  # otherwise another mistake was reported
                     self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
-            twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
+            repeated = [name for k, name in enumerate(names) if name in names[:k] or name in used]
             if len(names) < 2:
                 self.mistake(key, f"found {show(names)}, expected at least two axes that run together")
                 continue
-            before |= set(names)
-            for name in twice:
+            used |= set(names)
+            for name in repeated:
                 self.mistake(key, f"found {name} twice, expected every axis in one zip at most")
-            if not unknown and not twice:
+            if not unknown and not repeated:
                 zips.append(tuple(names))
                 lengths = {name: len(axes[name]) for name in names}
                 if len(set(lengths.values())) > 1:
@@ -403,19 +403,19 @@ class ExperimentReader:
         return zips
 
     def _read_limits(self, kind: TaskKind, fixed: dict[str, AxisValues]) -> TaskLimits:
-        own = self.valid_value("limits") or {}
+        own_limits = self.valid_value("limits") or {}
         time, memory, digits = (
             self.valid_value("limits", name) or self.spec.valid_value("limits", name)
             for name in ("time", "memory", "digits")
         )
         key = self.given().get("max_digits")
-        if "digits" in own and self.valid_value("limits", "digits") is None:
+        if "digits" in own_limits and self.valid_value("limits", "digits") is None:
             pass  # reported with the shape
         elif "max_digits" not in kind.options:
-            if "digits" in own:
+            if "digits" in own_limits:
                 self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
         elif key is not None:
-            if "digits" in own:
+            if "digits" in own_limits:
                 self.mistake("limits.digits", f"found {key} as well, expected one of the two")
         elif digits is not None:
             fixed["max_digits"] = AxisValues(VOCABULARY["max_digits"], [(digits,)])

@@ -62,13 +62,13 @@ class TaskKind:
         """Perform the task; `options` are canonical, and `other` is a system."""
         options = dict(options)
         is_full = self.reports and options.pop(REPORT, False)
-        made = {
+        arguments = {
             name: value if value is None or name == OTHER else self.options[name].make(value)
             for name, value in options.items()
         }
-        if "eps" in self.required and made.get("eps") is None:  # omitted for maps that do not depend on eps
-            made["eps"] = self.options["eps"].make("1")
-        result = self.function(**made) if self.needs is None else self.function(system, **made)
+        if "eps" in self.required and arguments.get("eps") is None:  # omitted for maps that do not depend on eps
+            arguments["eps"] = self.options["eps"].make("1")
+        result = self.function(**arguments) if self.needs is None else self.function(system, **arguments)
         if isinstance(result, tuple):
             result, reported = result
             result |= {REPORT: reported.to_json()} if is_full else {}

@@ -118,45 +118,45 @@ def orbit(
     seed: int = 0,
 ) -> Result:
     """Compute an orbit: how it ended, its period, digits and last point."""
-    point = _drawn(system, seed) if start is None else start
-    numbers = Arithmetic.parse(arithmetic)
-    if numbers.kind == "float" and at is not None:
+    point = _random_start(system, seed) if start is None else start
+    parsed_arithmetic = Arithmetic.parse(arithmetic)
+    if parsed_arithmetic.kind == "float" and at is not None:
         raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
     normal_form: SystemNormalForm | NoNormalForm = NoNormalForm("as requested")
     if method != "generic" and system.is_quadratic:
-        normal_form = _float_normal_form(system, method) if numbers.kind == "float" else system.normal_form
-    walk = find_orbit(
+        normal_form = _float_normal_form(system, method) if parsed_arithmetic.kind == "float" else system.normal_form
+    trajectory = find_orbit(
         system.map,
         point,
         eps,
         steps=steps if at is None else None,
         at=at,
-        arithmetic=numbers,
+        arithmetic=parsed_arithmetic,
         method=method,
         max_digits=max_digits,
         normal_form=normal_form,
     )
-    reached = deque(walk, 1)
+    reached = deque(trajectory, 1)
     if not reached:  # perhaps none of the requested iterates was reached
-        first = walk.orbit.start
-        exact = numbers.kind == "exact"
-        reached.append(OrbitPoint(0, numbers.field, IntegerPoint.from_rationals(first) if exact else first))
+        first = trajectory.orbit.start
+        exact = parsed_arithmetic.kind == "exact"
+        reached.append(OrbitPoint(0, parsed_arithmetic.field, IntegerPoint.from_rationals(first) if exact else first))
     last = reached[0]
-    end = walk.end
+    end = trajectory.end
     result: Result = {
         "start": format_point(point),
-        "method": walk.method,
+        "method": trajectory.method,
         "status": end.status,
         "reached": end.steps,
         "ending": end.message,
     }
-    if numbers.kind != "float":
+    if parsed_arithmetic.kind != "float":
         result["period"] = end.period
     text = ",".join(last.text)
     if len(text) <= _MAX_POINT:
         result["last"] = text
     result["last_sha256"] = sha256(text.encode()).hexdigest()  # to compare two computations
-    if numbers.kind == "exact":
+    if parsed_arithmetic.kind == "exact":
         result["digits"] = last.digits
     return result
 
@@ -183,8 +183,8 @@ def ensemble(
     kernel = "numpy" if orbits * steps < _MIN_COMPILED else None
     run = FloatEnsemble(system.map, eps, starts, form=form, kernel=kernel, threads=1)
     run.advance(steps)
-    words, counts = run.status.tolist(), Counter(run.status.tolist())
-    alive = [k for k, word in enumerate(words) if word == "completed"]
+    statuses, counts = run.status.tolist(), Counter(run.status.tolist())
+    alive = [k for k, word in enumerate(statuses) if word == "completed"]
     return {
         "method": chosen.name,
         **{word: counts[word] for word in ("completed", "overflow", "singular")},
@@ -204,7 +204,7 @@ def heights(
     seed: int = 0,
 ) -> Result:
     """Measure the growth of the heights along an orbit: its kind and constant."""
-    point = _drawn(system, seed) if start is None else start
+    point = _random_start(system, seed) if start is None else start
     growth = height_growth(
         system.map.at(eps), point, steps, normal_form=system.normal_form, every=every, max_digits=max_digits
     )
@@ -224,7 +224,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
     normal_form = system.normal_form
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"no period of {system.name} can be computed: {normal_form.reason}")
-    point = _drawn(system, seed) if start is None else start
+    point = _random_start(system, seed) if start is None else start
     result = period_of(normal_form, eps, point, prime)
     return {
         "start": format_point(point),
@@ -235,7 +235,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
     }
 
 
-def _drawn(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
+def _random_start(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
     """Return a random initial point that depends on the system too: a fixed one may be special for some systems."""
     return next(random_starts(system.dim, derive_seed(seed, system.map.subject)))
 

@@ -66,9 +66,9 @@ class PlanarPart:
     @property
     def D(self) -> fmpq_mpoly:
         """h_uu h_vv - h_uv^2; the Kahan map of this system conserves h/(1 + eps^2 D)."""
-        slope = self.h.derivative
-        mixed = slope(0).derivative(1)
-        return slope(0).derivative(0) * slope(1).derivative(1) - mixed * mixed
+        derivative = self.h.derivative
+        mixed = derivative(0).derivative(1)
+        return derivative(0).derivative(0) * derivative(1).derivative(1) - mixed * mixed
 
     @property
     def D_text(self) -> str:
@@ -189,11 +189,11 @@ class NormalForm(HtmlDisplay, ResultPart):
     def parts(self) -> tuple[PlanarPart, ...]:
         """The planar systems at the rational roots of chi, by increasing root; m of them if chi splits over Q."""
         u, v = ring(["u", "v"]).gens()
-        slope = self.chi.derivative()
+        chi_prime = self.chi.derivative()
         parts = []
         for root in sorted(-factor[0] / factor[1] for factor, _ in self.chi.factor()[1] if factor.degree() == 1):
             a, b, c, d = (coefficient(root) for coefficient in self.coefficients)
-            parts.append(PlanarPart(root, 1 / slope(root), a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3))
+            parts.append(PlanarPart(root, 1 / chi_prime(root), a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3))
         return tuple(parts)
 
     @property
@@ -234,9 +234,9 @@ class NormalForm(HtmlDisplay, ResultPart):
         a, b, c, d = self.coefficients
         table = [self._functional_of_powers(third, 3 * m - 2) for third in (6 * a, 2 * b, 2 * c, 6 * d)]
         # The trilinear form in the coordinates z: one matrix for each column of S.
-        turned, tensors = self.S.transpose(), third_derivatives(self.H)
-        for i, column in enumerate(turned.tolist()):
-            third = turned * combination_of(column, tensors) * self.S
+        transposed, tensors = self.S.transpose(), third_derivatives(self.H)
+        for i, column in enumerate(transposed.tolist()):
+            third = transposed * combination_of(column, tensors) * self.S
             expected = [
                 table[(i >= m) + (j >= m) + (k >= m)][i % m + j % m + k % m] for j in range(n) for k in range(n)
             ]

@@ -49,10 +49,10 @@ def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: 
     for i in range(m):
         u, v = forms[i], forms[m + i]
         a = b = c = d = 0
-        while _discriminant(a, b, c, d) == 0:  # or the map would not be a genuine one
+        while _discriminant(a, b, c, d) == 0:  # a cubic with a double root is special
             a, b, c, d = (rng.randint(-size, size) for _ in range(4))
         H += a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3
-    return FamilyMember(_hidden(normal, S), H)
+    return FamilyMember(_in_original_coordinates(normal, S), H)
 
 
 def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
@@ -80,7 +80,7 @@ def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMe
             coefficient = fmpq(1) if k == m - 1 else chi[k + 1]
             Y[k - j] = Y[k - j] + coefficient * forms[m + j]
     drawn: list[list[int]] = []
-    # The discriminant is to be invertible: a genuine map on the part of every factor.
+    # The discriminant has to be invertible: then the cubic has no double root at any root of chi.
     while not drawn or _discriminant(*map(fmpq_poly, drawn)).gcd(chi).degree() != 0:
         drawn = []
         while len(drawn) < 4:
@@ -92,7 +92,7 @@ def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMe
     a, b, c, d = elements
     h = a * X_**3 + b * X_**2 * Y_ + c * X_ * Y_**2 + d * Y_**3
     H = components(h, split_names(["X", "Y"], m), chi)[m - 1].compose(*forms[:m], *Y, ctx=zero.context())
-    return FamilyMember(_hidden(normal, S), H)
+    return FamilyMember(_in_original_coordinates(normal, S), H)
 
 
 def random_member(m: int, seed: int, size: int = 1) -> FamilyMember:
@@ -134,7 +134,7 @@ def random_eigenvalues(m: int, seed: int) -> list[int]:
     return random.Random(f"eigenvalues {seed}").sample(values, m)
 
 
-def _hidden(normal: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
+def _in_original_coordinates(normal: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
     """A in the coordinates x = S z: Hess_x = S^{-T} Hess_z S^{-1}, so A_x = S^{-T} A_z S^T."""
     return symplectic_inverse(S).transpose() * normal * S.transpose()
 

@@ -120,8 +120,8 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     conditions: list[fmpz_mat] = [(third * J).numer_denom()[0] for third in third_derivatives(H)]
     # A few random combinations of the conditions are almost always equivalent to all of them.
     rng = random.Random(n)
-    few = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
-    for chosen in (few, conditions):
+    combinations = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
+    for chosen in (combinations, conditions):
         solutions = _skew_solutions(chosen, n)
         products = (S * condition for S in solutions for condition in conditions)
         if all(product == product.transpose() for product in products):
@@ -163,7 +163,7 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     space = structure_space(H)
     if len(space) == 1 and hamiltonian.dim > 2:
         return None
-    return FamilyStructure(hamiltonian, FamilyMember(_furthest(space), H), T, len(space))
+    return FamilyStructure(hamiltonian, FamilyMember(_with_most_eigenvalues(space), H), T, len(space))
 
 
 def find_cubic_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
@@ -246,7 +246,7 @@ class _Part:
     factor: fmpq_poly
 
 
-def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
+def _with_most_eigenvalues(space: Sequence[fmpq_mat]) -> fmpq_mat:
     """Return an element with as many distinct eigenvalues as possible and small entries."""
     parts = list(_parts(space, QQ.identity(space[0].nrows())))
     A = fmpq_mat(space[0].nrows(), space[0].nrows())
@@ -254,12 +254,14 @@ def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
     simple = sorted((part for part in parts if part.factor.degree() == 1), key=lambda part: -_size(part.E))
     for value, part in enumerate(simple, start=1):
         A = A + part.E * value + part.X
-    taken: list[fmpq_poly] = []
+    used_factors: list[fmpq_poly] = []
     for part in parts:
         if part.factor.degree() > 1:
             shifts = (k // 2 if k % 2 else -(k // 2) for k in itertools.count(1))  # 0, -1, 1, -2, ...
-            shift, shifted = next((c, moved) for c in shifts if (moved := part.factor(fmpq_poly([-c, 1]))) not in taken)
-            taken.append(shifted)
+            shift, shifted = next(
+                (c, moved) for c in shifts if (moved := part.factor(fmpq_poly([-c, 1]))) not in used_factors
+            )
+            used_factors.append(shifted)
             A = A + part.X + part.E * shift
     return A
 
@@ -274,20 +276,22 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
             for piece in pieces:
                 yield from _parts(space, piece)
             return
-    own = _reduced([E * X * E for X in space])
-    if len(own) == 1:
+    part_basis = _reduced([E * X * E for X in space])
+    if len(part_basis) == 1:
         yield _Part(E, E * 0, _T)
         return
     # In a commutative algebra the trace form has the rank of its semisimple part, the number of roots to be found.
-    is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(own, 2))
-    flat, turned = (fmpq_mat([M.entries() for M in Ms]) for Ms in (own, [X.transpose() for X in own]))
-    target = rank(QQ, flat * turned.transpose()) if is_commutative else 0
+    is_commutative = all(X * Y == Y * X for X, Y in itertools.combinations(part_basis, 2))
+    flat, transposed = (
+        fmpq_mat([M.entries() for M in matrices]) for matrices in (part_basis, [X.transpose() for X in part_basis])
+    )
+    target = rank(QQ, flat * transposed.transpose()) if is_commutative else 0
     parts: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
-    rng = random.Random(len(own))
+    rng = random.Random(len(part_basis))
     # The basis, then combinations with small coefficients, which grow slowly.
     bounds = (count // _DRAWS - 1 for count in itertools.count(2 * _DRAWS))
-    combinations = (combination_of([rng.randint(-bound, bound) for _ in own], own) for bound in bounds)
-    for tried, X in enumerate(itertools.chain(own, combinations)):
+    combinations = (combination_of([rng.randint(-bound, bound) for _ in part_basis], part_basis) for bound in bounds)
+    for tried, X in enumerate(itertools.chain(part_basis, combinations)):
         if len(pieces := _projections(X, E)) > 1:
             for piece in pieces:
                 yield from _parts(space, piece)
@@ -299,7 +303,7 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
         for Y, minimal in _variants(X, E, polynomial):
             height = sum(map(bits_of, minimal.coeffs()))
             parts.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
-        if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in parts) >= target:
+        if tried >= len(part_basis) + _DRAWS and max(key[0] for key, _, _ in parts) >= target:
             break
     _, X, polynomial = max(parts, key=lambda choice: choice[0])
     is_field = polynomial.degree() > 1

@@ -163,9 +163,9 @@ def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
 def centroid(system: QuadraticSystem) -> list[fmpq_mat]:
     """Return a reduced integral basis of all C with C f'(x) = f'(x) C for all x, by exact linear algebra."""
     n = system.dim
-    slopes = [system.B, *(fmpq_mat(n, n, [q[j, k] for q in system.Q for j in range(n)]) for k in range(n))]
+    derivatives = [system.B, *(fmpq_mat(n, n, [q[j, k] for q in system.Q for j in range(n)]) for k in range(n))]
     rows = []
-    for S in slopes:
+    for S in derivatives:
         for i, j in itertools.product(range(n), repeat=2):
             row = [fmpq(0)] * (n * n)
             for k in range(n):  # (C S - S C)_ij
@@ -182,8 +182,8 @@ def centroid(system: QuadraticSystem) -> list[fmpq_mat]:
 def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
     """Return whether C f'(x) = f'(x) C as polynomials in x, by the linear part B and each constant matrix df'/dx_k."""
     n = f.dim
-    slopes = (fmpq_mat(n, n, [q[j, k] for q in f.Q for j in range(n)]) for k in range(n))
-    return C * f.B == f.B * C and all(C * S == S * C for S in slopes)
+    derivatives = (fmpq_mat(n, n, [q[j, k] for q in f.Q for j in range(n)]) for k in range(n))
+    return C * f.B == f.B * C and all(C * S == S * C for S in derivatives)
 
 
 def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:

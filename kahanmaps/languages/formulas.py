@@ -106,8 +106,10 @@ class Formulas:
             yield f"integral {name}", f"x^T M x~/eps with M = {matrix_text}", function
         if not self.forms:
             images = (*x, *generators[2 * n : -1])
-            slopes = [self.H.derivative(k).compose(*images, ctx=context) for k in range(n)]
-            change = sum((slope * (b - a) for slope, a, b in zip(slopes, x, y, strict=True)), context.constant(0))
+            derivatives = [self.H.derivative(k).compose(*images, ctx=context) for k in range(n)]
+            change = sum(
+                (derivative * (b - a) for derivative, a, b in zip(derivatives, x, y, strict=True)), context.constant(0)
+            )
             function = RationalFunction(self.H.compose(*images, ctx=context) + change / 3, context.constant(1))
             yield "modified_hamiltonian", "H + grad H . (x~ - x)/3, where f = J grad H", function
 

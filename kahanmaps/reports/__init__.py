@@ -1,1 +1,1 @@
-"""Pages about a system, a member of the family or a batch: one HTML file, with nothing to be fetched."""
+"""HTML pages about a system or a member of the family, each a single file that needs no network."""

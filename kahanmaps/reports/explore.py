@@ -30,9 +30,9 @@ _MAX_VARIABLES = 12
 
 
 def explore_sections(analysis: Analysis) -> list[Section]:
-    """The sections of the page about what `analyze` found, with an orbit that its reader moves.
+    """Return the sections of a page with the verdict and the integrals of `analyze`, and an orbit that sliders change.
 
-    Raises InputError where a map has too many variables or terms for a browser to follow the slider.
+    Raises InputError if the map has too many variables or terms for a browser.
     """
     data, final = explore_data(analysis), analysis.conclusion
     names, reach, eps = data["variables"], data["reach"], data["eps"]
@@ -80,12 +80,12 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
     if file.hamiltonian is not None and "H" not in {name for name, *_ in functions}:
         H = file.hamiltonian.H
         functions.append(("H", RationalFunction(H, H.context().constant(1)), "of the flow"))
-    watched = []
+    plotted = []
     for name, function, certainty in functions:
         sides = [_terms(part, names, file.parameters) for part in (function.numerator, function.denominator)]
         if sum(map(len, sides)) <= _MAX_TERMS:
             text = format_rational_function(function)
-            watched.append(
+            plotted.append(
                 {"name": name, "text": text, "word": certainty, "numerator": sides[0], "denominator": sides[1]}
             )
     if file.is_quadratic:  # an initial point with a bounded orbit, in the middle of those of a portrait
@@ -101,7 +101,7 @@ def explore_data(analysis: Analysis) -> dict[str, Any]:
         "eps_moves": analysis.eps is None,
         "start": [float(f"{value:.4g}") for value in start],
         "reach": reach,
-        "functions": watched,
+        "functions": plotted,
     }
 
 

@@ -139,12 +139,12 @@ def mathml(latex: str) -> str:
     from latex2mathml.converter import convert
 
     # A name of several letters would look like a product: set it upright, with space around it.
-    known = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
-    known = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", known)
+    prepared = _WORDS.sub(lambda word: word[0] if word[0][0] == "\\" else rf"\mathrm{{{word[0]}}}", latex)
+    prepared = re.sub(r"(?<=[\w}]) (?=\\mathrm)|(?<=[A-Za-z]{2}\}) (?=[A-Za-z\\(])", r" \\, ", prepared)
     for command, other in _TEXT_COMMANDS.items():
-        known = known.replace(command, other)
+        prepared = prepared.replace(command, other)
     try:
-        text = convert(known)
+        text = convert(prepared)
         is_known = all(re.match(r"\\\w", element.text or "") is None for element in ElementTree.fromstring(text).iter())
     except Exception:  # one of latex2mathml's own, KeyError, IndexError or ParseError
         is_known = False

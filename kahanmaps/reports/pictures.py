@@ -58,8 +58,8 @@ class Pictures:
     ) -> str:
         """Return a <figure> with the picture made by `drawing`; `name` is its id, `alt` its text alternative.
 
-        `drawing` may append `remarks`, which are printed below the caption. The answer is empty without pictures, and
-        the reason where the picture cannot be drawn.
+        `drawing` may append `remarks`, which are printed below the caption. Returns an empty text if no pictures are
+        requested, and the reason if the picture cannot be drawn.
         """
         if not self._requested:
             return ""
@@ -68,10 +68,12 @@ class Pictures:
             for axes in figure.axes:
                 # Rasterize artists with many points; axes and letters stay vectors.
                 lines: list[Any] = list(axes.lines)
-                clouds: list[Any] = list(axes.collections)
-                points = sum(len(line.get_xdata()) for line in lines) + sum(len(dots.get_offsets()) for dots in clouds)
+                collections: list[Any] = list(axes.collections)
+                points = sum(len(line.get_xdata()) for line in lines) + sum(
+                    len(dots.get_offsets()) for dots in collections
+                )
                 if points > _MAX_ELEMENTS:
-                    for artist in (*lines, *clouds):
+                    for artist in (*lines, *collections):
                         artist.set_rasterized(True)
             svg = svg_text(figure, name, _STYLE, alt)
         except KahanmapsError as error:

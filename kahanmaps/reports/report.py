@@ -65,7 +65,7 @@ def report_html(
         pictures: whether to draw pictures; without matplotlib a note says how to install it.
         command: the command line that creates the page, printed on the page.
         left_out: sentences on omitted results, printed as notes.
-        certificate: the path of a file that `certificate` wrote, relative to the page, which links it.
+        certificate: the path of a file that `certificate` wrote, relative to the page; the page links to it.
         explore: for an Analysis, add sliders for eps and the initial point of an orbit instead of the results.
 
     Returns:
@@ -177,7 +177,7 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
     formulas = formulas_of(analysis)
     for name, lines in analysis.sections:
         statements = [(Html(markup.verdict(line.status)), formulas.get(line.text, line.text)) for line in lines]
-        pieces, folded = _beside(analysis, name, pictures)
+        pieces, folded = _pictures_and_tables(analysis, name, pictures)
         title = name[0].upper() + name[1:]
         section = Section(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
         sections.append(section)
@@ -214,7 +214,9 @@ def _catalogue(file: SystemFile) -> Section:
     )
 
 
-def _beside(analysis: Analysis, name: str, pictures: Pictures) -> tuple[list[Html], list[tuple[str, Html]]]:
+def _pictures_and_tables(
+    analysis: Analysis, name: str, pictures: Pictures
+) -> tuple[list[Html], list[tuple[str, Html]]]:
     """Return the pictures and folded tables below the statements of a section."""
     drawn: list[str] = []
     folded: list[tuple[str, Html]] = []

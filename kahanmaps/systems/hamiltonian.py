@@ -97,11 +97,11 @@ class CubicHamiltonian(LatexDisplay):
         that grad H has the same value at all of them.
         """
         n, zero = self.dim, (0,) * self.dim
-        affine = [slope.derivative(j) for i, slope in enumerate(self.gradient) for j in range(i + 1)]
+        affine = [component.derivative(j) for i, component in enumerate(self.gradient) for j in range(i + 1)]
         rows = [[*(entry.derivative(k)[zero] for k in range(n)), entry[zero]] for entry in affine]
         # c = 0 where that is a solution: all but the last of the columns without pivot are zero in this vector.
         last = next((v for v in nullspace(QQ, fmpq_mat(rows)) if v[n] != 0), None)
-        if last is None or any(evaluate(slope, QQ, last[:n]) != 0 for slope in self.gradient):
+        if last is None or any(evaluate(component, QQ, last[:n]) != 0 for component in self.gradient):
             return None
         return last[:n]
 

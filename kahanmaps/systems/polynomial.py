@@ -58,8 +58,8 @@ class PolynomialField:
         """
         context = function.context()
         images = context.gens()[: self.dim + len(self.symbols)]
-        slopes = (p.compose(*images, ctx=context) * function.derivative(i) for i, p in enumerate(self.rhs))
-        return sum(slopes, context.constant(0))
+        derivatives = (p.compose(*images, ctx=context) * function.derivative(i) for i, p in enumerate(self.rhs))
+        return sum(derivatives, context.constant(0))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, PolynomialField):

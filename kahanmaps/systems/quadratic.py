@@ -114,7 +114,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return QuadraticSystem(tuple(polynomial * by for polynomial in self.rhs), self.symbols)
 
     def transformed(self, matrix: fmpq_mat) -> QuadraticSystem:
-        """The system x' = C f(x) for a constant matrix C = `matrix`."""
+        """Return the system x' = C f(x) for a constant matrix C = `matrix`."""
         return QuadraticSystem(linear_combinations(matrix, self.rhs), self.symbols)
 
     def composed(self, matrix: fmpq_mat, shift: Sequence[fmpq]) -> QuadraticSystem:
@@ -165,9 +165,9 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         return [[p.derivative(k).compose(*images, ctx=context) for k in range(self.dim)] for p in self.rhs]
 
     def over(self, field_of_numbers: Field, values: Sequence[Any] = ()) -> SystemOver:
-        """The system over a field, with elements of the field for the symbols.
+        """Return the system over a field, with elements of the field for the symbols.
 
-        Raises BadPrime where GF(p) does not allow it.
+        Raises BadPrime if the prime divides the denominator of a coefficient.
         """
         if self.symbols:
             return SystemOver.of(field_of_numbers, self, values)
@@ -200,7 +200,7 @@ class SystemOver:
     tensor: Any
     B: Any = None
     c: Any = None
-    exact: QuadraticSystem | None = None  # the rational system without symbols that this is, in a field
+    exact: QuadraticSystem | None = None  # the system over Q from which this was made, if it has no symbols
 
     def __post_init__(self) -> None:
         n, field = self.dim, self.field
@@ -211,7 +211,10 @@ class SystemOver:
 
     @classmethod
     def of(cls, field: Field, system: QuadraticSystem, values: Sequence[Any] = ()) -> SystemOver:
-        """A system with its symbols at these elements of the field. Raises BadPrime where a coefficient has none."""
+        """Return the system over a field, with elements of the field for its symbols.
+
+        Raises BadPrime if the prime divides the denominator of a coefficient.
+        """
         n, zero = system.dim, field.zero
         tensor, linear, constants = [zero] * n**3, [zero] * (n * n), [zero] * n
 
@@ -247,20 +250,22 @@ class SystemOver:
         return int(self.tensor.ncols())
 
     def transformed(self, matrix: Any) -> SystemOver:
-        """The system x' = C f(x) for a constant matrix C = `matrix` over the field."""
+        """Return the system x' = C f(x) for a constant matrix C = `matrix` over the field."""
         n, field = self.dim, self.field
         with field.working():
             rows = matrix * field.matrix(n, n * n, self.tensor.entries())
             return SystemOver(field, field.matrix(n * n, n, rows.entries()), matrix * self.B, matrix * self.c)
 
     def hessian_times(self, vector: Sequence[Any]) -> Any:
-        """The matrix f''(v), with f'(x + v) = f'(x) + f''(v)."""
+        """Return the matrix f''(v), with f'(x + v) = f'(x) + f''(v)."""
         with self.field.working():
-            first, *others = (slope * self.field.convert(v) for slope, v in zip(self._slopes, vector, strict=True))
+            first, *others = (
+                derivative * self.field.convert(v) for derivative, v in zip(self._derivatives, vector, strict=True)
+            )
             return sum(others, first)
 
     @cached_property
-    def _slopes(self) -> list[Any]:
+    def _derivatives(self) -> list[Any]:
         """The derivatives of f' by each variable; f''(v) as their sum costs a third of a product with the tensor."""
         n, entries = self.dim, self.tensor.entries()
         with self.field.working():
@@ -272,7 +277,7 @@ class SystemOver:
             return self.hessian_times(point) + self.B
 
     def value(self, point: Sequence[Any]) -> tuple[Any, ...]:
-        """f(x)."""
+        """Return f(x)."""
         if self.exact is None:
             return self.polarised(point, point)
         return tuple(evaluate(polynomial, self.field, point) for polynomial in self.exact.rhs)

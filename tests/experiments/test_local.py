@@ -25,7 +25,7 @@ from small_databases import exported, recorded, until
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.results.records import Job, Outcome, Record, Task, TaskLimits
 from kahanmaps.experiments.results.store import Store
-from kahanmaps.experiments.running.cluster import do_group
+from kahanmaps.experiments.running.cluster import run_group
 from kahanmaps.experiments.running.local import TRIES, LocalWorkers, WorkersError, failure, is_from_outside
 from kahanmaps.experiments.running.run import Batch, run
 
@@ -334,7 +334,7 @@ def test_the_command_of_a_cluster_hands_a_lost_task_back_at_once_for_another_mac
     limits = {"time": 20, "memory": None}
     text = json.dumps({"documents": {}, "jobs": [{"task": job.task.text, "limits": limits} for job in jobs]})
     said = io.StringIO()
-    do_group(io.StringIO(text), said)
+    run_group(io.StringIO(text), said)
     assert [json.loads(line)["outcome"] for line in said.getvalue().splitlines()] == ["lost", "ok"]
     assert tries(tmp_path, signal.SIGTERM, ALWAYS) == 1
 

@@ -383,7 +383,7 @@ def _require_experiments(only: Sequence[str], known: Sequence[str]) -> None:
 def _print_status(data: Mapping[str, Any]) -> None:
     """Print a line for each experiment."""
     rows = data["experiments"]
-    kinds = ["ok", *(kind for kind in lib.KEPT[1:] if any(row["outcomes"].get(kind) for row in rows))]
+    kinds = ["ok", *(kind for kind in lib.STORED_OUTCOMES[1:] if any(row["outcomes"].get(kind) for row in rows))]
     verdicts = [verdict for verdict in lib.VERDICTS if any(row["verdicts"].get(verdict) for row in rows)]
     table = [["experiment", "tasks", "missing", *kinds, *verdicts, "time"]]
     for row in rows:

@@ -86,8 +86,8 @@ def command(name: str) -> click.Command:
     indented = [line if line.startswith("kahanmaps ") else f"    {line}" for line in lines]
     examples = "\n".join(["\b", *(f"  {line}" for line in indented)])
     help_text = "\n\n".join([check.headline, examples, cleandoc(check.text), _STATUS.format(check.outcome)])
-    made: click.Command = click.command(name, cls=kind, help=help_text)(run)
-    return made
+    click_command: click.Command = click.command(name, cls=kind, help=help_text)(run)
+    return click_command
 
 
 class _PairCommand(click.Command):

@@ -59,9 +59,10 @@ def command(system: str | None, **options: Any) -> int:
     The images of the exceptional hypersurfaces, those that the map contracts, are followed. From their singularity
     patterns the degrees of all iterates are derived: generating function, recurrence and dynamical degree. (Long
     compositions are followed map by map.) One line for each exceptional hypersurface says at which steps it lowers the
-    degree, in which exceptional hypersurfaces its images lie, and whether it is confined. Where no law can be derived,
-    a recurrence is accepted if it holds for at least 2 terms more than determine it, with enough terms beyond the last
-    confinement; otherwise there is only an estimate. "no confinement" comes with the number of steps tried.
+    degree, in which exceptional hypersurfaces its images lie, and whether it is confined. If the degrees cannot be
+    derived, a recurrence is accepted if it holds for at least 2 terms more than are needed to determine it, and for
+    enough terms beyond the last confinement; otherwise there is only an estimate. After "no confinement" the output
+    gives the number of steps that were tried.
 
     In the plane a dynamical degree above 1 is proved, and its bounds are exact. The growth of monomial maps is proved
     by powers of the exponent matrix, and that of maps with an iterate of degree 1 by composing formulas.
@@ -72,7 +73,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 a recurrence was found, or all requested terms were measured, or the iterates become undefined or
     constant; 2 usage error; 3 undecided, or stopped early.
     """
-    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:
         growth = measure(file, eps, options, search)

@@ -60,16 +60,16 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
     Exit status: 0 all orbits completed, 2 usage error, 3 some ended early, 130 interrupted.
     """
-    _require_sense(system, options)
+    _require_consistent(system, options)
     file = opt.load_system(system, {**options, "quiet": quiet})
     integrals = lib.functions_along(file, options["integrals"], in_floats=True)
     eps = opt.eps_of(file, options)
-    number = lib.rational(1) if eps is None else eps
-    file.map.at(number)  # raises the same errors for eps as the command orbit
+    eps_value = lib.rational(1) if eps is None else eps
+    file.map.at(eps_value)  # raises the same errors for eps as the command orbit
     starts = requested_starts(file, options)
     normal_form = normal_form_for(file, options["method"])
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
-    value = lib.to_float(number)  # backward too: the inverse has the same integrals
+    value = lib.to_float(eps_value)  # backward too: the inverse has the same integrals
 
     def of_point(claimed: Any) -> Callable[[Sequence[float]], float | None]:
         in_floats = lib.float_function(claimed.function)
@@ -79,7 +79,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     is_short_run = steps * (30 * min(len(starts), 20) + len(starts)) < _MIN_COMPILED_WORK
     ensemble = lib.FloatEnsemble(
         file.map,
-        number,
+        eps_value,
         starts,
         form=form,
         kernel="numpy" if options["kernel"] is None and is_short_run else options["kernel"],
@@ -152,7 +152,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     return 130 if ensemble.step < steps else 0 if results["counts"]["completed"] == ensemble.n else 3
 
 
-def _require_sense(system: str | None, options: dict[str, Any]) -> None:
+def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
     """Raise UsageError for options that contradict each other or are out of range."""
     steps, every, output = options["steps"], options["every"], options["output"]
     if (options["starts"] is None) == (options["count"] is None):

@@ -281,17 +281,17 @@ def associated(
 
     If a factor g of chi is irreducible of degree 2 or more, the list also contains those over Q[t]/g that have the
     other sign only at one root t of g: systems with the parameter t, "root of g". All other associated systems are
-    conjugates of these and products of them.
+    conjugates of these, or belong to products of their matrices B_s.
     """
     file, member = _member(system, parameters)
     written: dict[str, lib.SystemFile] = {}
 
-    def with_file(row: dict[str, Any], suffix: str, made: Callable[[str], lib.SystemFile]) -> dict[str, Any]:
+    def with_file(row: dict[str, Any], suffix: str, make_file: Callable[[str], lib.SystemFile]) -> dict[str, Any]:
         if write_to is None:
             return row
         text = "".join("p" if sign > 0 else "m" for sign in row["signs"])
         path = Path(write_to) / f"{file_name(file.name)}-{text}{suffix}.toml"
-        written[str(path)] = made(path.stem)
+        written[str(path)] = make_file(path.stem)
         will_write(str(path))
         return {**row, "file": str(path)}
 

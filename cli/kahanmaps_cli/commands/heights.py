@@ -77,7 +77,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 if all decided orbits agree, 2 for a usage error, 3 if no orbit is decided, the orbits disagree, or
     the work limit was reached.
     """
-    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     require_heights(options)
 
     def cell(file: lib.SystemFile, search: SearchProgress) -> Cell:

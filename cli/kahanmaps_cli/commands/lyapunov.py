@@ -22,8 +22,12 @@ _DEFAULT_STARTS = 16
 @opt.system_options
 @opt.random_starts_options
 @opt.eps_options
-@click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of counted steps.")
-@click.option("--transient", type=int, metavar="K", help="Number of uncounted steps before (default: N/10).")
+@click.option(
+    "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps for the means."
+)
+@click.option(
+    "--transient", type=int, metavar="K", help="Number of steps before these, which are not used (default: N/10)."
+)
 @opt.seconds_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:

@@ -51,10 +51,12 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @click.option(
     "--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="Correct digits for ball:auto; default 15."
 )
-@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Kernel for float orbits; numba needs [fast].")
+@click.option(
+    "--kernel", type=click.Choice(("numpy", "numba")), help="Kernel for float orbits; numba needs kahanmaps[fast]."
+)
 @opt.integral_option(
-    "Add a column with a function: an expression in the variables and eps, the name of an integral of the file, or "
-    "known for all integrals that follow from theorems (not in floats)."
+    "Add a column with a function: an expression in the variables and eps, the name of an integral of the file, or, "
+    "except with --arithmetic float, known for all integrals that follow from theorems."
 )
 @click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default: by the suffix of FILE, otherwise text.")
@@ -81,16 +83,15 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     SYSTEM may also be another map than Kahan's; --eps is not needed if the map does not depend on it.
     Ctrl-C stops after the current step and leaves a valid file; pressed again, it stops at once.
 
-    For members of the commuting family steps are computed in normal form, and --at computes an iterate directly, by
-    doublings: modulo P and in balls even for steps of thirty digits. Then poles at steps in between are not noticed,
-    except over Q.
+    For members of the commuting family steps are computed in normal form, and --at N computes the N-th iterate
+    directly, by doublings; modulo P and in balls N may have thirty digits. Over Q indeterminacy points before step N
+    are detected; modulo P and in balls they are not.
 
-    --integral adds a column: an expression, the name of an integral of the file, or known for all integrals that
-    follow from theorems (not in floats).
+    --integral adds a column with the values of a function.
 
     Exit status: 0 done, 2 usage error, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
-    _require_sense(options)
+    _require_consistent(options)
     output = None if output == "-" else output
     form = _form(options, output)
     options["quiet"] = quiet
@@ -162,7 +163,7 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
     return 3 if is_unread else _STATUS.get(end.status, 3)
 
 
-def _require_sense(options: dict[str, Any]) -> None:
+def _require_consistent(options: dict[str, Any]) -> None:
     """Raise UsageError for options that contradict each other."""
     steps, at = options["steps"], options["at"]
     if (steps is None) == (at is None):

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.options import eps_options, load_system, output_options, requested_eps, system_options
 from kahanmaps_cli.params import Arithmetic, PointText
 from kahanmaps_cli.screen.progress import print_stderr
 from kahanmaps_cli.screen.render import envelope, print_json, record_of
@@ -51,8 +51,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     Modulo P this order is computed; over Q the orbit is proved periodic or aperiodic.
 
     The command also recognizes systems of the family that are not declared as such. The translation is defined at
-    indeterminacy points of the map too: if the orbit meets one, the period is that of the continued orbit, and the
-    output says so.
+    indeterminacy points of the map too: if the orbit meets one, the output says so, and gives the period under the
+    translation.
 
     --levels N prints the polynomial psi_N: its roots gamma = 1 - disc(h) level^2 are the levels whose period is N or a
     divisor of N. It also prints the rational gamma with period N; with SYSTEM and eps also these levels in each plane
@@ -72,7 +72,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     no_period, normal_form = f"no period of {file.name} can be computed", file.normal_form
     if not file.is_quadratic and isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(f"{no_period}: {normal_form.reason}. {_WALK}")
-    eps = the_eps(options["eps"], options["time_step"])
+    eps = requested_eps(options["eps"], options["time_step"])
     # Check eps, prime and initial point as for orbits, with the same messages.
     file.map.at(eps, lib.GF(prime) if kind == "mod" else lib.QQ).point(options["start"])
     if isinstance(normal_form, lib.NoNormalForm):
@@ -137,7 +137,7 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
         if isinstance(normal_form, lib.NoNormalForm):
             reason = normal_form.reason if file.is_quadratic else "it is no Kahan map"
             raise lib.InputError(f"no levels of {file.name} can be computed: {reason}")
-        eps = the_eps(options["eps"], options["time_step"])
+        eps = requested_eps(options["eps"], options["time_step"])
         data |= {
             "system": file.name,
             "eps": lib.format_number(eps),

@@ -74,14 +74,15 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps report euler_top --explore -o explore.html
       kahanmaps report --from verify --m 2 -o paper.html
 
-    --from analyze shows the verdict, what the map preserves and how it grows; --from verify the claims of the paper for
-    a member of the family, by sections; --from checks those of the four checks that apply. The page is a single file
-    with its pictures and the command that made it; it needs neither network nor JavaScript. With --explore it has
-    sliders for eps and the initial point beside the exact verdict; with --eps given, only for the initial point.
+    --from analyze shows the results of `analyze`: the verdict, what the map preserves, and how fast its iterates grow
+    in complexity. --from verify shows the claims of the paper for a member of the family, by sections. --from checks
+    shows the results of the checks that apply to the system. The page is a single file with its pictures and the
+    command that made it; it needs neither network nor JavaScript. With --explore it has sliders for eps and the initial
+    point beside the exact verdict; with --eps given, only for the initial point.
 
-    --certificate FILE also writes the proofs of `kahanmaps certificate --all`, which the page links.
+    --certificate FILE also writes the proofs of `kahanmaps certificate --all`, and the page links to FILE.
 
-    Exit status: as that of the command named by --from.
+    The exit status is that of the command named by --from.
     """
     is_named, is_drawn = _require_consistent(system, options)
     require_every_eps(options)
@@ -110,7 +111,7 @@ def command(system: str | None, **options: Any) -> int:
             # Without SYSTEM, verify and the options of a random member need a member of the family.
             draws = not is_named and (is_drawn or options["source"] == "verify")
             file = drawn_file(options) if draws else opt.load_system(system, options)
-            eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+            eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
             settings = lib.Settings(eps=eps, seed=options["seed"], progress=search)
             left_out: list[str] = []
             if options["source"] == "verify":

@@ -47,12 +47,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     The degrees of the first iterates are measured for all members with parameters in GF(p), for several small primes p.
     Members with smaller degrees than a generic member are special. They form points, lines, curves and surfaces; those
-    that appear modulo all primes are lifted to conditions over Q. A condition is confirmed at random members by the
-    computation of `degrees`, and the growth is that of a rational member. All this is evidence, and no proof.
+    that appear modulo all primes are lifted to conditions over Q. A condition is confirmed if random members that
+    satisfy it have these degrees, computed as in `degrees`; the growth is that of a rational member. All this is
+    evidence, and no proof.
 
     With two or three parameters, members on random lines of parameter space are tried as well, modulo primes at which
-    quadratic fields split, so that a^2 - 2 = 0 is found as one curve. The effort limits the whole scan; what it did not
-    allow is reported.
+    quadratic fields split, so that a^2 - 2 = 0 is found as one condition. The effort limits the whole scan; the output
+    lists what was not done.
 
     Without --eps the conditions hold for every eps; with eps among the parameters they may contain it. With more than
     three parameters, only members on random lines and planes of parameter space are tried. This finds conditions of

@@ -53,7 +53,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     from kahanmaps.laboratory.singular.singularities import default_eps
 
-    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     file = opt.load_system(system, {**options, "quiet": quiet})
     with SearchProgress({**options, "quiet": quiet}) as search:
         runs = [
@@ -65,8 +65,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     verdict = runs[0].verdict if agree else lib.UNDECIDED
     symbolic = lib.symbolic_denominator(file.map) if eps is None else None
     if as_json:
-        of_run = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
-        of_each = (
+        run_keys = ("verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text")
+        hypersurface_keys = (
             "polynomial",
             "degree",
             "divides_denominator",
@@ -78,13 +78,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
         records = [
             {
-                **lib.attributes(run, *of_run, singular_everywhere="is_undefined", dominant="is_dominant"),
+                **lib.attributes(run, *run_keys, singular_everywhere="is_undefined", dominant="is_dominant"),
                 "eps": str(run.eps),
                 "time_step": lib.eps_record(run.eps, file.map)["time_step"],
                 "maps_a_step": None if run.word is None else run.word.length,
                 "hypersurfaces": [
                     {
-                        **lib.attributes(surface, *of_each, "followed", "settled_at", "note", "stage"),
+                        **lib.attributes(surface, *hypersurface_keys, "followed", "settled_at", "note", "stage"),
                         **{name: [getattr(step, of) for step in surface.steps] for name, of in steps.items()},
                         "primes": [str(prime) for prime in surface.primes],
                     }

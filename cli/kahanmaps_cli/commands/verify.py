@@ -51,9 +51,7 @@ _LEGEND = {
 @opt.parameter_option
 @draw_options
 @opt.eps_options
-@click.option(
-    "--universal", is_flag=True, help="Verify the claims for the generic member, at random points over GF(p)."
-)
+@click.option("--universal", is_flag=True, help="Verify the claims for the generic member instead of one member.")
 @click.option(
     "--beyond",
     is_flag=True,
@@ -99,7 +97,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --section conclusions  # geometry of the level sets
 
     The member is SYSTEM, or a random one given by --m, --eigenvalues, --generic or --chi; by default m = 3. Claims are
-    proved by symbolic expansion or formally, verified exactly, or supported at random points over GF(p) with a bound on
+    proved by symbolic expansion, by a formal proof or exactly, or supported at random points over GF(p) with a bound on
     the error. Formulas with misprints are listed both as printed and corrected. m is at most 8; for m > 6 claims with
     sums over all eigenvalues are only supported.
 
@@ -130,7 +128,7 @@ def command(system: str | None, **options: Any) -> int:
         raise click.UsageError("found -p without SYSTEM: a random member has no parameters")
     with Progress(options["quiet"]) as progress:
         settings = lib.Settings(
-            eps=opt.the_eps(options["eps"], options["time_step"], required=False),
+            eps=opt.requested_eps(options["eps"], options["time_step"], required=False),
             seed=options["seed"],
             error_bits=options["error_bits"],
             progress=progress,

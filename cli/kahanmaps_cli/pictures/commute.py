@@ -39,7 +39,7 @@ from kahanmaps_cli.screen.progress import Progress
     ),
 )
 def command(options: dict[str, Any], progress: Progress) -> Drawing:
-    """Draw the square x, Phi_f x, Phi_g x and its fourth corners Phi_g Phi_f x and Phi_f Phi_g x.
+    """Draw x, Phi_f x and Phi_g x, and both candidates for the fourth corner of the square.
 
     \b
       kahanmaps plot commute paper_m2 --start 1/2,-1/3,0,1 --eps 1/50 \\
@@ -49,7 +49,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
       kahanmaps plot commute euler_top zhukovski_volterra_1 \\
           --start 1,1/2,-1 --eps 1/10 -o open.svg
 
-    The maps commute at x if the two fourth corners coincide. For one SYSTEM, a member of the commuting family, the left
+    The maps commute at x if the two candidates coincide. For one SYSTEM, a member of the commuting family, the left
     panel shows two associated maps, which commute, and the right one the maps of H_0 and H_1, where
     grad H_1 = A grad H_0, which in general do not. Two systems have one panel.
 

@@ -66,7 +66,7 @@ def degrees(options: dict[str, Any], progress: SearchProgress) -> Drawing:
 
     for path in options["records"]:
         add(*lib.degrees_of_record(read_record(path), path))
-    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     inline = opt.is_inline(options)
     names: list[str | None] = list(options["systems"])
     if inline or not (names or growths):
@@ -123,8 +123,8 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
       kahanmaps heights weierstrass --json | kahanmaps plot heights --from - \\
           -o heights.svg
 
-    The height of a point is the bit length of its largest numerator or
-    denominator. Each eps has a color; marks are heights, lines are fits. Results
+    The height of a point is the bit length of the largest integer in its
+    coordinates over a common denominator. Each eps has a color; marks are heights, lines are fits. Results
     read by --from contain the heights at the steps 0, 1, 2, 4, 8, ... only.
 
     Exit status: 0 done, 2 usage error, 3 some orbit met a singular point, or the
@@ -141,7 +141,7 @@ def heights(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         is_complete, digits = record.get("complete") is not False, record.get("max_digits", digits)
     else:
         file = opt.load_system(options["system"], options)
-        eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+        eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
         survey = surveyed(file, eps, options, progress)
         curves, is_complete = lib.height_curves(survey), survey.is_complete
     figure = lib.plot_heights(curves, options["style"], scale=options["scale"])

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps import internals as lib
-from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
+from kahanmaps_cli.options import eps_options, load_system, requested_eps, system_options
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawing, picture, two_variables
 from kahanmaps_cli.screen.progress import Progress
@@ -53,12 +53,13 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
 
     A real root has a real plane with symplectic coordinates u, v in which h = kappa (u^3 - 3 u v^2) or
     kappa (u^3 + 3 u v^2). A pair of complex roots has one complex plane; u and v have a panel each, without a curve.
-    The system need not be declared as a member. There are no planes where chi has a repeated root.
+    The system need not be declared as a member. If chi has a repeated root, there are no such planes.
 
-    Exit status: 0 done, 2 usage error or no normal form, 3 an orbit met a pole (the picture shows it up to there).
+    Exit status: 0 done, 2 usage error or no normal form, 3 an orbit met an indeterminacy point (the picture shows the
+    orbit up to there).
     """
     file = load_system(options["system"], options)
-    eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
+    eps = requested_eps(options["eps"], options["time_step"], required=file.is_quadratic)
     original = two_variables("--original", options["original"], file.variables)
     curves = lib.find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
     texts = [lib.format_point(start) for start in options["starts"]]

@@ -39,7 +39,7 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     normal_form = file.normal_form
     if isinstance(normal_form, lib.NoNormalForm):
         raise lib.InputError(f"{file.name} has no rotation numbers here: {normal_form.reason}")
-    eps = opt.the_eps(options["eps"], options["time_step"])
+    eps = opt.requested_eps(options["eps"], options["time_step"])
     for end in (options["first"], options["last"]):
         file.map.at(eps, lib.QQ).point(end)
     progress("rotation numbers")

@@ -55,7 +55,7 @@ def requested_comparison(options: dict[str, Any], progress: Callable[[str], None
     return lib.compare(
         file,
         starts,
-        opt.the_eps(options["eps"], options["time_step"]),
+        opt.requested_eps(options["eps"], options["time_step"]),
         options["steps"],
         progress=progress,
         **{"methods": options["methods"], "integrals": options["integrals"] or None, "seed": options["seed"], **more},

@@ -80,7 +80,7 @@ def run_scan(system: str | None, quiet: bool, options: dict[str, Any]) -> tuple[
         result = lib.scan(
             file,
             names,
-            eps=opt.the_eps(options["eps"], options["time_step"], required=False),
+            eps=opt.requested_eps(options["eps"], options["time_step"], required=False),
             **opt.given(options, "terms", "effort", "seed", "jobs"),
             primes=primes_of(options["primes"]),
             analysis=options.get("analysis"),

@@ -41,7 +41,7 @@ def require_one_form(options: dict[str, Any]) -> None:
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
     """Return the names of --symbolic without eps, and the number eps or None."""
     named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
-    eps = opt.the_eps(options["eps"], options["time_step"], required=False)
+    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
     if eps is not None and "eps" in named:
         raise click.UsageError("give --eps as a number, or eps among --symbolic, not both")
     return tuple(name for name in named if name != "eps"), eps

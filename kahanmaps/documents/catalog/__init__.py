@@ -13,8 +13,8 @@ x3' = -3/2*x1*x2
 >>> top.catalog["title"]
 'Euler top'
 
-A file is data, in the format of every other system file; its name is that of the system. Each of its facts opens with
-its status: Proved (in the source named; where none is, by the argument given or by tests/documents/test_catalog.py),
+A file is data, in the format of every other system file; its name is that of the system. Each of its facts begins with
+its status: Proved (in the named source; without a source by the argument given or by tests/documents/test_catalog.py),
 Refuted (at a point), Measured (a finite computation modulo a prime, which is no proof), Classical, or Origin (how the
 file was made). Degrees, growth, verdict and relations are also given as structured data, see
 `kahanmaps.documents.structured_facts`; tests/laboratory/test_catalog_blind.py computes them again.
@@ -72,11 +72,11 @@ def _names_in(folder: Traversable) -> tuple[str, ...]:
 
 def text_of(name: str) -> bytes:
     """Return the text of the file of a system or map of the catalogue. Raises KeyError for other names."""
-    made = family_member(name)
-    if made is not None:
+    generated = family_member(name)
+    if generated is not None:
         from kahanmaps.documents.toml_text import to_toml
 
-        return to_toml(made[1], ("variables",), ("catalog", "system", "integrals", "density")).encode()
+        return to_toml(generated[1], ("variables",), ("catalog", "system", "integrals", "density")).encode()
     folder = resources.files(__name__)
     if name in map_names():
         return folder.joinpath("maps", name + _ENDING).read_bytes()
@@ -182,12 +182,12 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
         kind = type(reference).__name__
         raise InputError(f"found a {kind}, expected the name of a system or the path of a file: km.load('lorenz')")
     if not isinstance(reference, Path):
-        made = family_member(reference)
-        name = reference if made is None else made[0]
+        generated = family_member(reference)
+        name = reference if generated is None else generated[0]
         hyphenated = name.replace("-", "_")
-        if made is None and not os.path.exists(name) and hyphenated in (*names(), *map_names()):
+        if generated is None and not os.path.exists(name) and hyphenated in (*names(), *map_names()):
             name = hyphenated
-        if made is not None or name in (*names(), *map_names()):
+        if generated is not None or name in (*names(), *map_names()):
             return parse_system(text_of(name), name, parameters)
         has_ending = "." in reference and "(" not in reference  # the ending of a file, or a mistyped one
         has_separator = any(mark in reference for mark in (os.sep, os.altsep) if mark)

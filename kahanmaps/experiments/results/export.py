@@ -169,9 +169,9 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
     from kahanmaps.maps.convention import CONVENTION
 
     layout = _Layout(rows(), stable, typed=True)
-    beside = {name: f"{name}.number" for name in layout.numbers if f"{name}.number" not in layout.types}
+    number_columns = {name: f"{name}.number" for name in layout.numbers if f"{name}.number" not in layout.types}
     types = {"int64": arrow.int64(), "bool": arrow.bool_(), "float64": arrow.float64(), "string": arrow.string()}
-    fields = {**layout.types, **dict.fromkeys(beside.values(), "float64")}
+    fields = {**layout.types, **dict.fromkeys(number_columns.values(), "float64")}
     schema = arrow.schema(
         [arrow.field(plain(name), types[kind]) for name, kind in fields.items()],
         metadata={"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__},
@@ -190,8 +190,8 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
             line = {}
             for name, value in layout.cells(row).items():
                 if value is not None and layout.types[name] == "string":
-                    if name in beside:
-                        line[beside[name]] = nearest(value)
+                    if name in number_columns:
+                        line[number_columns[name]] = nearest(value)
                     value = plain(value)
                     characters += len(value)
                 line[plain(name)] = value

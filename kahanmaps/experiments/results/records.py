@@ -141,7 +141,7 @@ class Outcome(StrEnum):
 
 
 VERDICTS = ("proved", "supported", "refuted", "undecided")  # verdicts of checks; user-defined tasks may have others
-KEPT = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # the outcomes of results
+STORED_OUTCOMES = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # the outcomes of results
 
 
 @dataclass(frozen=True)

@@ -258,12 +258,12 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} may not be written to: change its permissions, or work on a copy")
         address = f"{self.path.as_uri()}?mode={mode}"
         self._connection = sqlite3.connect(address, timeout=_BUSY_SECONDS, isolation_level=None, uri=True)
-        self._is_made(create)  # before locking: no lock file beside a file that is not ours
+        self._is_initialized(create)  # before locking: no lock file beside a file that is not ours
         if not self._is_readonly:
             self._take_lock()
             self._execute(f"PRAGMA cache_size = -{_CACHE}")
             self._execute("PRAGMA journal_mode = DELETE")  # older versions wrote WAL
-            if not self._is_made(create):  # again, under the lock: another process may have created it meanwhile
+            if not self._is_initialized(create):  # again, under the lock: another process may have created it meanwhile
                 with self._transaction():
                     for statement in SCHEMA.split(";"):  # executescript would commit
                         self._execute(statement)
@@ -272,7 +272,7 @@ class Store(HtmlDisplay):
         if self._is_readonly:
             self._execute("PRAGMA query_only = ON")
 
-    def _is_made(self, create: bool) -> bool:
+    def _is_initialized(self, create: bool) -> bool:
         """Return False for an empty file if `create`. Raises StoreError for a file that is not ours."""
         # The schema first: pragmas succeed even for files that SQLite cannot read.
         queries = ("SELECT count(*) FROM sqlite_master", "PRAGMA application_id", "PRAGMA user_version")
@@ -561,11 +561,11 @@ class Store(HtmlDisplay):
         for record in records:  # values that JSON cannot represent raise an error here
             if not math.isfinite(record.seconds):
                 raise ValueError(f"a record cannot have taken {record.seconds} seconds")
-            kept = {name: getattr(record, name) for name in _COLUMNS}  # not asdict, which copies results
+            columns = {name: getattr(record, name) for name in _COLUMNS}  # not asdict, which copies results
             for name in ("result", "versions"):
-                kept[name] = None if kept[name] is None else canonical(dict(kept[name]))
-            kept |= {name: kept[name] and encodable(kept[name]) for name in ("verdict", "message", "stderr")}
-            rows.append([*{**kept, "outcome": str(record.outcome), "seconds": float(record.seconds)}.values()])
+                columns[name] = None if columns[name] is None else canonical(dict(columns[name]))
+            columns |= {name: columns[name] and encodable(columns[name]) for name in ("verdict", "message", "stderr")}
+            rows.append([*{**columns, "outcome": str(record.outcome), "seconds": float(record.seconds)}.values()])
         with self._transaction():
             for record, row in zip(records, rows, strict=True):
                 stored = self._find_result(record.key)

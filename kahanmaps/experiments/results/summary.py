@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from kahanmaps.display_protocols import HtmlDisplay, shorten
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.results.export import Entry, entries, is_number, known, names_of, nearest, plain
-from kahanmaps.experiments.results.records import KEPT, VERDICTS, Row, canonical, system_words
+from kahanmaps.experiments.results.records import STORED_OUTCOMES, VERDICTS, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
 _SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # in tables, and their headings
@@ -135,7 +135,7 @@ class _GroupBuilder:
             for quantile, percent in QUANTILES.items():
                 value = ordered[max(-(-percent * n // 100) - 1, 0)]
                 numbers[name][quantile] = int(value) if value.is_integer() and abs(value) < 2**53 else value
-        outcomes = {str(outcome): self.counts[outcome] for outcome in KEPT}
+        outcomes = {str(outcome): self.counts[outcome] for outcome in STORED_OUTCOMES}
         counts = (self.counts.total(), self.counts["missing"], outcomes, dict(self.verdicts))
         return Group(self.values, *counts, numbers, {name: dict(self.flags[name]) for name in sorted(self.flags)})
 

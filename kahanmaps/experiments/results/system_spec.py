@@ -34,7 +34,7 @@ from kahanmaps.family.random_members import (
     random_member_with_eigenvalues,
 )
 
-_KEPT = 16  # systems cached by a worker: consecutive tasks often differ only in eps
+_MAX_CACHED_SYSTEMS = 16  # systems cached by a worker: consecutive tasks often differ only in eps
 
 
 def document_text(file: SystemFile) -> str:
@@ -87,12 +87,12 @@ def system_from(spec: Mapping[str, Any], document: Callable[[str], str]) -> Syst
     return _read(document(spec["document"]), canonical(spec["parameters"]))
 
 
-@lru_cache(_KEPT)
+@lru_cache(_MAX_CACHED_SYSTEMS)
 def _read(text: str, parameters: str) -> SystemFile:
     return SystemFile(**DocumentReader(json.loads(text), "system", json.loads(parameters)).read())
 
 
-@lru_cache(_KEPT)
+@lru_cache(_MAX_CACHED_SYSTEMS)
 def _random_system(text: str) -> SystemFile:
     spec = json.loads(text)
     seed, m, size = spec["seed"], spec.get("m"), spec.get("size")

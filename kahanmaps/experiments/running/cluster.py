@@ -47,7 +47,7 @@ START_UP_OF_A_JOB = 5.0  # and for each job in it
 LARGEST_GROUP = 200  # jobs
 UNFIT_AFTER = 3  # groups that ended by themselves without a record, while no group has printed one
 FETCH = 30.0  # seconds to fetch the output of a group that has ended
-LOOK_EVERY = 2.0  # seconds between two counts of the workers
+COUNT_EVERY = 2.0  # seconds between two counts of the workers
 _ADDRESS = re.compile(r"([a-z]+://)?[^\s/]+:\d+/?")
 
 
@@ -88,7 +88,7 @@ class ClusterWorkers(Executor):
         self.address = address
         self._documents = documents
         self._group_seconds = group_seconds
-        self._talk = on_message or (lambda text: None)
+        self._on_message = on_message or (lambda text: None)
         # `env=` of subprocess.run would replace the whole environment of the worker.
         passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
         self._command = ["/usr/bin/env", *passed, *(command or [python or sys.executable, "-m", MODULE])]
@@ -102,8 +102,8 @@ class ClusterWorkers(Executor):
         self._client = connect(address, connect_seconds)
         self._results = import_module("distributed").as_completed(loop=self._client.loop)
         self._lost: str | None = None  # why the scheduler is lost
-        self._threads, self._looked, self._is_reported = 0, -LOOK_EVERY, False
-        self._look()
+        self._threads, self._counted_at, self._is_reported = 0, -COUNT_EVERY, False
+        self._count_threads()
 
     @property
     def is_free(self) -> bool:
@@ -144,7 +144,7 @@ class ClusterWorkers(Executor):
             while not (is_ready := self._results.has_ready()) and time.monotonic() < deadline and self._is_connected:
                 time.sleep(0.01)
             futures = self._results.next_batch(block=False) if is_ready else []
-            self._look()
+            self._count_threads()
             records = [record for future in futures if self._is_connected for record in self._collect(future)]
             if records or (self._is_connected and time.monotonic() >= deadline):
                 return records
@@ -175,15 +175,15 @@ class ClusterWorkers(Executor):
     def _is_connected(self) -> bool:
         return self._lost is None and self._client.status == "running"
 
-    def _look(self) -> None:
+    def _count_threads(self) -> None:
         """Count the threads of the workers from time to time, and report once that there are none."""
-        if not self._is_connected or time.monotonic() - self._looked < LOOK_EVERY / (1 if self._threads else 4):
+        if not self._is_connected or time.monotonic() - self._counted_at < COUNT_EVERY / (1 if self._threads else 4):
             return
-        self._looked = time.monotonic()
+        self._counted_at = time.monotonic()
         with suppress(Exception):  # the scheduler may be lost meanwhile
             self._threads = sum(self._client.nthreads().values())
             if not self._threads and not self._is_reported:
-                self._talk(f"waiting for workers: the scheduler at {self.address} has none")
+                self._on_message(f"waiting for workers: the scheduler at {self.address} has none")
             self._is_reported = not self._threads
 
     def _send_open(self) -> None:
@@ -320,20 +320,20 @@ def connect(address: str, timeout: float) -> Any:
     for name in list(logging.Logger.manager.loggerDict):  # each logger has its own handler
         if name.split(".")[0] in ("distributed", "tornado"):
             logging.getLogger(name).disabled = True
-    made: Future[Any] = Future()
+    client_future: Future[Any] = Future()
 
     def make() -> None:
         try:
             # It warns of different versions of packages, which do not matter: workers only run a command.
             with warnings.catch_warnings(action="ignore"):
-                made.set_result(client(chosen, timeout=timeout, set_as_default=False, name="kahanmaps"))
+                client_future.set_result(client(chosen, timeout=timeout, set_as_default=False, name="kahanmaps"))
         except BaseException as error:
-            made.set_exception(error)
+            client_future.set_exception(error)
 
     # In a thread: distributed waits forever if another service listens at the address.
     Thread(target=make, daemon=True).start()
     try:
-        return made.result(timeout + 1)
+        return client_future.result(timeout + 1)
     except Exception as error:
         raise InputError(
             f"no dask scheduler answers at {address} within {timeout:g} s ({on_one_line(error)}): "
@@ -344,7 +344,7 @@ def connect(address: str, timeout: float) -> Any:
 # The command on a worker
 
 
-def do_group(source: IO[str], target: IO[str]) -> None:
+def run_group(source: IO[str], target: IO[str]) -> None:
     """Run the jobs in the JSON text of `source` one after the other, and write their records to `target`.
 
     A job whose process is killed from outside is lost at once: the sender runs it again, perhaps on another worker.
@@ -370,4 +370,4 @@ if __name__ == "__main__":
         reader.register(sys.stdout.fileno(), 0)
         if any(events & select.POLLERR for _, events in reader.poll(0)):
             os._exit(1)
-    do_group(sys.stdin, sys.stdout)
+    run_group(sys.stdin, sys.stdout)

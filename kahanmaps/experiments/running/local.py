@@ -197,12 +197,12 @@ class LocalWorkers:
             if attempt.tries < self._tries:
                 return None
             return _record_of({**data, "outcome": Outcome.LOST, "message": ended})
-        wants_memory = any(phrase in printed.lower() for phrase in _NO_MEMORY)
+        lacks_memory = any(phrase in printed.lower() for phrase in _NO_MEMORY)
         # The signal of a fault may also have been sent from outside, but hardly twice.
-        if not was_fresh or not (wants_memory or attempt.had_fault or (status is not None and status > 0)):
+        if not was_fresh or not (lacks_memory or attempt.had_fault or (status is not None and status > 0)):
             attempt.had_fault = True
             return None
-        if wants_memory:
+        if lacks_memory:
             return _record_of({**data, "outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"})
         return _record_of({**data, "outcome": Outcome.CRASHED, "message": ended})
 
@@ -233,8 +233,8 @@ class _Worker:
             self._output = Connection(os.dup(file.fileno()))
         fcntl(self._output.fileno(), F_SETFL, os.O_APPEND)
         self._context = _Context()
-        begin = (os.getpid(), self._output)
-        self.pool: Any = ProcessPool(1, initializer=_begin, initargs=begin, context=self._context)
+        arguments = (os.getpid(), self._output)
+        self.pool: Any = ProcessPool(1, initializer=_begin, initargs=arguments, context=self._context)
 
     def start_task(self, attempt: _Attempt) -> Future[str]:
         """Start a task and return the future of its record as text."""

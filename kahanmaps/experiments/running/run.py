@@ -35,24 +35,24 @@ class Batch:
         self._jobs = iter(jobs)
         self._executor = executor
         self._grace = grace
-        self._until: float | None = None
+        self._deadline: float | None = None
         self.abandoned = 0
 
     @property
     def was_interrupted(self) -> bool:
         """Whether `interrupt` was called."""
-        return self._until is not None
+        return self._deadline is not None
 
     def interrupt(self) -> None:
         """Submit no further jobs, and abandon those that need more than `grace` seconds (safe in a signal handler)."""
-        self._until = time.monotonic() + self._grace
+        self._deadline = time.monotonic() + self._grace
 
     def __iter__(self) -> Iterator[list[Record]]:
         executor, took = self._executor, 0.0
         try:
             self._submit_jobs()
             while executor.in_flight:
-                if self._until is not None and time.monotonic() > self._until:
+                if self._deadline is not None and time.monotonic() > self._deadline:
                     self.abandoned = executor.in_flight
                     return
                 records = executor.wait(_TICK)
@@ -69,7 +69,7 @@ class Batch:
             executor.close()
 
     def _submit_jobs(self) -> None:
-        while self._until is None and self._executor.is_free:
+        while self._deadline is None and self._executor.is_free:
             job = next(self._jobs, None)
             if job is None:
                 break

@@ -48,12 +48,12 @@ class EllipticSteps:
     @property
     def stride(self) -> int:
         """The number of steps of factors that T belongs to."""
-        return len(self._places)
+        return len(self._groups)
 
     @property
     def degree(self) -> int:
         """The largest degree of a group of coordinates on its curve."""
-        return max(group.degree for row in self._places for group in row if isinstance(group, Coordinates))
+        return max(group.degree for row in self._groups for group in row if isinstance(group, Coordinates))
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
         """Return the point with this number, after the previous one was computed or skipped; None if not determined."""
