@@ -152,10 +152,10 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
             length += 1
         lengths[length] += length > 0
     indeterminate, ended = (int((points[:count] == count).sum()) for points in (image, final))
-    kinds = dict[str, Any](
+    counts_by_kind = dict[str, Any](
         indeterminate=indeterminate, pre_indeterminate=ended - indeterminate, preperiodic=count - ended - len(cyclic)
     )
-    return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **kinds)
+    return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **counts_by_kind)
 
 
 def _of_samples(

@@ -207,17 +207,17 @@ class Laboratory:
         """Why the map at the given eps is not birational, measured at random points; empty if it is."""
         if self.flow or (self.eps is None and self.system is not None):
             return ""  # det(I - eps f'(x)) is 1 at eps = 0
-        at = "" if self.eps is None else f"at eps = {self.eps} "
+        at_eps_text = "" if self.eps is None else f"at eps = {self.eps} "
         name, numerator = self.map.denominator_name, "det dPhi(x)"
         if self.system is not None:
             name, numerator = "det(I - eps f'(x))", "det(I + eps f'(x))"
         try:
             pairs = [(map_, *pair) for map_ in self.maps for pair in map_.pairs(2)]
         except NoPoint:
-            return f"{at}the map is defined nowhere: {name} is identically 0"
+            return f"{at_eps_text}the map is defined nowhere: {name} is identically 0"
         if not any(map_.determinant(x, image)[0] for map_, x, image in pairs):
             where = "points" if self.system is None else "images"
-            return f"{at}the map is not invertible: {numerator} is 0 at all {where}"
+            return f"{at_eps_text}the map is not invertible: {numerator} is 0 at all {where}"
         return ""
 
     def cofactors(self) -> list[Cofactor]:

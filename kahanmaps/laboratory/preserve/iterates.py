@@ -215,7 +215,7 @@ def integrals_in_iterates(
     plain, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
     level = _level(laboratory)
     level_laboratory, replace_levels = (laboratory, None) if level is None else level
-    base = level_laboratory.maps[0]
+    modular_map = level_laboratory.maps[0]
     cut = ""
     for two_point_basis in TWO_POINT_BASES if level is not None else TWO_POINT_BASES[1:]:
         if len(independent.rows) >= required:
@@ -223,12 +223,12 @@ def integrals_in_iterates(
         if budget.is_spent:
             cut = f"{two_point_basis.text} were not tried: {SPENT}"
             break
-        for basis_with_rank, spaces in bases_with_spaces(base, [two_point_basis]):
+        for basis_with_rank, spaces in bases_with_spaces(modular_map, [two_point_basis]):
             progress(basis_with_rank.text)
             result = SpaceSearch()
             step = SearchStep("iterates", 2, None, basis_with_rank.text, basis_with_rank)
             result.add(step, sorted(spaces, key=lambda space: space.pattern))
-            bases, _ = interpolate_bases(level_laboratory, base.prime, result, budget)
+            bases, _ = interpolate_bases(level_laboratory, modular_map.prime, result, budget)
             for basis in bases:
                 functions = [_bilinear_function(P, basis_with_rank, level_laboratory.map) for P in basis]
                 if replace_levels is not None:

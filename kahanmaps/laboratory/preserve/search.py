@@ -116,11 +116,11 @@ def search_spaces(
     Raises NoPoint.
     """
     result, required = SpaceSearch(), profile.codimension
-    is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
+    is_of_vector_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
     affine = affine_space(map_)
     if affine is not None:
-        result.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
-    if is_of_field:  # its denominators divide det(I - eps f'): relations of small span cost less than these factors
+        result.add(SearchStep("affine", 1, None, AFFINE if is_of_vector_field else "affine integral"), [affine])
+    if is_of_vector_field:  # denominators divide det(I - eps f'): relations of small span cost less than these factors
         add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
     if gradient_rank(map_, result.all_spaces) >= required:
         return result
@@ -133,7 +133,7 @@ def search_spaces(
     cofactor_result = search_cofactors(map_, cofactors, denominators, result.all_spaces, required, max_degree, budget)
     steps, spaces = [*result.steps, *cofactor_result.steps], [*result.spaces, *cofactor_result.spaces]
     result = replace(cofactor_result, steps=steps, spaces=spaces, searched=result.searched)
-    if not is_of_field:
+    if not is_of_vector_field:
         add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
     return result
 
@@ -316,7 +316,7 @@ def find_branches(
     `model` holds the spaces on one map; `spaces_at(prime, values)` returns those on another map in any order, or None
     at special values. Returns None where the spaces are conjugate over an extension of Q, or the budget is spent first.
     """
-    places = [
+    distinguishing_places = [
         (i, k)
         for i, vector in enumerate(model[0].basis)
         for k in range(len(vector))
@@ -325,7 +325,7 @@ def find_branches(
     count, context = len(model), ring((*names, "T"))
     *gens, T = context.gens()
     at_zero = {"T": fmpq(0)}
-    for samples, place in cartesian(_SAMPLES, places[:_COEFFICIENTS]):
+    for samples, place in cartesian(_SAMPLES, distinguishing_places[:_COEFFICIENTS]):
         if budget.is_spent:
             return None
 
@@ -339,7 +339,7 @@ def find_branches(
             for space in spaces:
                 w = space.basis[place[0]][place[1]]
                 shifted = zip([*coefficients, 0], [0, *coefficients], strict=True)
-                coefficients = [(here - w * before) % prime for here, before in shifted]
+                coefficients = [(coefficient - w * previous) % prime for coefficient, previous in shifted]
             return coefficients[1:]
 
         answer = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, budget=budget)

@@ -153,11 +153,11 @@ def _image(
     An empty list `pivots` is filled with the pivots used, which determine this power. For the neighbours of a curve
     the pivots of the curve must be given. Raises PrecisionTooLow.
     """
-    zero, unit = X[0] * 0, product_units(known_terms, known_terms)
+    zero, units_per_product = X[0] * 0, product_units(known_terms, known_terms)
     count(row_units(equation, known_terms))
 
     def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
-        count(unit)
+        count(units_per_product)
         return left.mul_low(right, known_terms)
 
     if equation.dim >= _MIN_ELIMINATION_DIMENSION and equation.explicit is None:
@@ -182,7 +182,7 @@ def kernel(
     its exponent must be below `precision`. `check` is called before each row, and may raise. Raises PrecisionTooLow.
     """
     free_rows, free_columns = list(range(len(rows))), list(range(len(rows) + 1))
-    inversion, product = series_units(known_terms), 0.3 + product_units(known_terms, known_terms)
+    units_per_inversion, units_per_product = series_units(known_terms), 0.3 + product_units(known_terms, known_terms)
     solved: list[tuple[int, dict[int, nmod_poly]]] = []
     for k in range(len(rows)):
         if len(pivots) == k:
@@ -190,14 +190,14 @@ def kernel(
         power, i, j = pivots[k]
         free_rows.remove(i)
         free_columns.remove(j)
-        count(inversion + product * len(free_columns) * 2)  # includes the products for the kernel
+        count(units_per_inversion + units_per_product * len(free_columns) * 2)  # includes the products for the kernel
         inverse = rows[i][j].right_shift(power).inverse_series_trunc(known_terms - power)
         scaled_row = {c: rows[i][c].right_shift(power).mul_low(inverse, known_terms - power) for c in free_columns}
         for r in free_rows:
             check()
             factor = rows[r][j]
             if not factor.is_zero():
-                count(product * sum(not entry.is_zero() for entry in scaled_row.values()))
+                count(units_per_product * sum(not entry.is_zero() for entry in scaled_row.values()))
                 for c in free_columns:
                     if not scaled_row[c].is_zero():
                         rows[r][c] = rows[r][c] - factor.mul_low(scaled_row[c], known_terms)

@@ -204,8 +204,8 @@ class Hypersurface(ResultPart):
         cut = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
         name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
         if self.orbit_data.continues_as:
-            after, other = self.orbit_data.continues_as
-            outcome = f"mapped onto C{other + 1} after {counted(after, 'step')}"
+            steps, target = self.orbit_data.continues_as
+            outcome = f"mapped onto C{target + 1} after {counted(steps, 'step')}"
         elif self.confined_at is not None:
             outcome = f"confined after {counted(self.confined_at, 'step')}"
         elif self.orbit_data.recurrences:

@@ -169,8 +169,8 @@ def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
         return [p.derivative(j)[(0,) * p.context().nvars()] for j in range(p.context().nvars())]
 
     yield QQ.identity(n)
-    planes = [linear_coefficients(affine.function) for affine in affine_darboux(f).functions]
-    yield from itertools.islice(_invertible(planes, n), MAX_FRAMES)
+    normals = [linear_coefficients(affine.function) for affine in affine_darboux(f).functions]
+    yield from itertools.islice(_invertible(normals, n), MAX_FRAMES)
     lines = [component for component in fixed.found if component.dimension == 1 and not component.equations]
     directions = [[sum(linear_coefficients(value), fmpq(0)) for value in line.coordinates] for line in lines]
     yield from (columns.transpose().inv() for columns in itertools.islice(_invertible(directions, n), MAX_FRAMES))

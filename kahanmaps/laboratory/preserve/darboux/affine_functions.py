@@ -157,15 +157,16 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
     if system.digits > LONG_COEFFICIENTS:
         return only_factors(f"coefficients of more than {LONG_COEFFICIENTS} digits")
     over_Q = system.over(QQ)
-    # A line parallel to a hyperplane misses it. The seed depends on the system, so no system can be built for the line.
+    # A line parallel to a hyperplane misses it. The seed depends on the system, so that nobody can choose a system with
+    # hyperplanes parallel to the line.
     rng = random.Random(f"affine {derive_seed(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
-    on_line = _determinant_along(over_Q, start, direction, quotient.free)
-    if on_line.degree() < 0:
+    determinant_on_line = _determinant_along(over_Q, start, direction, quotient.free)
+    if determinant_on_line.degree() < 0:
         return only_factors("the extactic determinant vanishes identically, there may be infinitely many")
     complete = True
     candidates = list[list[fmpq]]()
-    for t in _rational_roots(on_line):
+    for t in _rational_roots(determinant_on_line):
         x = [a + t * d for a, d in zip(start, direction, strict=True)]
         normals = nullspace(QQ, _taylor_rows(over_Q, x, quotient.free))
         if len(normals) > 1:

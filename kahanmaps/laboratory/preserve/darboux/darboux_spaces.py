@@ -142,20 +142,20 @@ def darboux_spaces(
     if len(span) > 2 * LARGEST_SPAN:
         return None
     multiples = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
-    # `fresh` completes the multiples of known spaces to a basis of the sum.
+    # `complement` completes the multiples of known spaces to a basis of the sum.
     stacked = [*multiples, *span]
     independent = pivots(echelon(list(zip(*stacked, strict=True)), prime)) if stacked else []
-    fresh = [stacked[k] for k in independent if k >= len(multiples)]
-    if not fresh:
+    complement = [stacked[k] for k in independent if k >= len(multiples)]
+    if not complement:
         return []
-    if not multiples and _is_darboux(map_, fresh, degree):
-        return [DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)]
-    if len(fresh) + len(multiples) > largest:
+    if not multiples and _is_darboux(map_, complement, degree):
+        return [DarbouxSpace.spanned_by(map_.dim, degree, complement, prime)]
+    if len(complement) + len(multiples) > largest:
         return None
-    # A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x, w = fresh + multiples.
-    size = len(fresh) + len(multiples)
+    # A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x, w = complement + multiples.
+    size = len(complement) + len(multiples)
     positions = [(a, b) for a in range(size) for b in range(a + 1, size)]
-    at_points, at_images = _values(map_, [*fresh, *multiples], degree, len(positions) + _SPARE)
+    at_points, at_images = _values(map_, [*complement, *multiples], degree, len(positions) + _SPARE)
     count_work(len(positions) ** 2 / 2)
     rows = []
     for x, y in zip(integers(at_points), integers(at_images), strict=True):
@@ -167,9 +167,9 @@ def darboux_spaces(
             A[a, b] = entry
             A[b, a] = -entry
         solutions.append(A)
-    bases = [basis for basis in _separate(solutions, fresh, multiples, prime) if _is_darboux(map_, basis, degree)]
+    bases = [basis for basis in _separate(solutions, complement, multiples, prime) if _is_darboux(map_, basis, degree)]
     if not bases and not multiples:
-        bases = [basis for basis in _of_rank_two(solutions, fresh, prime) if _is_darboux(map_, basis, degree)]
+        bases = [basis for basis in _of_rank_two(solutions, complement, prime) if _is_darboux(map_, basis, degree)]
     return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
 
 
@@ -190,21 +190,22 @@ def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
     return all(u[i, 0] * v[i, a] == u[i, a] * v[i, 0] for i in range(u.nrows()) for a in range(1, len(basis)))
 
 
-def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
-    """Compute the spaces with a common cofactor from the matrices A on fresh + multiples.
+def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
+    """Compute the spaces with a common cofactor from the matrices A on complement + multiples.
 
-    The fresh parts of the spaces are eigenspaces of a random E with E A = A E^T for the fresh-fresh block of every A.
+    The projections of the spaces to the complement are eigenspaces of a random E with E A = A E^T, where A stands for
+    the block on the complement of each of the matrices.
     """
-    k, size, rng = len(fresh), len(fresh) + len(multiples), random.Random(prime)
-    # The columns of the fresh-fresh blocks span the fresh parts of the spaces. Take an echelon basis b_i of this span:
-    # then a block is sum A'_ij b_i b_j^T, and A' consists of its entries at the pivots.
+    k, size, rng = len(complement), len(complement) + len(multiples), random.Random(prime)
+    # The columns of the blocks on the complement span the projections of the spaces. Take an echelon basis b_i of this
+    # span: then a block is sum A'_ij b_i b_j^T, and A' consists of its entries at the pivots.
     count_work(len(solutions) * k**2)
     coordinates = echelon([[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)], prime)
-    n, places = len(coordinates), pivots(coordinates)
+    n, pivot_columns = len(coordinates), pivots(coordinates)
     if n < 2:
         return []
     count_work(len(solutions) * n**2)
-    blocks = [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
+    blocks = [nmod_mat([[int(A[i, j]) for j in pivot_columns] for i in pivot_columns], prime) for A in solutions]
     if len(blocks) > _MAX_FORMS:  # a few random combinations give the same conditions on E
         blocks = [combination_of([rng.randrange(prime) for _ in blocks], blocks) for _ in range(_MAX_FORMS)]
     rows = []
@@ -236,11 +237,11 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, pri
             block = echelon(combine(eigenvectors, coordinates, prime), prime)
             corrected = _add_corrections(solutions, block, k, size, prime)
             if corrected is not None:
-                spaces.append(echelon(combine(corrected, [*fresh, *multiples], prime), prime))
+                spaces.append(echelon(combine(corrected, [*complement, *multiples], prime), prime))
     return spaces
 
 
-def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[Vectors]:
+def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
     """Return the row space of the matrix of rank 2 among the combinations of few matrices, if there is exactly one.
 
     The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
@@ -250,7 +251,7 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
     if not 1 <= count <= _MAX_FORMS:
         return []
     rng = random.Random(prime)
-    size = len(fresh)
+    size = len(complement)
     pairs = [(s, t) for s in range(count) for t in range(s, count)]
     rows = []
     count_work(2 * len(pairs) * (2 * size + count * (3 + size**2 / 100) + 5 * len(pairs)))
@@ -280,14 +281,18 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
         return []
     total = combination_of([products[min(lead, t), max(lead, t)] for t in range(count)], solutions)
     coordinates = echelon(integers(total), prime)
-    return [echelon(combine(coordinates, fresh, prime), prime)] if len(coordinates) == 2 else []
+    return [echelon(combine(coordinates, complement, prime), prime)] if len(coordinates) == 2 else []
 
 
 def _add_corrections(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: int) -> Vectors | None:
-    """Add to each vector of the block its correction by multiples, in coordinates of fresh + multiples."""
+    """Add to each vector of `block`, a basis of the projection of a space to the complement, its part in the multiples.
+
+    Returns coordinates on complement + multiples, or None if the matrices do not determine these parts.
+    """
     if size == k:
         return block
-    # Take the combinations of the A with a fresh-fresh block on `block`: its columns are combinations of the vectors.
+    # Take the combinations of the A whose block on the complement belongs to this space: its columns are combinations
+    # of the vectors of `block`.
     block_pivots = pivots(block)
     others = [i for i in range(k) if i not in block_pivots]
     conditions = []
