@@ -505,9 +505,9 @@ class _Search:
             return curve.degree
 
         while True:
-            on_lines = [degree_on(curve) for curve in self.lines]
-            best = max(on_lines)
-            if best >= 0 and min(on_lines) == best:
+            degrees_on_lines = [degree_on(curve) for curve in self.lines]
+            best = max(degrees_on_lines)
+            if best >= 0 and min(degrees_on_lines) == best:
                 self.degrees.append(best)
                 return
             self.replaced += 1
@@ -516,11 +516,11 @@ class _Search:
                     Ended.SINGULAR, f"iterate {n} exists nowhere: {self.map.denominator_name} = 0 on the image"
                 )
             if self.replaced > _REPLACEMENTS:
-                raise Stopped(Ended.LINES, f"random lines disagree on the degree of iterate {n}: {on_lines}")
+                raise Stopped(Ended.LINES, f"random lines disagree on the degree of iterate {n}: {degrees_on_lines}")
             if best >= 0:
                 self.notes.append(
-                    f"a line gave a smaller degree of iterate {n} and was replaced by another: {on_lines}"
+                    f"a line gave a smaller degree of iterate {n} and was replaced by another: {degrees_on_lines}"
                 )
-            for k, degree in enumerate(on_lines):
+            for k, degree in enumerate(degrees_on_lines):
                 if degree < best or best < 0:
                     self.lines[k] = new_line()

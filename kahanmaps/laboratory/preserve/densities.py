@@ -221,7 +221,7 @@ def densities_of(
         return DensitySearch(*laboratory.request, (), -1, laboratory.defect, flow=flow)
     period = None if flow else closing_period(laboratory.maps)
     product = anti_invariant = None
-    theorem, dim, cut = _theorem(laboratory), laboratory.map.dim, ""
+    theorem, dim, cut = _hamiltonian_density(laboratory), laboratory.map.dim, ""
     if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
         densities, tried = [theorem], theorem.degree(dim)
     else:
@@ -363,7 +363,7 @@ def _certified(
     return laboratory.verdict_on(phi, is_density=True, factor=factor)
 
 
-def _theorem(laboratory: Laboratory) -> FoundDensity | None:
+def _hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
     """Return the primitive part of det(I - eps f') for a Hamiltonian system without symbols; None for others."""
     if laboratory.symbols or laboratory.flow or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
         return None

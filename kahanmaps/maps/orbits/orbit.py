@@ -225,9 +225,11 @@ class OrbitRequest(NamedTuple):
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and normal_form is not None:
             return Orbit(map_at_eps, self.start, at=self.at or (), normal_form=normal_form, **limits)
-        normal = normal_form if method == "normal-form" else None
+        used_normal_form = normal_form if method == "normal-form" else None
         is_requested = self.is_requested if self.at is not None or self.every > 1 else None
-        return Orbit(map_at_eps, self.start, self.steps, normal_form=normal, is_requested=is_requested, **limits)
+        return Orbit(
+            map_at_eps, self.start, self.steps, normal_form=used_normal_form, is_requested=is_requested, **limits
+        )
 
 
 class Trajectory(HtmlDisplay):
