@@ -177,7 +177,7 @@ def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], minor_
     ]
 
 
-NOTHING = Tracked()
+NOTHING_TRACKED = Tracked()
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class TestCurve:
     point: Sequence[int]
     direction: Sequence[int]
     limits: Range
-    tracked: AlongCurves = NOTHING
+    tracked: AlongCurves = NOTHING_TRACKED
 
     @property
     def prime(self) -> int:

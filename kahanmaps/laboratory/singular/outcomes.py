@@ -30,7 +30,7 @@ from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.following import (
     NO_ORBIT_DATA,
-    NOTHING,
+    NOTHING_TRACKED,
     AlongCurves,
     OrbitData,
     Range,
@@ -442,7 +442,7 @@ def _outcome_at(
     tangents: list[list[int]],
     rng: random.Random,
     limits: Range,
-    tracked: AlongCurves = NOTHING,
+    tracked: AlongCurves = NOTHING_TRACKED,
 ) -> Hypersurface:
     """The outcome for the hypersurface with these tangents at a point, with its singularity pattern."""
     full_rank = len(tangents)
