@@ -503,7 +503,7 @@ def _solve(
 
 
 def _lift(
-    first: list[Quotient],
+    at_first_prime: list[Quotient],
     at_new_prime: Callable[[], SampledValues],
     names: tuple[str, ...],
     primes: list[int],
@@ -511,13 +511,13 @@ def _lift(
 ) -> tuple[RationalFunction, ...]:
     """Lift the functions to Q. Raises Unlucky if values modulo other primes do not fit."""
     modulus = primes[-1]
-    shapes = {i: quotient.shape for i, quotient in enumerate(first)}
-    residues = [[*quotient.numerator, *quotient.denominator] for quotient in first]
+    shapes = {i: quotient.shape for i, quotient in enumerate(at_first_prime)}
+    residues = [[*quotient.numerator, *quotient.denominator] for quotient in at_first_prime]
     groups: dict[object, list[int]] = {}
-    for i, quotient in enumerate(first):
+    for i, quotient in enumerate(at_first_prime):
         groups.setdefault((quotient.shape.denominator, quotient.denominator), []).append(i)
     # Numerators up to a factor: the first coefficient is made 1.
-    monic = [str([c * pow(f.numerator[0], -1, modulus) % modulus for c in f.numerator]) for f in first]
+    monic = [str([c * pow(f.numerator[0], -1, modulus) % modulus for c in f.numerator]) for f in at_first_prime]
     pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
     misfits = 0
     while True:

@@ -78,9 +78,9 @@ def format_univariate(polynomial: fmpq_poly, name: str = "t") -> str:
         if coefficient == 0:
             continue
         size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
-        letter = "" if power == 0 else name if power == 1 else f"{name}^{power}"
-        number = "" if size == 1 and letter else format_number(size) + ("*" if letter else "")
-        text += f" {sign} {number}{letter}" if text else f"{'-' if sign == '-' else ''}{number}{letter}"
+        power_text = "" if power == 0 else name if power == 1 else f"{name}^{power}"
+        number = "" if size == 1 and power_text else format_number(size) + ("*" if power_text else "")
+        text += f" {sign} {number}{power_text}" if text else f"{'-' if sign == '-' else ''}{number}{power_text}"
     return text or "0"
 
 

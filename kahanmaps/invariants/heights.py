@@ -301,26 +301,26 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
         width * _leading_coefficient(heights[begin + j * width : begin + (j + 1) * width + 1], 1) for j in range(4)
     ]
     increases = [after - before for before, after in pairwise(rises)]
-    measured = f"four quarters raise them by {', '.join(decimal_text(rise, 4) for rise in rises)} bits"
+    rises_text = f"four quarters raise them by {', '.join(decimal_text(rise, 4) for rise in rises)} bits"
     if min(increases) > 0 and sum(increases) >= 2 * _NOISE:
         first, second, third = increases
         if second >= 2 * first and 10 * first * third >= 9 * second * second:
-            return Growth.EXPONENTIAL, f"{measured}, and the increases multiply"
+            return Growth.EXPONENTIAL, f"{rises_text}, and the increases multiply"
         if 3 * max(increases) <= 5 * min(increases) and len(heights) >= MIN_HEIGHTS:
-            return Growth.QUADRATIC, f"{measured}, and the increases are about the same"
+            return Growth.QUADRATIC, f"{rises_text}, and the increases are about the same"
     if len(heights) < MIN_HEIGHTS:
         return Growth.UNDECIDED, _too_few(heights)
     rises_at_all = max(heights[: width + 1]) < max(heights[-width - 1 :])
     if rises_at_all and -3 * width < 8 * sum(rises[1:]) < 3 * width and len(heights) >= _MIN_FOR_LOGARITHMIC:
-        return Growth.LOGARITHMIC, f"{measured}: less than linear growth would"
+        return Growth.LOGARITHMIC, f"{rises_text}: less than linear growth would"
     half = len(heights) // 2
     low, high = min(heights[:half]), max(heights[:half])
     if low <= min(heights[half:]) and max(heights[half:]) <= high:
         return Growth.BOUNDED, f"the second half of them stays within {low} to {high} bits, as the first"
     least_rise, spread = min(rises), max(rises) - min(rises)
     if least_rise > 0 and spread <= least_rise / 4 and (spread <= _NOISE or spread <= least_rise / 32):
-        return Growth.LINEAR, f"{measured}, about the same each time"
-    return Growth.UNDECIDED, f"{measured}, which fits no rule; more steps may tell"
+        return Growth.LINEAR, f"{rises_text}, about the same each time"
+    return Growth.UNDECIDED, f"{rises_text}, which fits no rule; more steps may tell"
 
 
 def _too_few(heights: Sequence[int]) -> str:

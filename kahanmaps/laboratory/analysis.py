@@ -47,8 +47,10 @@ class Analysis(AnalysisResult, PrintableResult):
     interrupted: bool = False
 
     def __repr__(self) -> str:
-        final = self.conclusion
-        return f"<Analysis: {self.file.name}, {final.kind}{f' ({final.ground})' if final.ground else ''}>"
+        conclusion = self.conclusion
+        return (
+            f"<Analysis: {self.file.name}, {conclusion.kind}{f' ({conclusion.ground})' if conclusion.ground else ''}>"
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """The state for `pickle`, which cannot store the functions of the table; the default of the class is used."""
@@ -108,7 +110,7 @@ class Analysis(AnalysisResult, PrintableResult):
         from kahanmaps.maps.convention import eps_record
         from kahanmaps.version import __version__
 
-        final = self.conclusion
+        conclusion = self.conclusion
         return {
             "command": "analyze",
             "version": __version__,
@@ -119,11 +121,11 @@ class Analysis(AnalysisResult, PrintableResult):
             "arithmetic": "exact formulas, from residues modulo primes",
             **attributes(self, "seed", "effort", "units", "dim", "interrupted"),
             "verdict": {
-                "integrability": final.kind,
-                "integrals": final.integrals if self.integrals_were_counted else None,
+                "integrability": conclusion.kind,
+                "integrals": conclusion.integrals if self.integrals_were_counted else None,
                 "integrals_exact": self.count_is_exact,
-                "growth": final.growth,
-                **attributes(final, "sense", "ground", "sentence"),
+                "growth": conclusion.growth,
+                **attributes(conclusion, "sense", "ground", "sentence"),
             },
             "statements": [
                 {"section": title, **attributes(line, "status", "text")}
@@ -161,7 +163,7 @@ def analyze(
         time_step, h: the time step 2 eps, in its place.
         effort: an integer; each increase by 1 doubles the work that searches may take.
         seed: the random seed.
-        progress: called with a message whenever the analysis turns to something else.
+        progress: called with a message at the beginning of each step, and in steps that take longer.
         on_result: called with the results so far, at the beginning and after each step.
         analyses: the steps to run, in this order; the verdict rests on their results only.
         processes: 1, or more: then a forked copy of this process runs the independent steps, where there is a second
@@ -198,10 +200,10 @@ def analyze(
         for is_independent in (False, True)
     }
     with _second_process(context, forked, accounts[True]) as outcomes:
-        here, there = [step for step in steps if step not in forked], list(forked)
-        while here or there:
-            has_arrived = bool(there) and (not here or outcomes.poll())
-            step, outcome = (there if has_arrived else here).pop(0), None
+        own, in_fork = [step for step in steps if step not in forked], list(forked)
+        while own or in_fork:
+            has_arrived = bool(in_fork) and (not own or outcomes.poll())
+            step, outcome = (in_fork if has_arrived else own).pop(0), None
             progress(step.name)
             if has_arrived:
                 # The process was killed, or met an error, which this process meets again.
@@ -218,13 +220,13 @@ def analyze(
                 analysis[step.key] = result
             analysis.pending.remove(step.name)
             on_result(analysis)
-    if others := ", ".join(step.name for step in analyses if not context.applies(step)):
+    if inapplicable := ", ".join(step.name for step in analyses if not context.applies(step)):
         if context.root is not None:
             analysis.skipped.append(
-                f"over the number field {context.root.number_field}: {others}, integrals in iterates"
+                f"over the number field {context.root.number_field}: {inapplicable}, integrals in iterates"
             )
         else:
-            analysis.skipped.append(f"{others}: for vector fields only")
+            analysis.skipped.append(f"{inapplicable}: for vector fields only")
     return analysis
 
 

@@ -66,14 +66,14 @@ class _Facts:
         # The number of integrals, or a lower bound.
         where = f" in dimension {result.dim}"
         number = counted(self.count, "independent integral") if self.count else "no integral"
-        self.integrals = number + where if result.count_is_exact else f"at least {number}{where}"
+        self.integrals_text = number + where if result.count_is_exact else f"at least {number}{where}"
         if not result.integrals_were_counted:
-            self.integrals = "the integrals were not counted"
+            self.integrals_text = "the integrals were not counted"
         elif not self.count and result.integrals is not None and not result.count_is_exact:
             degree = result.integrals.profile.degree
-            self.integrals = f"no integral{where} up to degree {degree} (relations along orbits)"
+            self.integrals_text = f"no integral{where} up to degree {degree} (relations along orbits)"
         period = result.integrals.profile.period if result.integrals is not None else None
-        self.closes = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
+        self.closing_text = "" if period is None else f"orbits close after {counted(period, 'step')} (measured)"
         self.is_linear = result.file.is_quadratic and result.file.system.degree <= 1
         self.liouville = ""  # why the map is Liouville integrable; only if proved
         if result.dim > 2 and not self.is_linear:
@@ -88,14 +88,14 @@ class _Facts:
 def conclude(result: AnalysisResult) -> Conclusion:
     """Return the verdict of the first rule in `_RULES` that applies, or that the growth is undecided."""
     facts = _Facts(result)
-    undecided = f"The growth is undecided: {facts.growth_text}; {facts.integrals}."
+    undecided = f"The growth is undecided: {facts.growth_text}; {facts.integrals_text}."
     verdict = next(filter(None, (rule(facts) for rule in _RULES)), _Verdict("undecided", undecided, ground=None))
     sentence = verdict.sentence
     if result.eps is not None:
         sentence += f" All this holds at eps = {result.eps}; other eps may differ."
     if result.symbols:
-        parts = "integrals" if result.densities is None else "integrals and densities"
-        sentence += f" The {parts} hold for every {', '.join(result.symbols)}, all else for the given values."
+        formulas_text = "integrals" if result.densities is None else "integrals and densities"
+        sentence += f" The {formulas_text} hold for every {', '.join(result.symbols)}, all else for the given values."
     if facts.liouville:
         sentence += f" It is Liouville integrable, {facts.liouville} (proved)."
     sense, ground, growth = (
@@ -122,17 +122,17 @@ def _linear(facts: _Facts) -> _Verdict | None:
     if eps is not None and (QQ.identity(B.nrows()) - B * eps).det() == 0:
         return _Verdict("singular", "The map is nowhere defined: det(I - eps f') = 0.", ground=Certainty.PROVED)
     proof = None if facts.degrees is None else facts.degrees.proof
-    closes = facts.closes and f"; {facts.closes}"
+    closes = facts.closing_text and f"; {facts.closing_text}"
     if proof is not None and proof.is_identity:
         closes = f"; {proof.reason} (proved)"
-    sentence = f"The system is linear, and so is its Kahan map; {facts.integrals}{closes}."
+    sentence = f"The system is linear, and so is its Kahan map; {facts.integrals_text}{closes}."
     return _Verdict("linear", sentence, ground=Certainty.PROVED)
 
 
 def _contradictory(facts: _Facts) -> _Verdict | None:
     if not (sentences := contradictions(facts.result)):
         return None
-    sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capital(facts.integrals)}."
+    sentence = f"The results contradict each other: {'; '.join(sentences)}. {_capital(facts.integrals_text)}."
     return _Verdict("undecided", sentence, ground=None)
 
 
@@ -147,16 +147,18 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
     """Periodic maps, those with a constant iterate, and those of bounded degrees."""
     proof = facts.degrees.proof if facts.degrees is not None else None
     if proof is not None and proof.is_identity:
-        sentence = f"The map is periodic: {proof.reason} (proved); {facts.integrals}."
+        sentence = f"The map is periodic: {proof.reason} (proved); {facts.integrals_text}."
         return _Verdict("linearisable", sentence, ground=Certainty.PROVED)
-    if facts.closes:
-        return _Verdict("linearisable", f"{_capital(facts.closes)}: the map is periodic there; {facts.growth_text}.")
+    if facts.closing_text:
+        return _Verdict(
+            "linearisable", f"{_capital(facts.closing_text)}: the map is periodic there; {facts.growth_text}."
+        )
     if facts.growth is Growth.ZERO:
         return _Verdict("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
     if facts.growth is not Growth.BOUNDED:
         return None
     bounded = f"The degrees of the iterates are bounded{facts.basis_text}"
-    sentence = f"{bounded}: the map is linearisable in the sense of bounded degrees; {facts.integrals}."
+    sentence = f"{bounded}: the map is linearisable in the sense of bounded degrees; {facts.integrals_text}."
     return _Verdict("linearisable", sentence, ground=facts.growth_certainty)
 
 
@@ -171,41 +173,43 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
         f"Not integrable (proved): {bound}{where}, so that the algebraic entropy is positive and no rational "
         f"function is an integral; {facts.growth_text}{facts.basis_text}."
     )
-    return _Verdict("not integrable", sentence, _confining(result), Certainty.PROVED)
+    return _Verdict("not integrable", sentence, _sense_if_not_integrable(result), Certainty.PROVED)
 
 
-def _on_curves(facts: _Facts) -> _Verdict | None:
-    """The verdict on a map whose orbits lie on curves: by proved integrals, or by those found if no growth is known."""
-    result, proved_integrals = facts.result, 0  # independent ones
+def _orbits_on_curves(facts: _Facts) -> _Verdict | None:
+    """The verdict on a map whose orbits lie on curves, by proved integrals; by others only if the growth is unknown."""
+    result, proved_count = facts.result, 0  # of independent integrals
     if result.integrals is not None:
-        proved_integrals = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
-        proved_integrals = max(proved_integrals, 0 if result.integrals.symbols else result.integrals.by_theorems)
-    if result.dim > 1 and proved_integrals >= result.dim - 1:
+        proved_count = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
+        proved_count = max(proved_count, 0 if result.integrals.symbols else result.integrals.by_theorems)
+    if result.dim > 1 and proved_count >= result.dim - 1:
         sense = "superintegrable" if result.dim > 2 else "integrable"
         genus = result.pencil.genus if result.pencil is not None else None
         if genus is None and result.dim == 2:  # not computed, but determined by the growth
             genus = next((g for g, kind in GROWTH_ON.items() if kind is facts.growth), None)
         where = f"so that orbits lie on {_CURVES.get(genus, f'curves of genus {genus}')}"
-        sentence = f"{sense.capitalize()} (proved): {facts.integrals}, {where}; {facts.growth_text}{facts.basis_text}."
+        sentence = (
+            f"{sense.capitalize()} (proved): {facts.integrals_text}, {where}; {facts.growth_text}{facts.basis_text}."
+        )
         return _Verdict("integrable", sentence, sense, Certainty.PROVED)
     on_curves = orbits_lie_on_curves(result)
     if facts.growth is not Growth.UNKNOWN or not (facts.liouville or on_curves):
         return None
     curves = ", so that orbits lie on curves" if on_curves else ""
-    sentence = f"Integrable: {facts.integrals}{curves}; degrees: {facts.growth_text}."
+    sentence = f"Integrable: {facts.integrals_text}{curves}; degrees: {facts.growth_text}."
     return _Verdict("integrable", sentence, *_sense(facts.liouville))
 
 
 def _by_growth(facts: _Facts) -> _Verdict | None:
     """Exponential and polynomial growth, measured or derived."""
-    count, integrals = facts.count, facts.integrals
-    exact = facts.growth is Growth.EXPONENTIAL  # else the text says that it is estimated
-    if exact or (facts.degrees is not None and facts.degrees.looks_exponential):
+    count, integrals = facts.count, facts.integrals_text
+    is_known = facts.growth is Growth.EXPONENTIAL  # else the text says that it is estimated
+    if is_known or (facts.degrees is not None and facts.degrees.looks_exponential):
         although = f", although there {'is' if count == 1 else 'are'} {integrals}" if count else f"; {integrals}"
-        growth = f"{facts.growth_text}{facts.basis_text if exact else ''}"
+        growth = f"{facts.growth_text}{facts.basis_text if is_known else ''}"
         sentence = f"Not integrable in the sense of zero algebraic entropy: {growth}{although}."
-        ground = facts.growth_certainty if exact else Certainty.ESTIMATED
-        return _Verdict("not integrable", sentence, _confining(facts.result), ground)
+        ground = facts.growth_certainty if is_known else Certainty.ESTIMATED
+        return _Verdict("not integrable", sentence, _sense_if_not_integrable(facts.result), ground)
     if facts.growth in _POLYNOMIAL:
         sentence = (
             f"Integrable in the sense of zero algebraic entropy: {facts.growth_text}{facts.basis_text}; {integrals}."
@@ -217,7 +221,7 @@ def _by_growth(facts: _Facts) -> _Verdict | None:
 # Stronger rules first: proved results before measured ones.
 _RULES: tuple[Callable[[_Facts], _Verdict | None], ...] = (
     *(_nowhere_defined, _linear, _contradictory, _not_birational, _linearisable, _of_positive_entropy),
-    *(_on_curves, _by_growth),
+    *(_orbits_on_curves, _by_growth),
 )
 
 
@@ -227,7 +231,7 @@ def _sense(liouville: str, ground: Certainty | None = Certainty.MEASURED) -> tup
     return "integrable in the sense of zero algebraic entropy", ground
 
 
-def _confining(result: AnalysisResult) -> str:
+def _sense_if_not_integrable(result: AnalysisResult) -> str:
     """Return the sense in which a map is not integrable; a map may be confining and not integrable."""
     confined = {run.verdict for run in result.singularities} == {CONFINED}
     return "confining and not integrable" if confined else "not integrable"
@@ -282,8 +286,10 @@ def doubt_of_heights(result: AnalysisResult) -> str:
     else:
         reason = ""
     steps = max(len(orbit.growth.heights) for orbit in result.heights.orbits) - 1
-    last = max(result.degrees.patterns.lengths, default=0) if result.degrees.patterns is not None else 0
-    if kind is not Growth.UNDECIDED and last > steps // 2:
-        late = f"orbits of {counted(steps, 'step')} are too short, singularity patterns settle only at step {last}"
-        return f"{reason}: {late}" if reason else late
+    longest = max(result.degrees.patterns.lengths, default=0) if result.degrees.patterns is not None else 0
+    if kind is not Growth.UNDECIDED and longest > steps // 2:
+        too_short = (
+            f"orbits of {counted(steps, 'step')} are too short, singularity patterns settle only at step {longest}"
+        )
+        return f"{reason}: {too_short}" if reason else too_short
     return reason

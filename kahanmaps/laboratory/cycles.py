@@ -129,19 +129,19 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
     p, count = census.prime, census.points
     # The code of a point is its coordinates as digits. As the last one that is not 0 is 1, codes are p^m ... 2 p^m - 1.
     codes = np.concatenate([np.arange(p**m, 2 * p**m) for m in range(census.dim + 1)])
-    places = p ** np.arange(census.dim + 1)
+    place_values = p ** np.arange(census.dim + 1)
     image = np.full(count + 1, count)  # `count` stands for no point
     try:
         for low in range(0, count, space.portion):
             progress(f"p = {p}: the images of {low} of {count} points")
-            found = places @ space.images(codes[low : low + space.portion] // places[:, None] % p)
-            image[low : low + len(found)] = np.where(found > 0, np.searchsorted(codes, found), count)
+            image_codes = place_values @ space.images(codes[low : low + space.portion] // place_values[:, None] % p)
+            image[low : low + len(image_codes)] = np.where(image_codes > 0, np.searchsorted(codes, image_codes), count)
     except TimeLimit:
         return replace(census, stopped=True)
-    last = image
+    final = image
     for _ in range(count.bit_length()):  # doubles the number of steps, until all orbits are on their cycles
-        last = last[last]
-    cyclic = np.setdiff1d(last, [count])
+        final = final[final]
+    cyclic = np.setdiff1d(final, [count])
     lengths: Counter[int] = Counter()
     following, is_seen = image.tolist(), bytearray(count)
     for point in cyclic.tolist():
@@ -151,11 +151,11 @@ def _of_all_points(space: _ProjectiveMap, census: Census, progress: Callable[[st
             point = following[point]
             length += 1
         lengths[length] += length > 0
-    indeterminate, ended = (int((points[:count] == count).sum()) for points in (image, last))
-    kinds = dict[str, Any](
+    indeterminate, ended = (int((points[:count] == count).sum()) for points in (image, final))
+    counts_by_kind = dict[str, Any](
         indeterminate=indeterminate, pre_indeterminate=ended - indeterminate, preperiodic=count - ended - len(cyclic)
     )
-    return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **kinds)
+    return replace(census, complete=True, examined=count, lengths=dict(sorted((+lengths).items())), **counts_by_kind)
 
 
 def _of_samples(

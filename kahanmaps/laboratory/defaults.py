@@ -33,5 +33,6 @@ def tensor_degree(dim: int) -> int:
 
 
 def budget_for(search: str, effort: int | Budget) -> Budget:
-    """The budget of a search at an effort, of which 1 is the default and each more doubles the units; or as given."""
+    """The budget of a search at an effort: 1 is the default, each increase by 1 doubles the units. A Budget is returned
+    unchanged."""
     return effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS[search]))

@@ -69,7 +69,7 @@ from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
-_TIMED = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
+_TIME_DEPENDENT = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
 MAX_DEGREE = 6  # of a number field; its polynomial splits modulo at least one prime in 720
 _BUDGET = DEFAULT_BUDGET  # the limit of `check-integrals`, so that both prove the same identities
@@ -126,8 +126,8 @@ class Laboratory:
         if algebraic and isinstance(file.map, AlgebraicMap):
             self.root, self.map = file.map.root, file.map.given
             if symbols or self.root.degree > MAX_DEGREE:
-                given = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
-                raise InputError(f"found {given}, expected no other symbols and a degree of at most {MAX_DEGREE}")
+                found = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
+                raise InputError(f"found {found}, expected no other symbols and a degree of at most {MAX_DEGREE}")
             self.symbols = self.map.symbols
         else:
             self.map = map_with_symbols(file, self.symbols)
@@ -148,9 +148,9 @@ class Laboratory:
         self._too_long: dict[bool, int] = {}
         self._flow_polynomials: FlowPolynomials | None = None
         if flow and (self.field is None or self.eps is not None):
-            what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
+            found_text = "eps = " + str(self.eps) if self.field is not None else self.map.kind
             raise InputError(
-                f"found {what}, expected a polynomial vector field without eps for an analysis of the flow"
+                f"found {found_text}, expected a polynomial vector field without eps for an analysis of the flow"
             )
         subject = self.map.subject if self.root is None else file.map.subject
         self.seed = derive_seed(seed, self.symbols, subject, self.eps)  # of all random choices for this map
@@ -169,9 +169,12 @@ class Laboratory:
         return ModularMap(self.map, prime, eps, values, self.seed)
 
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
-        """Return the map at values of the names in formulas: the symbols, and last eps if it enters as a symbol."""
+        """Return the map at values of the names in formulas: the symbols, and last eps if it enters as a symbol.
+
+        Elsewhere eps is 1, or the given number.
+        """
         count = len(self.symbols)
-        return self.map_at(prime, values[:count], (*values, 1)[count])
+        return self.map_at(prime, values[:count], values[count] if len(values) > count else 1)
 
     def other_maps(self, count: int) -> Iterator[ModularMap]:
         """Yield `count` maps modulo further primes, each at other random residues of the symbols and eps."""
@@ -204,17 +207,17 @@ class Laboratory:
         """Why the map at the given eps is not birational, measured at random points; empty if it is."""
         if self.flow or (self.eps is None and self.system is not None):
             return ""  # det(I - eps f'(x)) is 1 at eps = 0
-        at = "" if self.eps is None else f"at eps = {self.eps} "
+        at_eps_text = "" if self.eps is None else f"at eps = {self.eps} "
         name, numerator = self.map.denominator_name, "det dPhi(x)"
         if self.system is not None:
             name, numerator = "det(I - eps f'(x))", "det(I + eps f'(x))"
         try:
             pairs = [(map_, *pair) for map_ in self.maps for pair in map_.pairs(2)]
         except NoPoint:
-            return f"{at}the map is defined nowhere: {name} is identically 0"
+            return f"{at_eps_text}the map is defined nowhere: {name} is identically 0"
         if not any(map_.determinant(x, image)[0] for map_, x, image in pairs):
             where = "points" if self.system is None else "images"
-            return f"{at}the map is not invertible: {numerator} is 0 at all {where}"
+            return f"{at_eps_text}the map is not invertible: {numerator} is 0 at all {where}"
         return ""
 
     def cofactors(self) -> list[Cofactor]:
@@ -263,18 +266,18 @@ class Laboratory:
         """
         if self.field is not None and self.flow:
             is_kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
-            evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIMED
+            evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIME_DEPENDENT
             return (Certainty.PROVED if is_kept else Certainty.REFUTED), evidence
         map_ = self.map if self.root is None else self.file.map
         options: dict[str, Any] = {"eps": self.eps, "seed": self.seed, "is_density": is_density}
-        separated = self._separated
+        in_planes = self._separated
         terms = len(function.numerator) + len(function.denominator)
-        expands = separated is None and terms < self._too_long.get(is_density, math.inf)
+        expands = in_planes is None and terms < self._too_long.get(is_density, math.inf)
         verdict, evidence = verdict_on(map_, function, **options, factor=factor, expands=expands)
-        if verdict is Certainty.SUPPORTED and separated is not None:
-            moved_factor = None if factor is None else separated.function(factor)
+        if verdict is Certainty.SUPPORTED and in_planes is not None:
+            moved_factor = None if factor is None else in_planes.function(factor)
             certainty, proof = verdict_on(
-                separated.system, separated.function(function), **options, factor=moved_factor
+                in_planes.system, in_planes.function(function), **options, factor=moved_factor
             )
             if certainty is not Certainty.SUPPORTED:
                 summary = f"{proof.summary}, in coordinates in which the planes separate"
@@ -314,47 +317,51 @@ class Laboratory:
         supports = [set(space.places) for space in model]
         # Echelon forms end in a 1 at the largest monomial. The unknowns are the other entries that are not 0.
         pivots = [[max(k for k, entry in enumerate(vector) if entry) for vector in space.basis] for space in model]
-        places = [
-            [(i, k) for i, vector in enumerate(space.basis) for k, c in enumerate(vector) if c and k != ends[i]]
-            for space, ends in zip(model, pivots, strict=True)
+        unknowns = [
+            [(i, k) for i, vector in enumerate(space.basis) for k, c in enumerate(vector) if c and k != space_pivots[i]]
+            for space, space_pivots in zip(model, pivots, strict=True)
         ]
 
-        def box(prime: int, values: tuple[int, ...]) -> tuple[int, ...] | None:
+        def black_box(prime: int, values: tuple[int, ...]) -> tuple[int, ...] | None:
             try:
                 spaces = spaces_on(self.map_for(prime, values))
             except (NoPoint, BadPrime):
                 return None
             if not spaces or any(
-                not set(space.places) <= support or len(space.basis) != len(ends)
-                for space, support, ends in zip(spaces, supports, pivots, strict=True)
+                not set(space.places) <= support or len(space.basis) != len(space_pivots)
+                for space, support, space_pivots in zip(spaces, supports, pivots, strict=True)
             ):
                 return None  # the spaces have another shape
-            return tuple(space.basis[i][k] for space, cells in zip(spaces, places, strict=True) for i, k in cells)
+            return tuple(
+                space.basis[i][k]
+                for space, space_unknowns in zip(spaces, unknowns, strict=True)
+                for i, k in space_unknowns
+            )
 
         names = (*symbols, "eps") if eps_enters == "symbol" else tuple(symbols)
         functions: list[RationalFunction] = []
-        if any(places):
-            answer = reconstruct_at(root, box, names, seed=self.seed, budget=budget)
+        if any(unknowns):
+            answer = reconstruct_at(root, black_box, names, seed=self.seed, budget=budget)
             if answer.functions is None:
                 return ClosedForms(None, answer.reason)
             functions += answer.functions
         context, n = ring((*variables, *symbols, "eps")), len(variables)
         gens, bases = context.gens()[n:], []
-        for space, ends, cells in zip(model, pivots, places, strict=True):
+        for space, space_pivots, space_unknowns in zip(model, pivots, unknowns, strict=True):
             basis, monomials = list[fmpq_mpoly](), exponents_up_to(space.dim, space.degree)
-            for row, pivot in enumerate(ends):
-                mine = [k for i, k in cells if i == row]
-                numerators, denominator = over_one_denominator([functions.pop(0) for _ in mine], context, gens)
+            for row, pivot in enumerate(space_pivots):
+                columns = [k for i, k in space_unknowns if i == row]
+                numerators, denominator = over_one_denominator([functions.pop(0) for _ in columns], context, gens)
                 P = context.constant(0)
-                for k, factor in (*zip(mine, numerators, strict=True), (pivot, denominator)):
+                for k, factor in (*zip(columns, numerators, strict=True), (pivot, denominator)):
                     P = P + factor * context.from_dict({(*monomials[k], *([0] * len(gens))): 1})
                 P = primitive_part(P)[1]
                 if root is not None:
                     P = primitive_over(root, P, n)
                 if eps_enters == "by weight":  # P(eps x), divided by a power of eps
                     degrees = {monomial: sum(map(int, monomial[:n])) for monomial in P.monoms()}
-                    least = min(degrees.values())
-                    P = context.from_dict({(*m[:-1], degrees[m] - least): c for m, c in P.terms()})
+                    lowest_degree = min(degrees.values())
+                    P = context.from_dict({(*m[:-1], degrees[m] - lowest_degree): c for m, c in P.terms()})
                 basis.append(P)
             bases.append(basis)
         return ClosedForms(bases)
@@ -372,7 +379,7 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
     m = root.degree
     assert m <= MAX_DEGREE  # or suitable primes are too rare; the constructor of Laboratory refuses larger degrees
 
-    def split(rng: random.Random) -> int:
+    def draw_splitting_prime(rng: random.Random) -> int:
         while True:
             prime = random_prime(rng)
             with suppress(BadPrime):
@@ -386,10 +393,10 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
             if values is None:
                 return None
             rows.append(values)
-        through = [interpolated(roots, column, prime) for column in zip(*rows, strict=True)]
-        return [int(P[j]) for P in through for j in range(m)]
+        interpolants = [interpolated(roots, column, prime) for column in zip(*rows, strict=True)]
+        return [int(P[j]) for P in interpolants for j in range(m)]
 
-    answer = reconstruct(box, names[1:], draw=split, **options)
+    answer = reconstruct(box, names[1:], draw=draw_splitting_prime, **options)
     if answer.functions is None:
         return answer
     t, *gens = ring(names).gens()
@@ -412,20 +419,23 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
     3*y*a + x
     """
     K = root.number_field
-    parts: dict[tuple[int, ...], list[EtaleElement]] = {}
+    rows_in_eps: dict[tuple[int, ...], list[EtaleElement]] = {}
     for monomial, coefficient in root.remainder(polynomial, n).terms():
         *exponents, j, e = (int(k) for k in monomial)
-        row = parts.setdefault(tuple(exponents), [])
+        row = rows_in_eps.setdefault(tuple(exponents), [])
         row += [K.zero] * (e + 1 - len(row))
         row[e] = row[e] + K.convert(fmpq_poly([0] * j + [coefficient]))
     # Euclid's algorithm over the field: the content is a polynomial in eps, defined up to a number of the field.
     content: list[EtaleElement] = []
-    for row in parts.values():
+    for row in rows_in_eps.values():
         content, remainder = row, content
         while remainder:
             content, remainder = remainder, _divide(content, remainder)[1]
     entries = {
-        (*exponents, e): c for exponents, row in parts.items() for e, c in enumerate(_divide(row, content)[0]) if c != 0
+        (*exponents, e): c
+        for exponents, row in rows_in_eps.items()
+        for e, c in enumerate(_divide(row, content)[0])
+        if c != 0
     }
     multiples = []
     for unit in {str(c): c for c in entries.values()}.values():
@@ -457,9 +467,9 @@ def _divide(P: Sequence[EtaleElement], Q: Sequence[EtaleElement]) -> tuple[list[
 def euler_map(field: PolynomialField) -> ImplicitMap:
     """Return x -> x + eps f(x), a map with the variables and symbols of the field, which represents its flow."""
     context = ring((*field.variables, *field.symbols, "eps"))
-    *old, eps = context.gens()
-    moved = (x + eps * f.compose(*old, ctx=context) for x, f in zip(old, field.rhs, strict=False))
-    return explicit_map(field.variables, [RationalFunction(P, context.constant(1)) for P in moved])
+    *gens, eps = context.gens()
+    images = (x + eps * f.compose(*gens, ctx=context) for x, f in zip(gens, field.rhs, strict=False))
+    return explicit_map(field.variables, [RationalFunction(P, context.constant(1)) for P in images])
 
 
 def is_kept_by_flow(
@@ -608,11 +618,11 @@ def separated(system: QuadraticSystem) -> Separated | None:
     >>> [len(f) for f in system.rhs], [len(f) for f in separated(system).system.rhs]
     ([8, 8, 9, 9], [2, 3, 3, 2])
     """
-    known = system_normal_form(system)
-    if not isinstance(known, SystemNormalForm):
+    normal_form = system_normal_form(system)
+    if not isinstance(normal_form, SystemNormalForm):
         return None
-    splitting = Splitting(known.form, QQ, 1, known.T)
+    splitting = Splitting(normal_form.form, QQ, 1, normal_form.T)
     matrices = [splitting.matrix(plane) for plane in range(len(splitting.planes))]
     T = fmpq_mat([list(chain(*rows)) for rows in zip(*matrices, strict=True)])
-    separate = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
-    return Separated(separate, T) if sum(map(len, separate.rhs)) < sum(map(len, system.rhs)) else None
+    separated_system = system.composed(T, [fmpq(0)] * system.dim).transformed(T.inv())
+    return Separated(separated_system, T) if sum(map(len, separated_system.rhs)) < sum(map(len, system.rhs)) else None

@@ -120,12 +120,14 @@ class ModularMap:
         points = self.orbit(count)
         period = len(points) if len(points) < count else None
         layers = _layers(self.dim, degree) if support is None else _layers_of(self.dim, degree, support)
-        return [_products(x, layers, self.prime) for x in points], points[0], period
+        return [_layered_values(x, layers, self.prime) for x in points], points[0], period
 
-    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
-        """Return the values of all monomials up to a degree at a point and at its image, times the two factors `by`."""
+    def monomials_at_both(
+        self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
+    ) -> tuple[Values, Values]:
+        """Return the values of all monomials up to a degree at a point and at its image, times the two `factors`."""
         layers, p = _layers(self.dim, degree), self.prime
-        return _products(x, layers, p, by[0]), _products(image, layers, p, by[1])
+        return _layered_values(x, layers, p, factors[0]), _layered_values(image, layers, p, factors[1])
 
 
 class ModularFlow(ModularMap):
@@ -180,17 +182,19 @@ class ModularFlow(ModularMap):
         values = monomial_values(x, self.degree, self.prime)
         return 1 + sum(c * values[k] for c, k in self._divergence), 1
 
-    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
-        """Return the values of all monomials P up to a degree and of P + f . grad P, times the two factors `by`."""
+    def monomials_at_both(
+        self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
+    ) -> tuple[Values, Values]:
+        """Return the values of all monomials P up to a degree and of P + f . grad P, times the two `factors`."""
         p = self.prime
         values = monomial_values(x, degree, p)
         count(len(values) * self.dim / 4)
         f = [after - before for before, after in zip(x, image, strict=True)]
         image_values = [
-            (value + sum(e * values[place] * f[k] for k, e, place in slopes)) * by[1] % p
-            for value, slopes in zip(values, monomial_tables(self.dim, degree), strict=True)
+            (value + sum(e * values[place] * f[k] for k, e, place in derivatives)) * factors[1] % p
+            for value, derivatives in zip(values, monomial_tables(self.dim, degree), strict=True)
         ]
-        return [by[0] * value % p for value in values], image_values
+        return [factors[0] * value % p for value in values], image_values
 
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
@@ -209,17 +213,17 @@ class ModularFlow(ModularMap):
         in_rows = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
         count(orders * (in_rows + columns / 2) + 3 * columns)
         # The keys are indices of monomials: 0 is that of 1, k + 1 that of the k-th variable.
-        known = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
-        known |= {place: list[int]() for place, _ in self._products}
+        coefficients = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
+        coefficients |= {place: list[int]() for place, _ in self._products}
         for order in range(1, orders):
             for place, (variable, lower) in self._products:
-                known[place].append(sum(map(mul, known[variable + 1], reversed(known[lower]))) % p)
-            slopes = [sum(c * known[place][-1] for c, place in f) for f in self._f]
+                coefficients[place].append(sum(map(mul, coefficients[variable + 1], reversed(coefficients[lower]))) % p)
+            derivatives = [sum(c * coefficients[place][-1] for c, place in f) for f in self._f]
             inverse = pow(order, -1, p)
-            known[0].append(0)
-            for k, slope in enumerate(slopes, 1):
-                known[k].append(slope * inverse % p)
-        solution = [nmod_poly(known[k + 1], p) for k in range(self.dim)]
+            coefficients[0].append(0)
+            for k, derivative in enumerate(derivatives, 1):
+                coefficients[k].append(derivative * inverse % p)
+        solution = [nmod_poly(coefficients[k + 1], p) for k in range(self.dim)]
         table = {0: nmod_poly([1], p)}
 
         def monomial(place: int) -> nmod_poly:
@@ -259,12 +263,12 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
 def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
     """Return for each degree and monomial of the support a variable, and the index of the quotient in the support."""
     exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
-    places = {number: place for place, number in enumerate(support)}
+    positions = {index: position for position, index in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]
-    for number in support:
-        if number:
-            variable, _, without = tables[number][-1]
-            layers[sum(exponents[number]) - 1].append((variable, places[without]))
+    for index in support:
+        if index:
+            variable, _, quotient = tables[index][-1]
+            layers[sum(exponents[index]) - 1].append((variable, positions[quotient]))
     return layers
 
 
@@ -275,12 +279,13 @@ def _layers(dim: int, degree: int) -> list[list[tuple[int, int]]]:
 
 def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
     """Return the values of all monomials of degree at most `degree` at a point modulo a prime."""
-    values = _products(point, _layers(len(point), degree), prime)
+    values = _layered_values(point, _layers(len(point), degree), prime)
     count(len(values) / 8)
     return list(map(int, values))
 
 
-def _products(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> Values:
+def _layered_values(point: Point, layers: Sequence[Sequence[tuple[int, int]]], prime: int, factor: int = 1) -> Values:
+    """Return the values of the monomials in the layers of `_layers_of`, times a factor."""
     x, table = [nmod(entry, prime) for entry in point], [nmod(factor, prime)]
     for layer in layers:
         table += [table[place] * x[variable] for variable, place in layer]
@@ -293,21 +298,21 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
     value, gradient = 0, [0] * len(point)
     powers = monomial_values(point, degree, prime)
     count(len(vector) / 20 + 0.75 * sum(map(bool, vector)))
-    for coefficient, slopes, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
+    for coefficient, factors, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
         if coefficient:  # most are 0
             value += coefficient * power
-            for variable, exponent, place in slopes:
+            for variable, exponent, place in factors:
                 gradient[variable] = (gradient[variable] + coefficient * exponent * powers[place]) % prime
     return value % prime, gradient
 
 
-def slope_values(point: Point, degree: int, prime: int) -> list[list[int]]:
+def monomial_derivatives(point: Point, degree: int, prime: int) -> list[list[int]]:
     """Return the partial derivatives of all monomials of degree at most `degree`, a row for each variable."""
     powers = monomial_values(point, degree, prime)
     rows = [[0] * len(powers) for _ in point]
     count(len(point) * len(powers) / 5)
-    for k, slopes in enumerate(monomial_tables(len(point), degree)):
-        for variable, exponent, place in slopes:
+    for k, factors in enumerate(monomial_tables(len(point), degree)):
+        for variable, exponent, place in factors:
             rows[variable][k] = exponent * powers[place] % prime
     return rows
 
@@ -345,11 +350,11 @@ def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmo
     return P
 
 
-def slopes(function: RationalFunction, field: Any, place: Sequence[Any], n: int) -> list[Any]:
+def scaled_gradient(function: RationalFunction, field: Any, place: Sequence[Any], n: int) -> list[Any]:
     """Return the gradient of N/D in the first n variables, times D^2."""
     N, D = (evaluate(part, field, place) for part in (function.numerator, function.denominator))
-    upper, lower = (gradient(part)[:n] for part in (function.numerator, function.denominator))
-    return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(upper, lower, strict=True)]
+    dN, dD = (gradient(part)[:n] for part in (function.numerator, function.denominator))
+    return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(dN, dD, strict=True)]
 
 
 class Independent:
@@ -366,7 +371,7 @@ class Independent:
         """Return a multiple of the gradient of a function of (variables, symbols, eps) in the variables."""
         field = GF(self.map.prime)
         place = [field.convert(c) for c in (*self.point, *self.map.values, self.map.eps)]
-        return [int(entry) for entry in slopes(function, field, place, self.map.dim)]
+        return [int(entry) for entry in scaled_gradient(function, field, place, self.map.dim)]
 
     def adds(self, row: list[int]) -> bool:
         """Return whether a gradient is linearly independent of the others; nothing is added."""

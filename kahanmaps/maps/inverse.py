@@ -70,7 +70,7 @@ def inverse_rows(rows: Rows) -> Rows:
         for row in rows
     ]
     field, sample = _graph_point(rows)
-    solution = _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
+    solution = _solve(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
     names_ring = ring(names)
     exchanged = [names_ring.constant(0)] * n + list(names_ring.gens())
     inverse = []
@@ -104,7 +104,7 @@ def why_not_birational(rows: Rows) -> str:
                     terms[key] = terms.get(key, field.zero) + value
             equations.append(context.from_dict({key: int(value) for key, value in terms.items() if value != 0}))
         try:
-            _solved(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
+            _solve(equations, list(range(n)), partial(_vanishes, field=field, sample=sample))
         except NotBirational as error:
             reasons.append(str(error))
             continue
@@ -140,7 +140,7 @@ def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool
     return bool(total == 0)
 
 
-def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
+def _solve(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
     """Solve for the unknowns as functions of the other variables, from polynomials that vanish on the graph."""
     if not unknowns:
         return {}
@@ -164,9 +164,9 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
         )
         constant, factor = _coefficients(chosen, u)  # constant + factor x_u = 0
         others = [_substituted(p, u, -constant, factor) for p in relations if p is not chosen]
-        solution = _solved(others, [v for v in unknowns if v != u], on_graph)
+        solution = _solve(others, [v for v in unknowns if v != u], on_graph)
         (a, b), (c, d) = (_substitute_solution(part, solution) for part in (-constant, factor))
-        return solution | {u: _lowest(a * d, b * c)}
+        return solution | {u: _in_lowest_terms(a * d, b * c)}
     # No equation is linear in an unknown: resultants eliminate one.
     if len(unknowns) == 1:
         raise NotBirational(
@@ -182,12 +182,12 @@ def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Calla
             raise TooLarge("the inverse of this map is too large to be computed: give it as well")
         eliminated.append(pivot.resultant(p, name))
     others = [v for v in unknowns if v != u]
-    solution = _solved(eliminated, others, on_graph)
+    solution = _solve(eliminated, others, on_graph)
     common = None
     for p in containing:
         numerator, _ = _substitute_solution(p, solution)
         common = numerator if common is None else common.gcd(numerator)
-    return solution | _solved([common], [u], on_graph)
+    return solution | _solve([common], [u], on_graph)
 
 
 def _coefficients(polynomial: Any, u: int) -> list[Any]:
@@ -215,9 +215,9 @@ def _substitute_solution(polynomial: Any, solution: Solution) -> Quotient:
     for u, (numerator, denominator_of_unknown) in solution.items():
         denominator = denominator * denominator_of_unknown ** int(polynomial.degrees()[u])
         polynomial = _substituted(polynomial, u, numerator, denominator_of_unknown)
-    return _lowest(polynomial, denominator)
+    return _in_lowest_terms(polynomial, denominator)
 
 
-def _lowest(numerator: Any, denominator: Any) -> Quotient:
+def _in_lowest_terms(numerator: Any, denominator: Any) -> Quotient:
     common = numerator.gcd(denominator)
     return numerator / common, denominator / common

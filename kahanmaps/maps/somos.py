@@ -78,8 +78,8 @@ class Integers:
         total = s.p * (denominator // s.q) * first - t.p * (denominator // t.q) * second
         if divisor is not None:
             total = divide_exactly([total], divisor)[0]
-        value, part = split_by_primes(total, self.power)
-        return value, fmpq(part, denominator)
+        value, scale_numerator = split_by_primes(total, self.power)
+        return value, fmpq(scale_numerator, denominator)
 
 
 class Terms:
@@ -105,21 +105,21 @@ class Terms:
         self._numbers, self._gamma = numbers, gamma
         self._terms: dict[int, Any] = {}
         self._scales: dict[int, Any] = {}  # s(n)/(s(i) S(j))^2 for n above 4
-        self._first: dict[int, Any] = {}  # s(n), as long as it is short
+        self._short_scales: dict[int, Any] = {}  # s(n), as long as it is short
         self._pairs: dict[int, tuple[Any, Any]] = {}
         self._order = deque[int]()  # of computation of the terms after the first ones
-        self._parts: dict[int, Any] = {}
-        self._ratios: dict[int, Any] = {}
+        self._own_quotients: dict[int, Any] = {}
+        self._mixed_quotients: dict[int, Any] = {}
         for n, term in enumerate(first, start=1):
             if term == 0:
                 raise ArithmeticError("one of the first terms is 0")
-            self._terms[n], self._first[n] = numbers.split(term)
+            self._terms[n], self._short_scales[n] = numbers.split(term)
         # The division by t(i - j): for 1 and W(2) in the scale, otherwise by w, which divides exactly.
         is_by_scale = multiples is None or first[0] == first[1] == 1
-        self._low = {
+        self._divisor_and_scale = {
             low: (None, first[low - 1])
             if is_by_scale
-            else (numbers.prepared_divisor(self._terms[low]), self._first[low])
+            else (numbers.prepared_divisor(self._terms[low]), self._short_scales[low])
             for low in (1, 2)
         }
 
@@ -138,14 +138,16 @@ class Terms:
             if self._gamma is not None and (i % 3 == 0) != (j % 3 == 0):
                 a, b = (a * self._gamma, b) if j % 3 == 0 else (a, b * self._gamma)
             (square, outer), (W_square, W_outer) = self.pair(i), self._W.pair(j)
-            divisor, scale = self._low[low]
-            self._terms[n], part = self._numbers.difference(a, outer * W_square, b, square * W_outer, divisor)
-            self._scales[n] = part / scale
+            divisor, scale = self._divisor_and_scale[low]
+            self._terms[n], numerator_scale = self._numbers.difference(
+                a, outer * W_square, b, square * W_outer, divisor
+            )
+            self._scales[n] = numerator_scale / scale
             if n > _DIRECT + 1:
                 self._order.append(n)
             else:
-                scale_product = self._first[i] * self._W._first[j]
-                self._first[n] = self._scales[n] * scale_product * scale_product
+                scale_product = self._short_scales[i] * self._W._short_scales[j]
+                self._short_scales[n] = self._scales[n] * scale_product * scale_product
         return self._terms[n]
 
     def pair(self, n: int) -> tuple[Any, Any]:
@@ -157,31 +159,31 @@ class Terms:
 
     def own_quotient(self, n: int) -> Any:
         """Return s(n + 1) s(n - 1)/s(n)^2, for n >= 2."""
-        if n not in self._parts:
+        if n not in self._own_quotients:
             at_n_minus_1, at_n, at_n_plus_1 = (self._scale(k, n <= _DIRECT) for k in (n - 1, n, n + 1))
             quotient = at_n_plus_1 * at_n_minus_1 / (at_n * at_n)
             if n > _DIRECT:
                 k = n // 2
                 root = self.mixed_quotient(k + 1) * self._W.own_quotient(k) if n % 2 else 1 / self.mixed_quotient(k)
                 quotient = quotient * root * root
-            self._parts[n] = quotient
-        return self._parts[n]
+            self._own_quotients[n] = quotient
+        return self._own_quotients[n]
 
     def mixed_quotient(self, n: int) -> Any:
         """Return S(n - 1) s(n + 1)/(S(n) s(n)), for n >= 2."""
         if self is self._W:
             return self.own_quotient(n)
-        if n not in self._ratios:
+        if n not in self._mixed_quotients:
             W = self._W
-            is_first = n <= _DIRECT
-            quotient = W._scale(n - 1, is_first) * self._scale(n + 1, is_first)
-            quotient = quotient / (W._scale(n, is_first) * self._scale(n, is_first))
+            is_short = n <= _DIRECT
+            quotient = W._scale(n - 1, is_short) * self._scale(n + 1, is_short)
+            quotient = quotient / (W._scale(n, is_short) * self._scale(n, is_short))
             if n > _DIRECT:
                 k = n // 2
                 root = self.mixed_quotient(k + 1) * W.own_quotient(k) if n % 2 else 1 / W.own_quotient(k)
                 quotient = quotient * root * root
-            self._ratios[n] = quotient
-        return self._ratios[n]
+            self._mixed_quotients[n] = quotient
+        return self._mixed_quotients[n]
 
     def forget(self, n: int) -> None:
         """Discard the terms with index below n that terms near 2 n + 8 and later do not need; keep the first ones.
@@ -193,8 +195,8 @@ class Terms:
         for k in [k for k in self._pairs if not (n <= k <= n + 12 or k >= 2 * n + 7)]:
             del self._pairs[k]
 
-    def _scale(self, n: int, is_first: bool) -> Any:
-        table = self._first if is_first else self._scales
+    def _scale(self, n: int, is_short: bool) -> Any:
+        table = self._short_scales if is_short else self._scales
         if n not in table:
             self.integer(n)
         return table[n]

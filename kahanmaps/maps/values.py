@@ -102,8 +102,8 @@ def coordinates(values: Any, field: Field, variables: Sequence[str], dim: int) -
     if not isinstance(values, tuple):
         values = as_point(values, variables)
     if len(values) != dim:
-        named = f": {', '.join(variables)}" if variables else ""
-        raise InputError(f"found a point with {counted(len(values), 'coordinate')}, expected {dim}{named}")
+        variables_text = f": {', '.join(variables)}" if variables else ""
+        raise InputError(f"found a point with {counted(len(values), 'coordinate')}, expected {dim}{variables_text}")
     try:
         return tuple(field.convert(value) for value in values)
     except InexactNumber as error:

@@ -88,6 +88,6 @@ def test_a_ratio_that_is_not_conserved_is_refuted():
 def test_ratios_of_functions_of_rank_two_are_no_integrals_but_those_of_minors_are():
     laboratory, _, _, ratios = searched(load("clebsch_first_flow"))
     minors = ratios[-1]
-    assert minors.lift.rank == 2
-    single = replace(minors, lift=minors.lift._replace(rank=1), numerator=(0,), denominator=(1,))
+    assert minors.two_point_basis.rank == 2
+    single = replace(minors, two_point_basis=minors.two_point_basis._replace(rank=1), numerator=(0,), denominator=(1,))
     assert verdict_on_ratio(laboratory, single)[0] is Certainty.REFUTED

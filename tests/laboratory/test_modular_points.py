@@ -96,7 +96,7 @@ def test_values_before_and_after_a_step_are_multiplied_each_by_its_number(kind):
     map_ = ModularFlow(system, PRIME) if kind == "flow" else ModularMap(system, PRIME, 7)
     map_ = TwoPointMap(map_, TwoPointBasis(1, 1)) if kind == "lifted" else map_
     ((x, image),) = map_.pairs(1)
-    plain, weighed = map_.moved(x, image, 2), map_.moved(x, image, 2, (3, 5))
+    plain, weighed = map_.monomials_at_both(x, image, 2), map_.monomials_at_both(x, image, 2, (3, 5))
     for values, more, number in zip(plain, weighed, (3, 5), strict=True):
         assert [number * int(value) % PRIME for value in values] == [int(value) % PRIME for value in more]
     assert plain[0] != plain[1]

@@ -66,9 +66,9 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
             yield Statement(integral.verdict, f"{integral.name} = {integral.short_text}  [{integral.origin}]")
         for iterated in search.in_iterates:
             yield Statement(iterated.verdict, f"{iterated.name} = {iterated.text}  [{iterated.origin}]")
-        for timed in search.time_dependent:
-            text = f"{timed.name} = {timed.text} at the n-th point, an integral that depends on n"
-            yield Statement(timed.integral.verdict, text)
+        for time_dependent in search.time_dependent:
+            text = f"{time_dependent.name} = {time_dependent.text} at the n-th point, an integral that depends on n"
+            yield Statement(time_dependent.integral.verdict, text)
         profile = search.profile
         if search.by_theorems:
             number = counted(search.by_theorems, "independent integral")
@@ -81,13 +81,16 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
         else:
             text = "orbits show no integral"
             if search.codimension:
-                seen = "" if search.is_exact else "at least "
-                number = f"{seen}{counted(search.codimension, 'independent integral')}"
-                text = (
-                    f"generic orbits lie on varieties of codimension {seen}{search.codimension}, which means {number}"
-                )
-            none = max((degree for degree, k in enumerate(profile.nullities, 1) if not k), default=0)
-            relations = [f"none up to degree {none}" if none > 1 else "none of degree 1"] if none else []
+                at_least = "" if search.is_exact else "at least "
+                number = f"{at_least}{counted(search.codimension, 'independent integral')}"
+                codimension = f"{at_least}{search.codimension}"
+                text = f"generic orbits lie on varieties of codimension {codimension}, which means {number}"
+            empty_degree = max((degree for degree, k in enumerate(profile.nullities, 1) if not k), default=0)
+            relations = (
+                [f"none up to degree {empty_degree}" if empty_degree > 1 else "none of degree 1"]
+                if empty_degree
+                else []
+            )
             spaces = [(degree, k) for degree, k in enumerate(profile.nullities, 1) if k]
             relations += [f"a {k}-dimensional space up to degree {degree}" for degree, k in spaces]
             yield Statement(MEASURED, f"{text}; relations along an orbit: {', '.join(relations)}")
@@ -111,10 +114,10 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
         yield Statement(PROVED, f"{number}, as a member of the commuting family")
     if result.pencil is not None:
         growth = result.degrees.growth if result.degrees is not None else Growth.UNKNOWN
-        against = result.pencil.contradiction(growth)
-        follows = f"but {against}" if against else result.pencil.motion(growth)
-        text = "; ".join(filter(None, [result.pencil.text, follows]))
-        yield Statement(UNDECIDED if against else MEASURED, text)
+        contradiction = result.pencil.contradiction(growth)
+        consequence = f"but {contradiction}" if contradiction else result.pencil.motion(growth)
+        text = "; ".join(filter(None, [result.pencil.text, consequence]))
+        yield Statement(UNDECIDED if contradiction else MEASURED, text)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -143,7 +146,7 @@ def of_densities(result: AnalysisResult) -> Iterator[Statement]:
 def of_flow(result: AnalysisResult) -> Iterator[Statement]:
     """A line for each structure of the flow that the map conserves, deforms or loses."""
     if result.flow is not None:
-        yield from (Statement(Certainty(known), text) for known, text in result.flow.lines())
+        yield from (Statement(Certainty(certainty), text) for certainty, text in result.flow.lines())
 
 
 def of_poisson_tensors(result: AnalysisResult) -> Iterator[Statement]:
@@ -169,10 +172,10 @@ def of_growth(result: AnalysisResult) -> Iterator[Statement]:
             yield Statement(status, f"degrees of the iterates: {shown}{more}")
         yield Statement(degrees.known, degrees.growth_text)
         if degrees.recurrence is not None:
-            known = MEASURED if degrees.derived is None else Certainty.DERIVED
-            yield Statement(known, f"recurrence: {degrees.recurrence.text}")
+            certainty = MEASURED if degrees.derived is None else Certainty.DERIVED
+            yield Statement(certainty, f"recurrence: {degrees.recurrence.text}")
             if degrees.recurrence.closed_form_text:
-                yield Statement(known, f"d_n = {degrees.recurrence.closed_form_text}")
+                yield Statement(certainty, f"d_n = {degrees.recurrence.closed_form_text}")
         if degrees.enclosure is not None:
             yield Statement(PROVED, degrees.enclosure.text)
     if heights is not None:

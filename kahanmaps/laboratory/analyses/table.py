@@ -82,8 +82,8 @@ def _degrees(context: AnalysisContext, **options: Any) -> DegreeGrowth:
     """The degrees of the iterates, derived from the singularity patterns where these are known."""
     runs = context.result.singularities if context.dim <= WRITTEN_DIMENSION else []
     # Used only if they are known for all steps, and agree with those that `degrees` would compute itself.
-    known = patterns_of(runs) if runs else None
-    patterns = None if known is None or known.running else known
+    patterns_of_runs = patterns_of(runs) if runs else None
+    patterns = None if patterns_of_runs is None or patterns_of_runs.running else patterns_of_runs
     return degree_growth(context.map, context.result.eps, patterns=patterns, seed=context.seed, **options)
 
 
@@ -110,8 +110,8 @@ def _relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]
         return ()
     relations: tuple[SparseRelation, ...] = ()
     maps = Laboratory(context.file_without_claims, (), context.result.eps, context.seed, algebraic=True).maps
-    top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
-    for degree in range(profile.first_degree, min(top, profile.degree, 4) + 1):
+    last_degree = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
+    for degree in range(profile.first_degree, min(last_degree, profile.degree, 4) + 1):
         first = 1 + len({name for relation in relations for name in relation.names})
         relations += sparse_relations(maps, degree, context.map.variables, first=first) or ()
     return relations

@@ -168,14 +168,14 @@ class Line:
     def _reconstruct_curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
         """Return polynomials with these quotients as series, or None if there are not enough terms to be certain."""
         for _ in range(2):
-            upper, lower = (
+            numerator_series, denominator_series = (
                 nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._random_combination(x) for _ in range(2)
             )
-            if int(lower[0]) == 0:
+            if int(denominator_series[0]) == 0:
                 continue
             count(series_units(length) + minpoly_units(length) + (2 + len(x)) * product_units(length, length))
-            inverse = lower.inverse_series_trunc(length)
-            values = [int(c) for c in upper.mul_low(inverse, length).coeffs()]
+            inverse = denominator_series.inverse_series_trunc(length)
+            values = [int(c) for c in numerator_series.mul_low(inverse, length).coeffs()]
             # Numerator and denominator may have the same degree; without its first term the series is t times a
             # proper fraction.
             values = (values + [0] * (length - len(values)))[1:]
@@ -184,8 +184,8 @@ class Line:
             if 2 * degree + _MARGIN > len(values):
                 return None
             denominator = nmod_poly([int(c) for c in reversed(minimal.coeffs())], self.prime)
-            first = denominator.mul_low(inverse, length)
-            curve = [*(first.mul_low(entry, length) for entry in x), first]
+            Z = denominator.mul_low(inverse, length)
+            curve = [*(Z.mul_low(entry, length) for entry in x), Z]
             # The denominator is that of all coordinates unless the random functions are in special position.
             if all(entry.degree() <= degree for entry in curve):
                 return curve

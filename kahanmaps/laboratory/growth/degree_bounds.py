@@ -244,12 +244,12 @@ def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> I
             return
 
 
-def round_up(end: arb, offset: int = 0) -> str:
+def round_up(number: arb, offset: int = 0) -> str:
     """Round an exact number up to six decimals, and add `offset` units of the last one.
 
     With the offset -1 the result is strictly less than the number: that the dynamical degree is strictly more than it
     holds for all but finitely many eps.
     """
-    units = int((end.fmpq() * 10**_DIGITS).ceil()) + offset
+    units = int((number.fmpq() * 10**_DIGITS).ceil()) + offset
     text = f"{units // 10**_DIGITS}.{units % 10**_DIGITS:0{_DIGITS}d}"
     return text.rstrip("0").rstrip(".")

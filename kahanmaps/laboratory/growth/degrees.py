@@ -102,7 +102,7 @@ class DegreeGrowth(PrintableResult):
 
     @cached_property
     def disagreement(self) -> int | None:
-        """The first n whose measured degree contradicts the singularity patterns; None if none does."""
+        """The first n for which the measured d_n contradicts the singularity patterns; None if none does."""
         if self.patterns is None or not self.patterns.series:
             return None
         expected = coefficients(self.patterns.fraction, len(self.degrees))
@@ -126,10 +126,9 @@ class DegreeGrowth(PrintableResult):
                 "try another --seed"
             )
         if len(self.degrees) < (needed := self.patterns.terms_needed(self.fitted.order)):
-            last = max(self.patterns.lengths)
-            return (
-                f"a singularity pattern of {last} steps calls for {needed - 1} iterates; raise --effort or --max-degree"
-            )
+            longest = max(self.patterns.lengths)
+            pattern = f"a singularity pattern of {longest} steps"
+            return f"{pattern} calls for {needed - 1} iterates; raise --effort or --max-degree"
         return ""
 
     @property
@@ -195,13 +194,13 @@ class DegreeGrowth(PrintableResult):
         """The kind of growth with its power or rate, or an estimate without a confirmed recurrence: one phrase."""
         if self.growth is Growth.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
-        if (reason := self.proof or self.recurrence) is not None:
-            if reason.growth is Growth.EXPONENTIAL:
+        if (source := self.proof or self.recurrence) is not None:
+            if source.growth is Growth.EXPONENTIAL:
                 return "exponential growth" + (
-                    f", dynamical degree {reason.rate.text}" if reason.rate is not None else ""
+                    f", dynamical degree {source.rate.text}" if source.rate is not None else ""
                 )
-            power = f" of degree {reason.power}" if reason.growth is Growth.POLYNOMIAL else ""
-            return f"{reason.growth} growth{power}, dynamical degree 1"
+            power = f" of degree {source.power}" if source.growth is Growth.POLYNOMIAL else ""
+            return f"{source.growth} growth{power}, dynamical degree 1"
         terms = counted(len(self.degrees), "term")
         if self.looks_exponential:
             why = self.unconfirmed or f"no recurrence in {terms}"
@@ -324,12 +323,12 @@ def degree_growth(
     search = _Search(as_map(system), exact, budget_for("degrees", effort), max_degree, seed, steps, patterns)
     try:
         return search.run(max_terms, enclosed, progress)
-    except TimeLimit as end:
+    except TimeLimit as stop:
         if isinstance(effort, Budget):
             raise
         if search.measured is not None:  # the bounds of the dynamical degree alone were cut
-            return replace(search.measured, message=f"{search.measured.message}; {end}")
-        return search.result(Ended.STOPPED, f"{end} at iterate {len(search.degrees)}")
+            return replace(search.measured, message=f"{search.measured.message}; {stop}")
+        return search.result(Ended.STOPPED, f"{stop} at iterate {len(search.degrees)}")
 
 
 def dynamical_degree(
@@ -361,7 +360,7 @@ def algebraic_entropy(
 
 @dataclass
 class _Search:
-    """The lines, and the degrees measured on them so far."""
+    """The state of one search: its random lines, and the degrees measured on them so far."""
 
     map: MapFamily
     eps: fmpq | None
@@ -380,12 +379,12 @@ class _Search:
         """Measure degree after degree until a reason to stop."""
         matrix = exponent_matrix(self.map, self.eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
-            periodic = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
+            period_proof = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
             # The degrees of a monomial map are exact, those of powers of the matrix.
             power, ended, message = matrix, Ended.PROVED if max_terms is None else Ended.TERMS, ""
             while len(self.degrees) <= (_MATRIX_TERMS if max_terms is None else max_terms):
-                known = find_recurrence(self.degrees) if max_terms is None else None
-                if known is not None and known.checked >= max(6, known.order):
+                recurrence = find_recurrence(self.degrees) if max_terms is None else None
+                if recurrence is not None and recurrence.checked >= max(6, recurrence.order):
                     break
                 degree = monomial_degree(power)
                 if degree > self.max_degree:
@@ -396,18 +395,18 @@ class _Search:
                 power = power * matrix
             iterates = counted(len(self.degrees) - 1, "iterate")
             message = message or f"degrees of {iterates} by powers of the exponent matrix"
-            return self.result(ended, message, proof=periodic or proof)
+            return self.result(ended, message, proof=period_proof or proof)
 
         rng = random.Random(f"degrees {derive_seed(self.seed, self.map.subject, self.eps)}")
 
-        def line() -> Line:
+        def new_line() -> Line:
             while True:
                 try:
                     return Line(reduced(self.map, self.eps, rng), rng, self.budget, self.max_degree)
                 except BadPrime:
                     continue
 
-        self.lines = [line() for _ in range(_LINES)]
+        self.lines = [new_line() for _ in range(_LINES)]
         try:
             while True:
                 self._check_recurrence(max_terms is None)
@@ -416,18 +415,18 @@ class _Search:
                 if len(self.degrees) > MAX_TERMS:
                     raise Stopped(Ended.TERMS, f"{MAX_TERMS} iterates, and no more are worked out")
                 progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
-                self._step(line)
+                self._step(new_line)
                 if self.degrees[-1] == 0 and max_terms is None:
                     raise Stopped(Ended.CONSTANT, f"iterate {len(self.degrees) - 1} is a constant map")
-        except Stopped as end:
-            ended, message = end.ended, end.message
+        except Stopped as stop:
+            ended, message = stop.ended, stop.message
         if ended is Ended.DEGREE:  # too soon for a recurrence to be seen
             self._compute_patterns()
         result = self.result(ended, message)
         patterns = self.patterns
         if patterns is not None and patterns.at and self.eps is None and not self.budget.is_spent:
-            named = with_eps(self.map, rational(patterns.at), patterns.exceptional)  # polynomials over Q[eps]
-            result = replace(result, patterns=replace(patterns, exceptional=named))
+            exceptional = with_eps(self.map, rational(patterns.at), patterns.exceptional)  # polynomials over Q[eps]
+            result = replace(result, patterns=replace(patterns, exceptional=exceptional))
         period = next((n for n, degree in enumerate(self.degrees) if n and degree == 1), None)
         if period is not None:
             result = replace(result, proof=linear_iterate(self.map, self.eps, period))
@@ -440,39 +439,39 @@ class _Search:
             return replace(result, notes=(*result.notes, unproved))
         return replace(result, enclosure=enclosure)
 
-    def result(self, ended: str, message: str, **more: Any) -> DegreeGrowth:
+    def result(self, ended: str, message: str, **proofs: Any) -> DegreeGrowth:
         primes, residues = tuple(line.prime for line in self.lines), tuple(line.eps for line in self.lines)
-        known: dict[str, Any] = {"patterns": self.patterns, "notes": tuple(self.notes), **more}
-        return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, primes, residues, **known)
+        fields: dict[str, Any] = {"patterns": self.patterns, "notes": tuple(self.notes), **proofs}
+        return DegreeGrowth(tuple(self.degrees), self.eps, ended, message, self.seed, primes, residues, **fields)
 
     def _check_recurrence(self, may_stop: bool) -> None:
         """Compute the singularity patterns early, and stop when a recurrence is confirmed."""
-        size = len(self.degrees)
-        if size < 2 or (size > _OFTEN and size % _SELDOM):
+        term_count = len(self.degrees)
+        if term_count < 2 or (term_count > _OFTEN and term_count % _SELDOM):
             return
         recurrence = find_recurrence(self.degrees)
         # Above dimension 4 series of maps without short forms are slow and wait until the degrees suggest a recurrence.
-        soon = self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit
-        if soon:
+        is_due = self.map.dim <= WRITTEN_DIMENSION or recurrence is not None or self.lines[0].is_explicit
+        if is_due:
             self._compute_patterns()
         if not may_stop:
             return
-        known = self.patterns
-        enough = recurrence is not None and recurrence.checked >= max(6, recurrence.order)
+        patterns = self.patterns
+        is_confirmed = recurrence is not None and recurrence.checked >= max(6, recurrence.order)
         derived = self.result(Ended.TERMS, "").derived
         if derived is not None:
-            last = max(known.lengths, default=0) if known is not None else 0
-            same = recurrence is not None and recurrence.characteristic == derived.characteristic
-            if (enough and same) or size > 2 * last + _AGREEING or self.degrees[-1] > _LARGE:
+            longest = max(patterns.lengths, default=0) if patterns is not None else 0
+            agrees = recurrence is not None and recurrence.characteristic == derived.characteristic
+            if (is_confirmed and agrees) or term_count > 2 * longest + _AGREEING or self.degrees[-1] > _LARGE:
                 raise Stopped(
                     Ended.DERIVED, "the degrees are derived from the singularity patterns, and the measured ones agree"
                 )
             return
-        if recurrence is None or not enough:
+        if recurrence is None or not is_confirmed:
             return
-        if known is not None and known.running:
-            raise Stopped(Ended.UNCONFIRMED, f"a recurrence of order {recurrence.order} fits, but {known.running}")
-        if known is None or size >= known.terms_needed(recurrence.order):
+        if patterns is not None and patterns.running:
+            raise Stopped(Ended.UNCONFIRMED, f"a recurrence of order {recurrence.order} fits, but {patterns.running}")
+        if patterns is None or term_count >= patterns.terms_needed(recurrence.order):
             raise Stopped(
                 Ended.RECURRENCE,
                 f"a recurrence of order {recurrence.order} holds for {recurrence.checked} further terms",
@@ -481,34 +480,34 @@ class _Search:
     def _compute_patterns(self) -> None:
         """Compute the singularity patterns, once, and unless the map is affine."""
         if self.map.root is None and self.patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
-            given: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
-            self.patterns = patterns_of_map(self.map, self.eps, **given)
+            options: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
+            self.patterns = patterns_of_map(self.map, self.eps, **options)
 
-    def _step(self, line: Callable[[], Line]) -> None:
+    def _step(self, new_line: Callable[[], Line]) -> None:
         """Move all lines one step on, and replace those in special position."""
-        n, known = len(self.degrees), self.degrees
+        n, earlier = len(self.degrees), self.degrees
 
         def degree_on(curve: Line) -> int:
             """The degree of iterate n on a line; -1 where this line does not give it."""
             try:
                 while curve.steps < n:
                     k = curve.steps + 1
-                    guess = known[k] if k < n else self.map.dim if k == 1 else known[1] * known[-1]
-                    if k == n > 1 and known[-2]:
+                    guess = earlier[k] if k < n else self.map.dim if k == 1 else earlier[1] * earlier[-1]
+                    if k == n > 1 and earlier[-2]:
                         # Degrees are almost log-concave: the last ratio bounds the next one. A guess that is too
                         # low costs a second attempt.
-                        guess = min(guess, known[-1] * known[-1] // known[-2] + 4)
+                        guess = min(guess, earlier[-1] * earlier[-1] // earlier[-2] + 4)
                     curve.step(guess)
-                    if k < n and curve.degree != known[k]:
+                    if k < n and curve.degree != earlier[k]:
                         return -1
             except ZeroDivisionError:
                 return -1
             return curve.degree
 
         while True:
-            degrees = [degree_on(curve) for curve in self.lines]
-            best = max(degrees)
-            if best >= 0 and min(degrees) == best:
+            degrees_on_lines = [degree_on(curve) for curve in self.lines]
+            best = max(degrees_on_lines)
+            if best >= 0 and min(degrees_on_lines) == best:
                 self.degrees.append(best)
                 return
             self.replaced += 1
@@ -517,9 +516,11 @@ class _Search:
                     Ended.SINGULAR, f"iterate {n} exists nowhere: {self.map.denominator_name} = 0 on the image"
                 )
             if self.replaced > _REPLACEMENTS:
-                raise Stopped(Ended.LINES, f"random lines disagree on the degree of iterate {n}: {degrees}")
+                raise Stopped(Ended.LINES, f"random lines disagree on the degree of iterate {n}: {degrees_on_lines}")
             if best >= 0:
-                self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {degrees}")
-            for k, degree in enumerate(degrees):
+                self.notes.append(
+                    f"a line gave a smaller degree of iterate {n} and was replaced by another: {degrees_on_lines}"
+                )
+            for k, degree in enumerate(degrees_on_lines):
                 if degree < best or best < 0:
-                    self.lines[k] = line()
+                    self.lines[k] = new_line()

@@ -36,7 +36,7 @@ DEFAULT_MAX_DIGITS = 20_000
 _NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
 _DENOMINATORS = (7, 8, 9, 16, 25, 27)
 _MAX_STARTS = 1000
-_GROWN = {
+_GROWTH_TEXTS = {
     Growth.PERIODIC: "points come back",
     Growth.BOUNDED: "bit lengths stay bounded",
     Growth.LOGARITHMIC: "bit lengths grow logarithmically",
@@ -95,8 +95,8 @@ class HeightSurvey(PrintableResult):
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
             # If all initial points of one eps agree, the kinds differ between the eps.
-            known = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
-            which = "the eps" if len(known) == len({value for value, _ in known}) else "the starts"
+            decided_kinds = {(o.eps, o.growth.kind) for o in self.orbits if o.growth.kind is not Growth.UNDECIDED}
+            which = "the eps" if len(decided_kinds) == len({value for value, _ in decided_kinds}) else "the starts"
             return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)}){cut}"
         decided = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
         if self.kind is Growth.UNDECIDED:
@@ -105,7 +105,7 @@ class HeightSurvey(PrintableResult):
         many = f"{decided} of {total}" if decided < total else f"all {total}" if total > 1 else "the"
         at = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
         of = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
-        return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}{cut}"
+        return f"{_GROWTH_TEXTS[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}{cut}"
 
     def rows(self) -> list[dict[str, str]]:
         """Return a row for each orbit, for example for `pandas.DataFrame(survey.rows())`."""

@@ -66,10 +66,10 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
     """
     if map_.symbols or map_.root is not None:
         return None
-    over = FunctionField(["eps"]) if eps is None and map_.has_eps else QQ
-    value = over.variables[0] if isinstance(over, FunctionField) else fmpq(1) if eps is None else eps
+    field = FunctionField(["eps"]) if eps is None and map_.has_eps else QQ
+    value = field.variables[0] if isinstance(field, FunctionField) else fmpq(1) if eps is None else eps
     try:
-        equations = map_.at(value, over).equations
+        equations = map_.at(value, field).equations
     except (BudgetExceeded, InputError):  # of an inverse that is not known
         return None
     if len(equations) > _MAX_FACTORS:
@@ -83,8 +83,8 @@ def exponent_matrix(map_: MapFamily, eps: fmpq | None) -> fmpz_mat | None:
             if len(columns) != 1 or len(entries[columns[0]]) != 1 or len(right) != 1:
                 return None
             ((left_monomial, _),), ((right_monomial, _),) = entries[columns[0]], right
-            left, above = equation.exponents[left_monomial], equation.exponents[right_monomial]
-            rows[columns[0]] = [above[k] - left[k] for k in range(n)]
+            left_exponents, right_exponents = equation.exponents[left_monomial], equation.exponents[right_monomial]
+            rows[columns[0]] = [right_exponents[k] - left_exponents[k] for k in range(n)]
         if len(rows) < n:
             return None
         product = fmpz_mat([rows[j] for j in range(n)]) * product
@@ -129,8 +129,8 @@ def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> Grow
     order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == one), None)
     periods = [] if order is None else [order, 2 * order]
     proofs = (linear_iterate(map_, eps, period) for period in periods)
-    periodic = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
-    return None if periodic is None or periodic.period == 1 else periodic
+    proof_of_period = next((proof for proof in proofs if proof is not None and proof.is_identity), None)
+    return None if proof_of_period is None or proof_of_period.period == 1 else proof_of_period
 
 
 def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
@@ -147,8 +147,8 @@ def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
     # The square of a modulus is the product of an eigenvalue and its conjugate, thus a root of the polynomial that has
     # all products of two eigenvalues as roots; that of the radius is the largest real one.
     rows = matrix.tolist()
-    square_of = fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
-    products = [factor for factor, _ in square_of.charpoly().factor()[1]]
+    kronecker_square = fmpz_mat([[a * b for a in first for b in second] for first in rows for second in rows])
+    products = [factor for factor, _ in kronecker_square.charpoly().factor()[1]]
     numbers = [g for factor in products for g, _ in factor(fmpz_poly([0, 0, 1])).factor()[1]]
     bits = _BITS
     while True:
@@ -180,10 +180,10 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
     n = map_.dim
     start = tuple(field.variables[:n])
     try:
-        over = map_.at(field.variables[-1] if is_generic else fmpq(1) if eps is None else eps, field)
+        map_over_field = map_.at(field.variables[-1] if is_generic else fmpq(1) if eps is None else eps, field)
         point: tuple[Any, ...] = start
         for _ in range(period):
-            point = over.step(point)
+            point = map_over_field.step(point)
         is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
     except (BudgetExceeded, SingularStep):
         return None
@@ -192,14 +192,14 @@ def linear_iterate(map_: MapFamily, eps: fmpq | None, period: int) -> GrowthProo
     # Coordinates are in lowest terms: this is the degree on projective space.
     if not is_identity and max(degree_in(form, n) for form in forms) != 1:
         return None
-    linear = period
+    first_linear = period
     with suppress(BudgetExceeded, SingularStep):
-        while not is_identity and period < _MAX_ORDER * linear:
-            for _ in range(linear):
-                point = over.step(point)
-            period += linear
+        while not is_identity and period < _MAX_ORDER * first_linear:
+            for _ in range(first_linear):
+                point = map_over_field.step(point)
+            period += first_linear
             is_identity = all(field.equal(x, y) for x, y in zip(point, start, strict=True))
-    period = period if is_identity else linear
+    period = period if is_identity else first_linear
     iterate = "the map" if period == 1 else f"iterate {period}"
     reason = f"Phi^{period} is the identity" if is_identity else f"{iterate} is linear on projective space"
     return GrowthProof(Growth.BOUNDED, 0, GrowthRate(fmpz_poly([-1, 1]), "1", "1", 1), reason, period, is_identity)

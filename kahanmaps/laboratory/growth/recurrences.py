@@ -175,16 +175,18 @@ class Recurrence(ResultPart):
         size = max(k for _, k in self.factors)
         if period > _MAX_CLASSES:
             return None
-        forms = []
+        polynomials = []
         for residue in range(period):
             first = next(n for n in count(self.preperiod) if n % period == residue)
-            at = [first + period * k for k in range(size)]  # the polynomial of degree below `size` with these values
-            powers = fmpq_mat(size, size, [fmpq(n) ** k for n in at for k in range(size)])
-            column = fmpq_mat(size, 1, [fmpq(self.predict(n)) for n in at])
-            forms.append(format_univariate(fmpq_poly(powers.solve(column).entries()), "n"))
-        if len(set(forms)) == 1:
-            return forms[0]
-        return "; ".join(f"{form} for n = {residue} mod {period}" for residue, form in enumerate(forms))
+            nodes = [first + period * k for k in range(size)]  # the polynomial of degree below `size` with these values
+            powers = fmpq_mat(size, size, [fmpq(n) ** k for n in nodes for k in range(size)])
+            column = fmpq_mat(size, 1, [fmpq(self.predict(n)) for n in nodes])
+            polynomials.append(format_univariate(fmpq_poly(powers.solve(column).entries()), "n"))
+        if len(set(polynomials)) == 1:
+            return polynomials[0]
+        return "; ".join(
+            f"{polynomial} for n = {residue} mod {period}" for residue, polynomial in enumerate(polynomials)
+        )
 
     @property
     def closed_form_text(self) -> str | None:
@@ -201,9 +203,9 @@ class Recurrence(ResultPart):
         >>> find_recurrence([2 * n * n + 1 for n in range(12)]).characteristic_text
         '(t - 1)^3'
         """
-        shown = [(f"({format_univariate(fmpq_poly(factor))})", k) for factor, k in self.factors]
-        shown = [("t", self.preperiod)] * bool(self.preperiod) + shown
-        return " ".join(text + (f"^{k}" if k > 1 else "") for text, k in shown) or "1"
+        factors = [(f"({format_univariate(fmpq_poly(factor))})", k) for factor, k in self.factors]
+        factors = [("t", self.preperiod)] * bool(self.preperiod) + factors
+        return " ".join(text + (f"^{k}" if k > 1 else "") for text, k in factors) or "1"
 
     def __str__(self) -> str:
         return self.text

@@ -2,8 +2,7 @@
 
 Let C_i be the irreducible hypersurfaces that a birational map of degree d of projective space may contract, mu_i(t) the
 power of the curve parameter that is divided out at the t-th step along a generic curve through C_i, and nu_ij(t) the
-multiplicity of C_j there. A
-generic line meets the strict preimage of C_i by the k-th iterate in s_i(k) points, and
+multiplicity of C_j there. A generic line meets the strict preimage of C_i by the k-th iterate in s_i(k) points, and
 
     d_(k+1) = d d_k - sum over i, l <= k of mu_i(k+1-l) s_i(l)
     s_i(k)  = deg(C_i) d_k - sum over j, l < k of nu_ji(k-l) s_j(l)
@@ -48,10 +47,10 @@ def degree_series(
     """
     z, one, zero = fmpz_poly([0, 1]), fmpz_poly([1]), fmpz_poly([])
     patterns = [pattern for _, pattern in hypersurfaces]
-    which = needed(patterns)
-    if which is None:
+    needed_indices = needed(patterns)
+    if needed_indices is None:
         raise ValueError("expected known multiplicities of all hypersurfaces that are needed")
-    # The unknowns are S_i, i in `which`, then the D of the stages 1, 2, ..., 0, and 1.
+    # The unknowns are the series S_i of the needed C_i, then the series D of the stages 1, 2, ..., 0, and 1.
     maps, rows = len(degrees), []
     stages = stages or [0] * len(patterns)
 
@@ -59,37 +58,37 @@ def degree_series(
         numerator, denominator = row[k]
         row[k] = numerator + term * denominator, denominator
 
-    for i, k in enumerate(which):
-        row = [_through_returns(patterns, j, k + 1) for j in which] + [(zero, one)] * (maps + 1)
+    for i, k in enumerate(needed_indices):
+        row = [_through_returns(patterns, j, k + 1) for j in needed_indices] + [(zero, one)] * (maps + 1)
         add(row, i, one)
-        add(row, len(which) + (stages[k] - 1) % maps, fmpz_poly([-hypersurfaces[k][0]]))
+        add(row, len(needed_indices) + (stages[k] - 1) % maps, fmpz_poly([-hypersurfaces[k][0]]))
         rows.append(row)
     for stage, degree in enumerate(degrees, 1):
         mu = []
-        for j in which:
-            series, first = _through_returns(patterns, j, 0), (stage - stages[j]) % maps
-            if maps > 1:  # the part with the exponents first, first + maps, ...
-                numerator, denominator = (part(z**maps) for part in every_nth(series, maps, first))
-                series = numerator * z**first, denominator
+        for j in needed_indices:
+            series, first_exponent = _through_returns(patterns, j, 0), (stage - stages[j]) % maps
+            if maps > 1:  # the terms with the exponents first_exponent + k maps
+                numerator, denominator = (part(z**maps) for part in every_nth(series, maps, first_exponent))
+                series = numerator * z**first_exponent, denominator
             mu.append(series)
         row = [*mu, *[(zero, one)] * maps, (-one if stage == maps else zero, one)]
-        add(row, len(which) + stage - 1, one)
-        add(row, len(which) + (stage - 2) % maps, -degree * z)
+        add(row, len(needed_indices) + stage - 1, one)
+        add(row, len(needed_indices) + (stage - 2) % maps, -degree * z)
         rows.append(row)
-    cleared = []
+    cleared_rows = []
     for row in rows:
         common = one
         for _, denominator in row:
             common = common * (denominator // common.gcd(denominator))
-        cleared.append([numerator * (common // denominator) for numerator, denominator in row])
+        cleared_rows.append([numerator * (common // denominator) for numerator, denominator in row])
     # Fraction-free Gaussian elimination (Bareiss). No pivot is zero: at z = 0 the matrix of the S_i is diagonal.
     previous = one
-    for k, pivot in enumerate(cleared[:-1]):
-        for entries in cleared[k + 1 :]:
+    for k, pivot in enumerate(cleared_rows[:-1]):
+        for entries in cleared_rows[k + 1 :]:
             factor, pairs = entries[k], zip(entries[k + 1 :], pivot[k + 1 :], strict=True)
             entries[k + 1 :] = [(pivot[k] * entry - factor * other) // previous for entry, other in pairs]
         previous = pivot[k]
-    denominator, numerator = cleared[-1][-2], -cleared[-1][-1]
+    denominator, numerator = cleared_rows[-1][-2], -cleared_rows[-1][-1]
     common = numerator.gcd(denominator)
     numerator, denominator = numerator // common, denominator // common
     sign = 1 if denominator[0] > 0 else -1
@@ -107,9 +106,8 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
     >>> needed([attracted]), needed([lowering, OrbitData(((0, 1),), (), 9, True, eventually_in=(0,))])
     ([], None)
     """
-    chains = [
-        [k] for k in range(len(patterns))
-    ]  # each followed by the hypersurfaces onto which it is mapped, in this order
+    # Each hypersurface, followed by those onto which it is mapped, in this order.
+    chains = [[k] for k in range(len(patterns))]
     for chain in chains:
         while (continuation := patterns[chain[-1]].continues_as) is not None and continuation[1] not in chain:
             chain.append(continuation[1])
@@ -159,11 +157,11 @@ def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
 def coefficients(series: Fraction, count: int) -> list[int]:
     """The first coefficients of a fraction of integer polynomials whose denominator has the constant term 1."""
     numerator, denominator = series
-    lower = [int(c) for c in denominator.coeffs()]
+    denominator_coefficients = [int(c) for c in denominator.coeffs()]
     values: list[int] = []
     for n in range(count):
-        earlier = sum(c * values[n - k] for k, c in enumerate(lower[1 : n + 1], 1))
-        values.append((int(numerator[n]) - earlier) // lower[0])
+        earlier = sum(c * values[n - k] for k, c in enumerate(denominator_coefficients[1 : n + 1], 1))
+        values.append((int(numerator[n]) - earlier) // denominator_coefficients[0])
     return values
 
 
@@ -171,15 +169,15 @@ def _through_returns(patterns: Sequence[OrbitData], start: int, column: int) -> 
     """The generating function of a column for a hypersurface, continued through those that it is mapped onto."""
     z = fmpz_poly([0, 1])
     k, shift, numerator = start, 0, fmpz_poly([])
-    seen: dict[int, tuple[int, fmpz_poly]] = {}
-    while k not in seen:
-        seen[k] = shift, numerator
-        part, denominator = patterns[k].generating_function(column)
+    visited: dict[int, tuple[int, fmpz_poly]] = {}
+    while k not in visited:
+        visited[k] = shift, numerator
+        own_numerator, denominator = patterns[k].generating_function(column)
         continuation = patterns[k].continues_as
         if continuation is None:
-            return numerator * denominator + z**shift * part, denominator
-        numerator += z**shift * part
+            return numerator * denominator + z**shift * own_numerator, denominator
+        numerator += z**shift * own_numerator
         shift, k = shift + continuation[0], continuation[1]
-    begin, before = seen[k]
-    around = 1 - z ** (shift - begin)
-    return before * around + numerator - before, around
+    earlier_shift, earlier_numerator = visited[k]
+    one_round = 1 - z ** (shift - earlier_shift)
+    return earlier_numerator * one_round + numerator - earlier_numerator, one_round

@@ -45,7 +45,7 @@ from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 1000
 _MAX_DEGREE = 12
-_ONCE = CofactorProduct((1,), 1)
+_FIRST_POWER = CofactorProduct((1,), 1)  # of det dPhi
 
 
 @dataclass(frozen=True)
@@ -221,18 +221,18 @@ def densities_of(
         return DensitySearch(*laboratory.request, (), -1, laboratory.defect, flow=flow)
     period = None if flow else closing_period(laboratory.maps)
     product = anti_invariant = None
-    theorem, dim, cut = _theorem(laboratory), laboratory.map.dim, ""
+    theorem, dim, cut = _hamiltonian_density(laboratory), laboratory.map.dim, ""
     if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
         densities, tried = [theorem], theorem.degree(dim)
     else:
         progress("densities that are products")
         stages = budget.share([1, 2, 2])  # products; polynomials; integrals, for their factors
         product, anti_invariant = _products(laboratory, max_degree, next(stages))
-        found = () if product is None else (product,)
-        on_result(DensitySearch(*laboratory.request, found, -1, UNFINISHED, period, anti_invariant, flow=flow))
+        so_far = () if product is None else (product,)
+        on_result(DensitySearch(*laboratory.request, so_far, -1, UNFINISHED, period, anti_invariant, flow=flow))
         # Reserve a share for the search for integrals, unless the caller gives them or a product is known already.
-        second = budget if integrals is not None or product is not None else next(stages)
-        densities, tried, cut = _search(laboratory, product, max_degree, second, progress)
+        polynomial_budget = budget if integrals is not None or product is not None else next(stages)
+        densities, tried, cut = _search(laboratory, product, max_degree, polynomial_budget, progress)
         none_proved = densities and all(phi.verdict is not Certainty.PROVED for phi in densities)
         if none_proved and laboratory.system is not None and not flow and (max_degree is None or dim <= max_degree):
             # The lemma on Lotka-Volterra systems may prove phi = x_1 ... x_n, whatever its degree.
@@ -245,8 +245,10 @@ def densities_of(
         on_result(replace(result, cut=UNFINISHED))
         if integrals is None:
             file, symbols, eps, seed, _ = laboratory.request
-            searched = find_integrals(file, symbols=symbols, eps=eps, effort=budget, seed=seed, progress=progress)
-            integrals = searched.integrals
+            integral_search = find_integrals(
+                file, symbols=symbols, eps=eps, effort=budget, seed=seed, progress=progress
+            )
+            integrals = integral_search.integrals
         progress("densities that are products of factors of integrals")
         result = with_factors(result, integrals, max_degree)
     return result
@@ -282,23 +284,26 @@ def _search(
     Returns the densities, the largest degree that was tried, and what ended the search.
     """
     dim = laboratory.map.dim
-    top = max_degree if max_degree is not None else _MAX_DEGREE
-    top, degree_budget = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0), budget
+    last_degree = max_degree if max_degree is not None else _MAX_DEGREE
+    last_degree, degree_budget = (
+        max((d for d in range(last_degree + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0),
+        budget,
+    )
     if product is not None:
         # Higher degrees are not needed then, and the other degrees get a part of the budget only.
-        degree_budget, top = budget.part(1 / 3), min(top, product.degree(dim))
+        degree_budget, last_degree = budget.part(1 / 3), min(last_degree, product.degree(dim))
     # If the space of a degree is 0, so are those of lower degrees: try only degrees that double the monomials.
-    degrees, tried = [top] if product is None else [max(top - 1, 0), top], -1
+    degrees, tried = [last_degree] if product is None else [max(last_degree - 1, 0), last_degree], -1
     while degrees[0] > 0:
-        halved = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
-        degrees.insert(0, next(halved, degrees[0] - 1))
+        smaller = (d for d in range(degrees[0] - 1, -1, -1) if 2 * comb(dim + d, d) <= comb(dim + degrees[0], dim))
+        degrees.insert(0, next(smaller, degrees[0] - 1))
     try:
-        while tried < top and not degree_budget.is_spent:
+        while tried < last_degree and not degree_budget.is_spent:
             degree = next(d for d in degrees if d > tried)
             progress(f"densities of degree {degree}")
             model = _space(laboratory.maps[0], degree)
             if model.basis and degree > tried + 1:
-                degrees = list(range(top + 1))  # go back: the answer is the least degree with a density
+                degrees = list(range(last_degree + 1))  # go back: the answer is the least degree with a density
                 continue
             if model.basis and len(model.basis) == len(_space(laboratory.maps[1], degree, model).basis):
                 densities, reason = list[FoundDensity](), ""
@@ -308,10 +313,11 @@ def _search(
                 ) -> list[DarbouxSpace]:
                     return [_space(map_, degree, model)]
 
-                forms = laboratory.formulas([model], spaces_on, budget)
-                if forms.bases is None:
-                    reason = f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
-                for P in [] if forms.bases is None else forms.bases[0]:
+                closed_forms = laboratory.formulas([model], spaces_on, budget)
+                if closed_forms.bases is None:
+                    reason = f"there is a density of degree {degree} modulo primes"
+                    reason += f", but no closed form: {closed_forms.reason}"
+                for P in [] if closed_forms.bases is None else closed_forms.bases[0]:
                     phi = RationalFunction(P, P.context().constant(1))
                     verdict, evidence = _certified(laboratory, phi)
                     densities += [FoundDensity(phi, verdict, evidence)] if verdict.holds else []
@@ -321,7 +327,7 @@ def _search(
             tried = degree
     except NoPoint as error:
         return [], tried, str(error)
-    cut = "" if tried == top else f"polynomials of degree {tried + 1} and more were not tried: {SPENT}"
+    cut = "" if tried == last_degree else f"polynomials of degree {tried + 1} and more were not tried: {SPENT}"
     return ([], tried, cut) if product is None else ([product], product.degree(dim), cut)
 
 
@@ -332,9 +338,9 @@ def _products(
 
     At most one of the two is not None.
     """
-    parts = [part for I in integrals for part in (I.function.numerator, I.function.denominator)]
+    polynomials = [polynomial for I in integrals for polynomial in (I.function.numerator, I.function.denominator)]
     try:
-        product = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), budget, parts)).density
+        product = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), budget, polynomials)).density
     except NoPoint:
         return None, None
     if product is None or (phi := product.function) is None:
@@ -357,7 +363,7 @@ def _certified(
     return laboratory.verdict_on(phi, is_density=True, factor=factor)
 
 
-def _theorem(laboratory: Laboratory) -> FoundDensity | None:
+def _hamiltonian_density(laboratory: Laboratory) -> FoundDensity | None:
     """Return the primitive part of det(I - eps f') for a Hamiltonian system without symbols; None for others."""
     if laboratory.symbols or laboratory.flow or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
         return None
@@ -367,8 +373,8 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
     if D is None:
         return None
     if laboratory.eps is not None:
-        at: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
-        D = D.subs(at)
+        at_eps: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
+        D = D.subs(at_eps)
     if D.is_zero():
         return None
     content = reduce(lambda common, c: common.gcd(c), coefficients_in(D, laboratory.system.dim))
@@ -382,4 +388,4 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
 def _space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
     """Compute the space of P of degree at most `degree` with P(x~) = det dPhi P(x), on the monomials of the model."""
     sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, *([] if model is None else [model])))
-    return cofactor_space(sample, _ONCE, degree, model)
+    return cofactor_space(sample, _FIRST_POWER, degree, model)

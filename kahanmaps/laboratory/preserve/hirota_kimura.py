@@ -46,9 +46,9 @@ from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,
     exponents_up_to,
+    monomial_derivatives,
     monomial_tables,
     places_of,
-    slope_values,
 )
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
@@ -136,11 +136,11 @@ class Profile:
 
 
 def relations_on_orbit(
-    map_: ModularMap, degree: int, most: int | None = None, leading: frozenset[Exponent] = frozenset()
+    map_: ModularMap, degree: int, rank_bound: int | None = None, leading: frozenset[Exponent] = frozenset()
 ) -> OrbitRelations:
     """Compute the polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
 
-    `most` is an upper bound of the number of independent monomials, if one is known: a few more points than that
+    `rank_bound` is an upper bound of the number of independent monomials, if one is known: a few more points than that
     suffice. For a generic point the rank of the rows grows until it is final, since relations of the points 0 to k that
     hold at the point k + 1 are, one step later, relations of the points 1 to k + 1, and so on. `leading` are the
     leading monomials of relations of lower degrees; their proper multiples are dependent and left out. Raises NoPoint
@@ -148,19 +148,19 @@ def relations_on_orbit(
     """
     exponents = exponents_up_to(map_.dim, degree)
     support = _not_multiples(map_.dim, degree, leading)
-    most = len(support) if most is None else min(most, len(support))
+    rank_bound = len(support) if rank_bound is None else min(rank_bound, len(support))
     selected = support if len(support) < len(exponents) else None
-    rows, point, period = map_.along_orbit(degree, most + _SPARE, selected)
+    rows, point, period = map_.along_orbit(degree, rank_bound + _SPARE, selected)
     form, independent = reduced(matrix(rows, map_.prime))
-    first, free = split_columns(form, independent)
+    pivot_columns, free = split_columns(form, independent)
     new_leading = frozenset(exponents[support[k]] for k in free)
-    if independent > most or not leading <= new_leading:
-        return relations_on_orbit(map_, degree)  # `most` or `leading` came from a special orbit
+    if independent > rank_bound or not leading <= new_leading:
+        return relations_on_orbit(map_, degree)  # `rank_bound` or `leading` came from a special orbit
     # The gradient of a relation: that of its dependent monomial minus the combination of those of the independent ones.
     count(len(exponents) / 2 + map_.dim * len(support) / 3)
-    slopes = [[row[k] for k in support] for row in slope_values(point, degree, map_.prime)]
-    of_first = [[row[k] for k in first] + [0] * (form.nrows() - independent) for row in slopes]
-    gradients = matrix(slopes, map_.prime) - multiply(matrix(of_first, map_.prime), form)
+    monomial_gradients = [[row[k] for k in support] for row in monomial_derivatives(point, degree, map_.prime)]
+    at_pivots = [[row[k] for k in pivot_columns] + [0] * (form.nrows() - independent) for row in monomial_gradients]
+    gradients = matrix(monomial_gradients, map_.prime) - multiply(matrix(at_pivots, map_.prime), form)
     normals = echelon(integers(gradients.transpose()), map_.prime)
     return OrbitRelations(form, independent, len(exponents) - independent, normals, period, point, new_leading)
 
@@ -184,9 +184,9 @@ def span_of_relations(map_: ModularMap, degree: int, largest: float = inf) -> li
     Orbits are added until two in a row do not enlarge the span, or its dimension exceeds `largest`.
     """
     first, unchanged = relations_on_orbit(map_, degree), 0
-    basis, most = first.vectors, first.independent
+    basis, rank_bound = first.vectors, first.independent
     while basis and unchanged < 2 and len(basis) <= largest:
-        enlarged = echelon([*basis, *relations_on_orbit(map_, degree, most).vectors], map_.prime)
+        enlarged = echelon([*basis, *relations_on_orbit(map_, degree, rank_bound).vectors], map_.prime)
         unchanged = unchanged + 1 if len(enlarged) == len(basis) else 0
         basis = enlarged
     return basis
@@ -197,7 +197,7 @@ def orbit_profile(
     *,
     max_degree: int | None = None,
     budget: Budget | None = None,
-    known: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
+    known_gradients: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
     """Measure the relations of degree 1, 2, ... on one orbit of each map; the maps are expected to agree.
@@ -206,7 +206,7 @@ def orbit_profile(
         maps: the maps, with different primes and, if eps is not given, different eps.
         max_degree: the last degree; by default it depends on the dimension and on the number of monomials.
         budget: no degree is begun once it is spent; None means no limit.
-        known: returns the gradients of known integrals at a point.
+        known_gradients: returns the gradients of known integrals at a point.
         progress: called with the degree that is tried.
 
     Returns:
@@ -232,11 +232,11 @@ def orbit_profile(
     with_known = 0
     agree, period, cut = True, None, ""
     leading: list[frozenset[Exponent]] = [frozenset()] * len(maps)
-    top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
+    last_degree = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
-        top = max((d for d in range(1, top + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
+        last_degree = max((d for d in range(1, last_degree + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
     largest = MAX_UNKNOWNS if max_degree is not None else MAX_INDEPENDENT
-    for degree in range(1, top + 1):
+    for degree in range(1, last_degree + 1):
         if comb(dim + degree, degree) > MAX_UNKNOWNS or any(
             len(_not_multiples(dim, degree, lower)) > largest for lower in leading
         ):
@@ -253,7 +253,7 @@ def orbit_profile(
         nullities.append(min(orbit.dimension for orbit in orbits))
         codimensions.append(min(orbit.codimension for orbit in orbits))
         ranks = [
-            rank([*orbit.normals, *known(map_, orbit.point)], map_.prime)
+            rank([*orbit.normals, *known_gradients(map_, orbit.point)], map_.prime)
             for map_, orbit in zip(maps, orbits, strict=True)
         ]
         with_known = max(with_known, min(ranks))
@@ -317,32 +317,34 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     constant: list[list[bool]] | None = None
     for map_ in maps:
         field = GF(map_.prime)
-        pair: list[list[list[int]]] = []
+        two_bases: list[list[list[int]]] = []
         for _ in range(2):
             points = map_.orbit(count + iterates)
             closed = len(points) < count + iterates  # a cycle: its points are continued around it
             periods.add(len(points) if closed else None)
-            ahead = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
+            continued = [points[k % len(points)] for k in range(len(points) + iterates * closed)]
             rows = [
                 [
                     int(evaluate(function, field, [field.convert(c) for x in segment for c in x]))
                     for function in functions
                 ]
-                for segment in zip(*(ahead[k : k + len(ahead) - iterates] for k in range(iterates + 1)), strict=True)
+                for segment in zip(
+                    *(continued[k : k + len(continued) - iterates] for k in range(iterates + 1)), strict=True
+                )
             ]
-            pair.append(null_space(rows, len(functions), map_.prime))
-        bases += pair
+            two_bases.append(null_space(rows, len(functions), map_.prime))
+        bases += two_bases
         # Entries of reduced bases that agree on two orbits of one map are constants; the others depend on the orbit,
         # and are values of integrals.
-        if len(pair[0]) == len(pair[1]):
-            same = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*pair, strict=True)]
+        if len(two_bases[0]) == len(two_bases[1]):
+            same = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*two_bases, strict=True)]
             constant = same if constant is None or len(constant) != len(same) else constant
     dimension = min(len(basis) for basis in bases)
-    rows_of = constant if constant is not None and len(constant) == dimension else []
+    constant_entries = constant if constant is not None and len(constant) == dimension else []
     return Basis(
         tuple(names),
         dimension,
-        tuple(tuple(row) for row in rows_of),
+        tuple(tuple(row) for row in constant_entries),
         len({len(basis) for basis in bases}) == 1,
         periods.pop() if len(periods) == 1 else None,
     )
@@ -364,15 +366,15 @@ class SparseRelation:
     @property
     def text(self) -> str:
         """The equation, e.g. m1^2 + m2^2 + c1*p3^2 + c2 = 0."""
-        parts = []
+        terms = []
         for monomial, coefficient in self.terms:
             if monomial == "1":
-                parts.append(coefficient)
+                terms.append(coefficient)
             elif coefficient in ("1", "-1"):
-                parts.append(coefficient[:-1] + monomial)
+                terms.append(coefficient[:-1] + monomial)
             else:
-                parts.append(f"{coefficient}*{monomial}")
-        return " + ".join(parts).replace("+ -", "- ") + " = 0"
+                terms.append(f"{coefficient}*{monomial}")
+        return " + ".join(terms).replace("+ -", "- ") + " = 0"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -409,23 +411,25 @@ def sparse_relations(
     relations, context = [], ring(variables)
     # Letters for the names c1, c2, ... and e1, e2, ... that no variable has as its name.
     taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
-    integral, function = (next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES"))
+    integral_letter, eps_letter = (
+        next((c for c in choice if c not in taken), f"{choice[0]}_") for choice in ("ckCK", "esES")
+    )
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
     # Two orbits of the first map distinguish integrals from constants; the second map gives constants as numbers.
     for row, other_orbit, other_map in zip(*tables, strict=True):
-        used = [k for k, entry in enumerate(row) if entry]
-        is_implied = any(all(map(ge, support[used[0]], lead)) for lead in leads)
-        if is_implied or len(used) > max_terms:
+        columns = [k for k, entry in enumerate(row) if entry]
+        is_implied = any(all(map(ge, support[columns[0]], lead)) for lead in leads)
+        if is_implied or len(columns) > max_terms:
             continue
         terms = []
-        for k in used:
+        for k in columns:
             if row[k] != other_orbit[k]:
                 key = row[k], other_orbit[k], other_map[k]
-                text = names.setdefault(key, f"{integral}{first + len(names)}")
+                text = names.setdefault(key, f"{integral_letter}{first + len(names)}")
             else:
                 number = _number_text(row[k], other_map[k], maps[0], maps[1])
-                text = number or functions.setdefault((row[k], other_map[k]), f"{function}{first + len(functions)}")
+                text = number or functions.setdefault((row[k], other_map[k]), f"{eps_letter}{first + len(functions)}")
             terms.append((format_polynomial(context.from_dict({support[k]: 1})), text))
         relations.append(
             SparseRelation(
@@ -452,8 +456,8 @@ def _number_text(entry: int, other_entry: int, map_: ModularMap, other_map: Modu
     """Recognize a coefficient, given modulo two primes, as a simple number times a power of eps; None otherwise."""
     for power in _POWERS:
         residues = [
-            [residue * pow(at.eps, -power, at.prime) % at.prime]
-            for residue, at in ((entry, map_), (other_entry, other_map))
+            [residue * pow(modular_map.eps, -power, modular_map.prime) % modular_map.prime]
+            for residue, modular_map in ((entry, map_), (other_entry, other_map))
         ]
         [residue] = chinese(residues[0], map_.prime, residues[1], other_map.prime)
         count(60)

@@ -198,14 +198,14 @@ class IntegralSearch(Search):
             if not self.profile.nullities:
                 return "orbits were not measured"
             return f"there is no integral (measured, {tried})" if self.is_exact else f"none shows in {tried} (measured)"
-        parts = [f"{self.by_theorems} by theorems: {self.theorems}"] if self.by_theorems else []
+        phrases = [f"{self.by_theorems} by theorems: {self.theorems}"] if self.by_theorems else []
         if self.profile.nullities:
             shown = max(self.profile.codimension, self.profile.with_known, self.by_theorems)
-            parts.append(f"measured: {tried} show {'no more' if shown == self.by_theorems else shown}")
+            phrases.append(f"measured: {tried} show {'no more' if shown == self.by_theorems else shown}")
             if self.formula_count > shown:
-                parts.append(f"{self.formula_count} have formulas")
+                phrases.append(f"{self.formula_count} have formulas")
         at_least = "" if self.is_exact else "at least "
-        return f"in all {at_least}{self.codimension} independent ({'; '.join(parts)})"
+        return f"in all {at_least}{self.codimension} independent ({'; '.join(phrases)})"
 
     @property
     def is_complete(self) -> bool:
@@ -299,7 +299,7 @@ def integrals_of(
     # Work that a stage does not use goes to later stages, and no stage can use up the share of a later one.
     stages = budget.share([3, 4, 1, 3, 3])
     collected = _Collected(laboratory, progress)
-    # The integrals that theorems give a Kahan map, for each map of the laboratory: without symbols all have one system.
+    # The integrals that theorems give a Kahan map, for each map of the laboratory; without symbols they are the same.
     inherited = list[InheritedIntegrals]()
     if laboratory.system is not None and not flow and laboratory.root is None:
         systems = {
@@ -336,16 +336,20 @@ def integrals_of(
             flow=flow,
         )
 
-    def known(map_: ModularMap, x: Point) -> list[list[int]]:
+    def known_gradients(map_: ModularMap, x: Point) -> list[list[int]]:
         return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
 
     cut = ""
-    empty = Profile(laboratory.map.dim, (), (), None, True, False)
+    empty_profile = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
-        return result(empty, laboratory.defect)
+        return result(empty_profile, laboratory.defect)
     try:
         profile = orbit_profile(
-            laboratory.maps, max_degree=max_degree, budget=next(stages), known=known, progress=progress
+            laboratory.maps,
+            max_degree=max_degree,
+            budget=next(stages),
+            known_gradients=known_gradients,
+            progress=progress,
         )
         on_result(result(profile, UNFINISHED))
         stage = next(stages)
@@ -355,14 +359,16 @@ def integrals_of(
         factors = factors if laboratory.field is not None else candidates(laboratory, cofactors, stage)
         denominators = denominators_among(factors, laboratory.map.dim)
 
-        def quickly(map_: ModularMap) -> SpaceSearch:
+        def quick_search(map_: ModularMap) -> SpaceSearch:
             # Half of the remaining work, on each map: the other half is for the formulas.
             return search_spaces(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
 
         base = laboratory.maps[0]
-        base, space_search, formulas, reason = _formulas(laboratory, base, quickly(base), quickly, stage, progress)
+        base, space_search, formulas, reason = _formulas(
+            laboratory, base, quick_search(base), quick_search, stage, progress
+        )
     except NoPoint as error:
-        return result(empty, str(error))
+        return result(empty_profile, str(error))
     collected.offer(formulas)
     if inherited and not laboratory.symbols:
         collected.add_by_theorems(inherited[0])
@@ -379,12 +385,16 @@ def integrals_of(
         cut = add_relation_spaces(base, profile, space_search, LARGEST_SPAN, stage.part(0.5), progress)
         if len(space_search.steps) > steps_before:
 
-            def thoroughly(map_: ModularMap) -> SpaceSearch:
-                again = search_spaces(map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress)
-                add_relation_spaces(map_, profile, again, LARGEST_SPAN, stage.part(0.5), progress)
-                return again
+            def thorough_search(map_: ModularMap) -> SpaceSearch:
+                second_search = search_spaces(
+                    map_, profile, cofactors, denominators, budget=stage.part(0.5), progress=progress
+                )
+                add_relation_spaces(map_, profile, second_search, LARGEST_SPAN, stage.part(0.5), progress)
+                return second_search
 
-            _, space_search, formulas, reason = _formulas(laboratory, base, space_search, thoroughly, stage, progress)
+            _, space_search, formulas, reason = _formulas(
+                laboratory, base, space_search, thorough_search, stage, progress
+            )
             collected.offer(formulas)
             result_so_far = result(profile, "")
     if not flow and not result_so_far.is_complete and laboratory.root is None:
@@ -473,8 +483,8 @@ class _Collected:
             return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
 
         for function, origin, product in sorted(map(self._normalized, formulas), key=size):
-            row = self._gradients.gradient(function)
-            if not self._gradients.adds(row):
+            gradient = self._gradients.gradient(function)
+            if not self._gradients.adds(gradient):
                 continue
             self._progress("verifying an integral")
             laboratory, evidence = self._laboratory, _AFFINE_EVIDENCE
@@ -486,15 +496,15 @@ class _Collected:
             else:
                 verdict, evidence = laboratory.verdict_on(function)
             if verdict.holds:
-                self._add(row, function, origin, verdict, evidence, product)
+                self._add(gradient, function, origin, verdict, evidence, product)
 
     def _normalized(self, formula: Formula) -> Formula:
         """Normalize the formula so that it tends to an integral of the flow as eps -> 0, where that is possible."""
         function, origin, product = formula
         if not self._has_limit:
             return formula
-        shown = normalized(function, self._laboratory.map.dim).function
-        return shown, origin, product if shown == function else ""
+        normalized_function = normalized(function, self._laboratory.map.dim).function
+        return normalized_function, origin, product if normalized_function == function else ""
 
     @property
     def _has_limit(self) -> bool:
@@ -503,39 +513,39 @@ class _Collected:
         of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
         return of_flow and laboratory.eps is None and laboratory.root is None
 
-    def _add(self, row: list[int], *fields: Any) -> None:
-        self._gradients.add(row)
+    def _add(self, gradient: list[int], *fields: Any) -> None:
+        self._gradients.add(gradient)
         name = f"{'F' if self._laboratory.flow else 'I'}{len(self.integrals) + 1}"
         self.integrals.append(FoundIntegral(name, *fields))
 
     def add_by_theorems(self, inherited: InheritedIntegrals) -> None:
         """Add the integrals that theorems give, unless the formula is too long to expand."""
         laboratory = self._laboratory
-        affine, context = len(inherited.quotient.integrals), ring((*laboratory.map.variables, "eps"))
-        for k, row in enumerate(inherited.gradients(laboratory.maps[0], self._gradients.point)):
-            if not self._gradients.adds(row):
+        affine_count, context = len(inherited.quotient.integrals), ring((*laboratory.map.variables, "eps"))
+        for k, gradient in enumerate(inherited.gradients(laboratory.maps[0], self._gradients.point)):
+            if not self._gradients.adds(gradient):
                 continue
-            if k < affine:
+            if k < affine_count:
                 terms = zip(context.gens(), inherited.quotient.integrals[k], strict=False)
                 affine_integral = RationalFunction(
                     sum((x * v for x, v in terms), context.constant(0)), context.constant(1)
                 )
-                self._add(row, affine_integral, AFFINE, Certainty.PROVED, _AFFINE_EVIDENCE)
+                self._add(gradient, affine_integral, AFFINE, Certainty.PROVED, _AFFINE_EVIDENCE)
                 continue
             field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
             eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
             try:
-                value = inherited.modified(k - affine, field, eps, field.variables[:-1])
+                value = inherited.modified(k - affine_count, field, eps, field.variables[:-1])
             except BudgetExceeded:
                 continue  # too long to expand
             function = RationalFunction.reduced(value.numerator, value.denominator)
-            is_hamiltonian = inherited.forms[k - affine].rank() == len(inherited.quotient.free)
+            is_hamiltonian = inherited.forms[k - affine_count].rank() == len(inherited.quotient.free)
             form = "f = J grad H with" if is_hamiltonian else "K f = grad H with"
             summary = f"{form} a constant skew matrix {'J' if is_hamiltonian else 'K'}"
             summary = f"{summary}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
-            evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k - affine))})
+            evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k - affine_count))})
             formula = self._normalized((function, "modified Hamiltonian (cmoq-2013)", ""))
-            self._add(row, *formula[:2], Certainty.PROVED, evidence)
+            self._add(gradient, *formula[:2], Certainty.PROVED, evidence)
 
     def add_products(self, cofactors: Sequence[Cofactor], budget: Budget) -> None:
         """Add products of powers of known polynomials, among them time-dependent integrals."""
@@ -553,12 +563,12 @@ class _Collected:
             function = product.function
             if function is None or len(self.integrals) + len(self.time_dependent) >= laboratory.map.dim:
                 continue
-            row = self._gradients.gradient(function)
-            if not self._gradients.adds(row):
+            gradient = self._gradients.gradient(function)
+            if not self._gradients.adds(gradient):
                 continue
             verdict, evidence = laboratory.verdict_on(function, factor=product.constant)
             if verdict.holds:
-                self._gradients.add(row)
+                self._gradients.add(gradient)
                 name = f"T{len(self.time_dependent) + 1}"
                 integral = FoundIntegral(name, function, origin, verdict, evidence, product.text)
                 self.time_dependent.append(TimeDependentIntegral(name, integral, product.constant, laboratory.flow))

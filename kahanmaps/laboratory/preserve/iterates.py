@@ -57,7 +57,7 @@ class RatioOfIterates:
     `denominator` are indices into `functions`: one index a for F_a, two indices a, b for F_a F_b~ - F_b F_a~.
     """
 
-    lift: TwoPointBasis
+    two_point_basis: TwoPointBasis
     functions: tuple[fmpq_mpoly, ...]
     numerator: tuple[int, ...]
     denominator: tuple[int, ...]
@@ -65,20 +65,20 @@ class RatioOfIterates:
     @property
     def length(self) -> int:
         """The number of successive points that I depends on."""
-        return self.lift.shift + self.lift.rank
+        return self.two_point_basis.shift + self.two_point_basis.rank
 
     def with_limit(self, count: int) -> RatioOfIterates:
         """Normalize a ratio that tends to a constant as eps -> 0; its first `count` variables are coordinates."""
-        if self.lift.rank > 1:
+        if self.two_point_basis.rank > 1:
             return self
         result = normalized(self.formula[0], count)
-        parts = result.function.numerator, result.function.denominator
-        return RatioOfIterates(self.lift, parts, (0,), (1,)) if result.is_shifted else self
+        functions = result.function.numerator, result.function.denominator
+        return RatioOfIterates(self.two_point_basis, functions, (0,), (1,)) if result.is_shifted else self
 
     @property
     def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:
         """The ratio, and the definitions of the letters F0, F1, ... in it: of rank 2 these abbreviate the functions."""
-        if self.lift.rank == 1:
+        if self.two_point_basis.rank == 1:
             return RationalFunction(self.functions[self.numerator[0]], self.functions[self.denominator[0]]), []
         taken = self.functions[0].context().names()
         letters = (c * k for k in count(1) for c in "FGKUVW")
@@ -87,8 +87,8 @@ class RatioOfIterates:
         gens = ring([*names, *(f"{name}~" for name in names)]).gens()
         F, F_next = gens[: len(names)], gens[len(names) :]
         P, Q = (F[a] * F_next[b] - F[b] * F_next[a] for a, b in (self.numerator, self.denominator))
-        used = sorted({*self.numerator, *self.denominator})
-        return RationalFunction(P, Q), [(names[k], self.functions[k]) for k in used]
+        occurring = sorted({*self.numerator, *self.denominator})
+        return RationalFunction(P, Q), [(names[k], self.functions[k]) for k in occurring]
 
     @property
     def text(self) -> str:
@@ -108,7 +108,7 @@ class RatioOfIterates:
         """Return numerator and denominator on successive points of an orbit, at the values of the symbols and eps."""
         rows = [
             [evaluate(F, field, (*x, *iterate, *values)) for F in self.functions]
-            for x, iterate in zip(points, points[self.lift.shift :], strict=False)
+            for x, iterate in zip(points, points[self.two_point_basis.shift :], strict=False)
         ]
 
         def minor(indices: tuple[int, ...]) -> Any:
@@ -191,7 +191,7 @@ def verdict_on_ratio(
 def integrals_in_iterates(
     laboratory: Laboratory,
     required: int,
-    known: Independent,
+    independent: Independent,
     budget: Budget,
     progress: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[tuple[RationalFunction, str, str]], list[tuple[RatioOfIterates, str]], str]:
@@ -200,7 +200,7 @@ def integrals_in_iterates(
     Args:
         laboratory: the map.
         required: the number of independent integrals at which the search stops, known ones included.
-        known: the known integrals, on the first map of the laboratory.
+        independent: the known integrals, on the first map of the laboratory.
         budget: no further basis is tried once it is spent.
         progress: called with the basis that is tried.
 
@@ -210,44 +210,44 @@ def integrals_in_iterates(
 
     Source: petrera-suris-2018.
     """
-    known = copy(known)
-    known.rows = list(known.rows)  # the argument is not to be changed
+    independent = copy(independent)
+    independent.rows = list(independent.rows)  # so that the argument does not change
     plain, ratios = list[tuple[RationalFunction, str, str]](), list[tuple[RatioOfIterates, str]]()
     level = _level(laboratory)
     level_laboratory, replace_levels = (laboratory, None) if level is None else level
-    base = level_laboratory.maps[0]
+    modular_map = level_laboratory.maps[0]
     cut = ""
-    for lift in TWO_POINT_BASES if level is not None else TWO_POINT_BASES[1:]:
-        if len(known.rows) >= required:
+    for two_point_basis in TWO_POINT_BASES if level is not None else TWO_POINT_BASES[1:]:
+        if len(independent.rows) >= required:
             break
         if budget.is_spent:
-            cut = f"{lift.text} were not tried: {SPENT}"
+            cut = f"{two_point_basis.text} were not tried: {SPENT}"
             break
-        for forms, spaces in bases_with_spaces(base, [lift]):
-            progress(forms.text)
+        for basis_with_rank, spaces in bases_with_spaces(modular_map, [two_point_basis]):
+            progress(basis_with_rank.text)
             result = SpaceSearch()
-            step = SearchStep("iterates", 2, None, forms.text, forms)
+            step = SearchStep("iterates", 2, None, basis_with_rank.text, basis_with_rank)
             result.add(step, sorted(spaces, key=lambda space: space.pattern))
-            bases, _ = interpolate_bases(level_laboratory, base.prime, result, budget)
+            bases, _ = interpolate_bases(level_laboratory, modular_map.prime, result, budget)
             for basis in bases:
-                functions = [_bilinear_function(P, forms, level_laboratory.map) for P in basis]
+                functions = [_bilinear_function(P, basis_with_rank, level_laboratory.map) for P in basis]
                 if replace_levels is not None:
-                    functions = [replace_levels(F, forms.shift) for F in functions]
+                    functions = [replace_levels(F, basis_with_rank.shift) for F in functions]
                 # These ratios generate all others.
-                candidates = [RatioOfIterates(forms, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
-                if forms.rank == 2:
+                candidates = [RatioOfIterates(basis_with_rank, (F, functions[0]), (0,), (1,)) for F in functions[1:]]
+                if basis_with_rank.rank == 2:
                     pairs = [(first, k) for k in range(2, len(functions)) for first in (0, 1)]
-                    candidates = [RatioOfIterates(forms, tuple(functions), pair, (0, 1)) for pair in pairs]
+                    candidates = [RatioOfIterates(basis_with_rank, tuple(functions), pair, (0, 1)) for pair in pairs]
                 for ratio in candidates:
-                    if not known.add(gradient_of(ratio, laboratory.map, laboratory.maps[0], known.point)):
+                    if not independent.add(gradient_of(ratio, laboratory.map, laboratory.maps[0], independent.point)):
                         continue
-                    if lift.shift:
-                        ratios.append((ratio, forms.text))
+                    if two_point_basis.shift:
+                        ratios.append((ratio, basis_with_rank.text))
                     else:  # the ratio contains no iterate: make it a function of (variables, symbols, eps)
                         context = ring(laboratory.map.names)
                         gens, n = context.gens(), laboratory.map.dim
                         P, Q = (F.compose(*gens[:n], *gens, ctx=context) for F in ratio.functions)
-                        plain.append((RationalFunction(P, Q), forms.text, ""))
+                        plain.append((RationalFunction(P, Q), basis_with_rank.text, ""))
     return plain, ratios, cut
 
 
@@ -257,18 +257,18 @@ def _letters(map_: MapFamily, shift: int) -> tuple[str, ...]:
     return (*names, *(name + "~" * max(shift, 1) for name in names), *map_.names[len(names) :])
 
 
-def _bilinear_function(P: fmpq_mpoly, lift: TwoPointBasis, map_: MapFamily) -> fmpq_mpoly:
+def _bilinear_function(P: fmpq_mpoly, two_point_basis: TwoPointBasis, map_: MapFamily) -> fmpq_mpoly:
     """Return the bilinear function of x and its iterate that a polynomial of degree 2 encodes (`TwoPointBasis`)."""
-    n, context = map_.dim, ring(_letters(map_, lift.shift))
+    n, context = map_.dim, ring(_letters(map_, two_point_basis.shift))
     one, gens = context.constant(1), context.gens()
-    X, Y = (one, *gens[:n]), (one, *gens[n * min(lift.shift, 1) :][:n])
+    X, Y = (one, *gens[:n]), (one, *gens[n * min(two_point_basis.shift, 1) :][:n])
     pairs = dict(zip(exponents_up_to(n, TWO_POINT_DEGREE), pairs_of(n), strict=True))
     total = context.constant(0)
     for monomial, coefficient in P.terms():
         exponents = tuple(map(int, monomial))
         i, j = pairs[exponents[:n]]
         scalar = context.from_dict({(0,) * (2 * n) + exponents[n:]: coefficient})
-        total = total + scalar * (X[i] * Y[j] + lift.sign * X[j] * Y[i])
+        total = total + scalar * (X[i] * Y[j] + two_point_basis.sign * X[j] * Y[i])
     return primitive_part(total)[1]
 
 
@@ -283,11 +283,11 @@ def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, in
     quotient = quotient_by(integrals, n)
     if system is None or not integrals or len(quotient.free) < 2:
         return None
-    used, levels = {*laboratory.map.names, *laboratory.file.parameters}, list[str]()
+    taken, levels = {*laboratory.map.names, *laboratory.file.parameters}, list[str]()
     for k in count(1):
         if len(levels) == len(integrals):
             break
-        levels += [f"c{k}"] if f"c{k}" not in used else []
+        levels += [f"c{k}"] if f"c{k}" not in taken else []
     free = [laboratory.map.variables[k] for k in quotient.free]
     context = ring((*free, *laboratory.symbols, *levels))
     gens = context.gens()
@@ -309,9 +309,9 @@ def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, in
         context = ring(_letters(laboratory.map, shift))
         *letters, eps = context.gens()
         x, iterate, symbols = letters[:n], letters[n : 2 * n], letters[2 * n :]
-        sums = [sum((a * g for a, g in zip(v, x, strict=True)), context.constant(0)) for v in integrals]
+        level_values = [sum((a * g for a, g in zip(v, x, strict=True)), context.constant(0)) for v in integrals]
         free_x, free_iterate = ([side[k] for k in quotient.free] for side in (x, iterate))
-        return F.compose(*free_x, *free_iterate, *symbols, *sums, eps, ctx=context)
+        return F.compose(*free_x, *free_iterate, *symbols, *level_values, eps, ctx=context)
 
     return restricted, replace_levels
 
@@ -321,12 +321,12 @@ def gradient_of(ratio: RatioOfIterates, exact: MapFamily, map_: ModularMap, poin
     field = DualField(GF(map_.prime))
     values = [field.convert(value) for value in map_.values]
     eps = field.convert(map_.eps)
-    over = exact.at(eps, field, values)
-    row = []
+    map_over_duals = exact.at(eps, field, values)
+    gradient = []
     for k in range(map_.dim):
         points = [tuple(field.dual(c, int(i == k)) for i, c in enumerate(point))]
         while len(points) < ratio.length:
-            points.append(over.step(points[-1]))
+            points.append(map_over_duals.step(points[-1]))
         P, Q = ratio.numerator_and_denominator(field, points, (*values, eps))
-        row.append(int(P.slope * Q.value - P.value * Q.slope))
-    return row
+        gradient.append(int(P.slope * Q.value - P.value * Q.slope))
+    return gradient

@@ -72,14 +72,14 @@ class Product:
     @property
     def function(self) -> RationalFunction | None:
         """The expanded product; None where it has too many terms."""
-        parts = []
+        numerator_and_denominator = []
         for sign in (1, -1):
             powers = [(g, sign * k) for g, k in self.factors if sign * k > 0]
             if prod(len(g) ** k for g, k in powers) > _MAX_TERMS:
                 return None
             one = self.constant.numerator.context().constant(1)
-            parts.append(reduce(lambda P, power: P * power[0] ** power[1], powers, one))
-        return RationalFunction(*parts)
+            numerator_and_denominator.append(reduce(lambda P, power: P * power[0] ** power[1], powers, one))
+        return RationalFunction(*numerator_and_denominator)
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,8 @@ def candidates(
     if laboratory.flow:
         return list(laboratory.flow_polynomials(budget).functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
-    known = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
-    factors = _irreducible((*context.gens()[:n], *known), n, laboratory.eps)
+    cofactor_polynomials = [cofactor.polynomial for cofactor in cofactors if cofactor.polynomial is not None]
+    factors = _irreducible((*context.gens()[:n], *cofactor_polynomials), n, laboratory.eps)
     factors |= _jacobian_factors(laboratory.map, laboratory.eps, laboratory.system is not None)
     factors |= _irreducible(further, n, laboratory.eps)
     return sorted(factors.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]
@@ -135,9 +135,9 @@ def _jacobian_factors(map_: MapFamily, eps: fmpq | None, both: bool) -> dict[str
         field = FunctionField(map_.names, _BUDGET, reduces=True)
         *x, eps_variable = field.variables
         try:
-            local = map_.at(eps_variable, field, x[n:])
-            local = local.inverse if backward else local
-            fractions += jacobian_determinant_fraction(local, x[:n], local.generic_step(tuple(x[:n])))
+            map_over_field = map_.at(eps_variable, field, x[n:])
+            map_over_field = map_over_field.inverse if backward else map_over_field
+            fractions += jacobian_determinant_fraction(map_over_field, x[:n], map_over_field.generic_step(tuple(x[:n])))
         except (BudgetExceeded, InputError, SingularStep):
             continue
     return _irreducible((part for function in fractions for part in (function.numerator, function.denominator)), n, eps)
@@ -179,10 +179,10 @@ class _Line:
             return [*(int(c) * denominator % p for c in image), denominator % p]
 
         # Without the common factor: its degree would multiply in each further map, and its zeros are not those of Z~.
-        raw = _interpolated(homogeneous, n * map_degree * curve_degree, p)
-        common = reduce(nmod_poly.gcd, raw)
-        self.image = [entry // common for entry in raw]
-        self.denominator = self.denominator * raw[-1]
+        undivided = _interpolated(homogeneous, n * map_degree * curve_degree, p)
+        common = reduce(nmod_poly.gcd, undivided)
+        self.image = [entry // common for entry in undivided]
+        self.denominator = self.denominator * undivided[-1]
         image_Z = self.image[-1]
 
         def numerator(t: int) -> list[int]:
@@ -200,30 +200,30 @@ class _Line:
         n, p = self.map.dim, self.prime
         field = GF(p)
         parameters = [field.convert(c) for c in (*self.map.values, self.map.eps)]
-        top = degree_in(g, n)
-        powers = [list(accumulate(repeat(c, top), mul, initial=nmod_poly([1], p))) for c in curve]
+        degree_of_g = degree_in(g, n)
+        powers = [list(accumulate(repeat(c, degree_of_g), mul, initial=nmod_poly([1], p))) for c in curve]
         total = nmod_poly([0], p)
         count(50 + 15 * len(g))
         for monomial, coefficient in g.terms():
             exponents = [int(e) for e in monomial]
             factors = (c**e for c, e in zip(parameters, exponents[n:], strict=True))
             value = nmod_poly([int(prod(factors, start=field.convert(coefficient)))], p)
-            used = zip(powers, [*exponents[:n], top - sum(exponents[:n])], strict=True)
-            total = total + reduce(mul, (row[e] for row, e in used if e), value)
+            tables_and_exponents = zip(powers, [*exponents[:n], degree_of_g - sum(exponents[:n])], strict=True)
+            total = total + reduce(mul, (row[e] for row, e in tables_and_exponents if e), value)
         return total
 
 
-def _interpolated(values: Callable[[int], list[int]], top: int, p: int) -> list[nmod_poly]:
-    """Interpolate the polynomials of degree at most `top` with these values at t = 1, 2, ... Raises NoPoint."""
+def _interpolated(values: Callable[[int], list[int]], max_degree: int, p: int) -> list[nmod_poly]:
+    """Interpolate the polynomials of degree at most `max_degree` with these values at t = 1, 2, ... Raises NoPoint."""
     nodes, rows, t, missed = list[int](), list[list[int]](), 0, 0
-    while len(nodes) <= top:
+    while len(nodes) <= max_degree:
         t += 1
         try:
             rows.append(values(t))
             nodes.append(t)
         except SingularStep:
             missed += 1
-            if missed > top + 20:
+            if missed > max_degree + 20:
                 raise NoPoint("random points modulo a prime are indeterminacy points of the map") from None
     return [interpolated(nodes, column, p) for column in zip(*rows, strict=True)]
 
@@ -276,8 +276,8 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
         return []
     size, width = len(rows), len(rows[0])
     count(10 + size**2 * (size + width) / 50)
-    wide = fmpz_mat([[*row, *(int(i == k) for i in range(size))] for k, row in enumerate(rows)]).hnf()
-    return [[int(e) for e in row[width:]] for row in wide.tolist() if not any(row[:width])]
+    augmented = fmpz_mat([[*row, *(int(i == k) for i in range(size))] for k, row in enumerate(rows)]).hnf()
+    return [[int(e) for e in row[width:]] for row in augmented.tolist() if not any(row[:width])]
 
 
 def coefficient_rows(polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
@@ -329,8 +329,8 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
             total = sum((k * c for k, c in zip(vector, numbers, strict=True)), context.constant(0))
             if vector[0] == 0 and not total.is_zero():
                 time_dependent.append((vector, RationalFunction(total, context.constant(1))))
-        exact = _reduced(relations(coefficient_rows(cofactors)), weights)
-        return _assembled(polynomials, n, exact, [(one, exact)], time_dependent)
+        constant_one = _reduced(relations(coefficient_rows(cofactors)), weights)
+        return _assembled(polynomials, n, constant_one, [(one, constant_one)], time_dependent)
     line = _Line(laboratory.maps[0])
     on_line, on_image = ([line.along(g, curve) for g in polynomials] for curve in (line.line, line.image))
     # det dPhi and the C_i on a random line, as vectors over a coprime base.
@@ -361,33 +361,40 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         return products
 
     values = constants_of(laboratory, constants)
-    known = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
+    reconstructed = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
 
     def with_constant(allowed: list[RationalFunction]) -> list[list[int]]:
         """Return a basis of the vectors whose constant is 1 or a product of powers of the allowed ones."""
-        combinations = multiplicative_relations([*(c for _, c in known), *allowed])
-        chosen = [_combined(a[: len(known)], [v for v, _ in known]) for a in combinations if any(a[: len(known)])]
+        combinations = multiplicative_relations([*(c for _, c in reconstructed), *allowed])
+        chosen = [
+            _combined(a[: len(reconstructed)], [v for v, _ in reconstructed])
+            for a in combinations
+            if any(a[: len(reconstructed)])
+        ]
         return _reduced(chosen, weights)
 
-    exact = with_constant([])
-    time_dependent = [(v, c) for v, c in known if v[0] == 0 and c != one]
-    return _assembled(polynomials, n, exact, [(one, exact), (minus_one, with_constant([minus_one]))], time_dependent)
+    constant_one = with_constant([])
+    time_dependent = [(v, c) for v, c in reconstructed if v[0] == 0 and c != one]
+    return _assembled(
+        polynomials, n, constant_one, [(one, constant_one), (minus_one, with_constant([minus_one]))], time_dependent
+    )
 
 
 def _assembled(
     polynomials: Sequence[fmpq_mpoly],
     n: int,
-    exact: Sequence[list[int]],
+    constant_one: Sequence[list[int]],
     of_densities: Sequence[tuple[RationalFunction, Sequence[list[int]]]],
     time_dependent: Sequence[tuple[list[int], RationalFunction]],
 ) -> Products:
     """Build the result from exponent vectors.
 
-    `exact` are those with constant 1, `of_densities` those allowed for a density by its constant (1 first, then -1).
+    `constant_one` are those with constant 1, `of_densities` those allowed for a density by its constant (1 first, then
+    -1).
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
-    for v in (v for v in exact if v[0] == 0):
+    for v in (v for v in constant_one if v[0] == 0):
         # Choose between I and 1/I: positive degree or, for degree 0, positive first exponent.
         total = sum(k * d for k, d in zip(v, degrees, strict=True))
         integrals.append(v if (total, next((k for k in v if k), 0)) > (0, 0) else [-k for k in v])
@@ -403,11 +410,11 @@ def _assembled(
         return denominator, numerator, sum(map(abs, vector))
 
     density = None
-    for constant, choice in of_densities:
-        vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
+    for constant, vectors in of_densities:
+        vector = next((v if v[0] == -1 else [-e for e in v] for v in vectors if abs(v[0]) == 1), None)
         while vector is not None and density is None:  # multiply by integrals while this lowers the cost
-            others = [_combined((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
-            best = min(others, key=cost, default=vector)
+            neighbours = [_combined((1, sign), (vector, v)) for v in integrals for sign in (1, -1)]
+            best = min(neighbours, key=cost, default=vector)
             if cost(best) >= cost(vector):
                 density = product(vector, constant)
             vector = best
@@ -434,7 +441,7 @@ def constants_of(laboratory: Laboratory, constants: Callable[[ModularMap], list[
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
     answer = reconstruct_at(laboratory.root, constants_at, names, seed=laboratory.seed)
     if answer.functions is None:
-        return [one if is_known else None for is_known in is_one]
+        return [one if is_constant_one else None for is_constant_one in is_one]
     gens = [gen for gen, name in zip(context.gens(), laboratory.map.names, strict=True) if name in names]
     quotients = [over_one_denominator([c], context, gens) for c in answer.functions]
     return [RationalFunction(numerator, denominator) for [numerator], denominator in quotients]

@@ -60,14 +60,14 @@ from kahanmaps.maps.kahan import KahanMap
 # Largest degrees of polynomials with a given cofactor that are searched for, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MAX_TERMS = 1000
-Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
+SpacesAt = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]  # for a prime and values of the names
 
 _SAMPLES = (150, 600, 3000)  # all coefficients are tried with few samples before any is tried with many
 _COEFFICIENTS = 6
 NO_BRANCHES: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
-_SPARE = 8
+_SPARE = 8  # points beyond the number of unknowns
 AFFINE = "v.x with v.f(x) = 0"
-_CHANCE = 20  # bits by which a fraction must be shorter than that of a random residue
+_SPARE_BITS = 20  # bits by which a fraction must be shorter than that of a random residue
 
 
 @dataclass(frozen=True)
@@ -77,14 +77,14 @@ class Branches:
     place: tuple[int, int]
     roots: tuple[RationalFunction, ...]
 
-    def in_order(self, alike: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
+    def in_order(self, spaces: Sequence[DarbouxSpace], map_: ModularMap) -> list[DarbouxSpace] | None:
         """Return the spaces on a map in the order of the roots; None where two roots agree there or one is missing."""
         field = GF(map_.prime)
         parameters = [field.convert(value) for value in (*map_.values, map_.eps)]
         row, column = self.place
-        by_value = {space.basis[row][column]: space for space in alike}
+        by_value = {space.basis[row][column]: space for space in spaces}
         values = [root.value(field, parameters[: len(root.names)]) for root in self.roots]
-        if len(by_value) < len(alike) or None in values:
+        if len(by_value) < len(spaces) or None in values:
             return None
         ordered = [by_value.get(int(value)) for value in values]
         return None if None in ordered else [space for space in ordered if space is not None]
@@ -116,11 +116,11 @@ def search_spaces(
     Raises NoPoint.
     """
     result, required = SpaceSearch(), profile.codimension
-    is_of_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
+    is_of_vector_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
     affine = affine_space(map_)
     if affine is not None:
-        result.add(SearchStep("affine", 1, None, AFFINE if is_of_field else "affine integral"), [affine])
-    if is_of_field:  # its denominators divide det(I - eps f'): relations of small span cost less than these factors
+        result.add(SearchStep("affine", 1, None, AFFINE if is_of_vector_field else "affine integral"), [affine])
+    if is_of_vector_field:  # denominators divide det(I - eps f'): relations of small span cost less than these factors
         add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
     if gradient_rank(map_, result.all_spaces) >= required:
         return result
@@ -133,7 +133,7 @@ def search_spaces(
     cofactor_result = search_cofactors(map_, cofactors, denominators, result.all_spaces, required, max_degree, budget)
     steps, spaces = [*result.steps, *cofactor_result.steps], [*result.spaces, *cofactor_result.spaces]
     result = replace(cofactor_result, steps=steps, spaces=spaces, searched=result.searched)
-    if not is_of_field:
+    if not is_of_vector_field:
         add_relation_spaces(map_, profile, result, SMALL_SPAN, budget, progress)
     return result
 
@@ -153,19 +153,19 @@ def add_relation_spaces(
     """
     small_nullities = takewhile(lambda size: size < largest, profile.nullities)
     for degree in [degree for degree, size in enumerate(small_nullities, 1) if size]:
-        known = result.all_spaces
-        independent = gradient_rank(map_, known)
-        if independent >= profile.codimension:
+        known_spaces = result.all_spaces
+        independent_count = gradient_rank(map_, known_spaces)
+        if independent_count >= profile.codimension:
             break
         if degree in result.searched:
             continue
         if budget.is_spent:
             return f"relations of degree {degree} and more were not searched: {SPENT}"
         progress(f"closed forms from the relations of degree {degree}")
-        spaces = darboux_spaces(map_, degree, known, largest)
+        spaces = darboux_spaces(map_, degree, known_spaces, largest)
         if spaces is not None:
             result.searched.append(degree)
-        if spaces and gradient_rank(map_, [*known, *spaces]) > independent:
+        if spaces and gradient_rank(map_, [*known_spaces, *spaces]) > independent_count:
             step = SearchStep("relations", degree, None, f"relations of degree {degree} along orbits")
             result.add(step, sorted(spaces, key=lambda space: space.pattern))
     return ""
@@ -195,27 +195,27 @@ def repeat_search(
                 spaces = [space for _, space in cofactor_spaces(sample, step.product, step.degree, model)]
             else:
                 spaces = [cofactor_space(sample, step.product, step.degree, *model)]
-        elif step.lift is not None:
-            spaces = two_point_spaces(map_, step.lift)
+        elif step.two_point_basis is not None:
+            spaces = two_point_spaces(map_, step.two_point_basis)
         else:
             spaces = darboux_spaces(map_, step.degree, repeated.all_spaces) or []
         # Sort as in the model: by zero pattern and, where patterns agree, by branches. There may be more spaces than in
         # the model, see `may_be_conjugate`.
-        by_pattern, of_step, waiting = (
+        by_pattern, step_branches, ordered = (
             group_by_pattern(spaces),
             branches.get(number, {}),
             dict[Pattern, list[DarbouxSpace]](),
         )
-        for kind, model_spaces in group_by_pattern(model).items():
-            alike = by_pattern.get(kind, [])
-            if kind in of_step:
-                alike = of_step[kind].in_order(alike, map_) or []
-            elif len(alike) > len(model_spaces):
-                alike = _most_similar(alike, model_spaces, map_.prime, reference)
-            if len(alike) < len(model_spaces):
+        for pattern, model_spaces in group_by_pattern(model).items():
+            candidates = by_pattern.get(pattern, [])
+            if pattern in step_branches:
+                candidates = step_branches[pattern].in_order(candidates, map_) or []
+            elif len(candidates) > len(model_spaces):
+                candidates = _most_similar(candidates, model_spaces, map_.prime, reference)
+            if len(candidates) < len(model_spaces):
                 return None
-            waiting[kind] = alike
-        repeated.add(step, [waiting[space.pattern].pop(0) for space in model])
+            ordered[pattern] = candidates
+        repeated.add(step, [ordered[space.pattern].pop(0) for space in model])
     return repeated
 
 
@@ -236,13 +236,13 @@ def may_be_conjugate(result: SpaceSearch) -> bool:
 
 
 def _most_similar(
-    alike: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
+    spaces: list[DarbouxSpace], models: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace]:
     """Return for each model the space that shares most coefficients with it; conjugate spaces share none.
 
     Two coefficients count as the same rational number if one simple fraction reduces to them modulo both primes.
     """
-    remaining = list(alike)
+    remaining = list(spaces)
     chosen = []
     for model in models:
         counts = []
@@ -251,7 +251,7 @@ def _most_similar(
             pairs = [(a, b) for row in rows for a, b in zip(*row, strict=True) if b and b != 1]
             count_work(60 * len(pairs))
             residues = chinese([a for a, _ in pairs], prime, [b for _, b in pairs], reference)
-            counts.append(sum(simple_fraction(c, prime * reference, _CHANCE) is not None for c in residues))
+            counts.append(sum(simple_fraction(c, prime * reference, _SPARE_BITS) is not None for c in residues))
         chosen.append(remaining.pop(counts.index(max(counts))))
     return chosen
 
@@ -276,36 +276,36 @@ def interpolate_bases(
 
     branches: dict[int, dict[Pattern, Branches]] = {}  # by step and zero pattern, where several spaces share it
     for number, group in enumerate(result.spaces):
-        for kind, model in group_by_pattern(group).items():
+        for pattern, model in group_by_pattern(group).items():
             if len(model) == 1:
                 continue
 
-            def alike(
-                prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
+            def spaces_at(
+                prime: int, values: tuple[int, ...], number: int = number, pattern: Pattern = pattern
             ) -> list[DarbouxSpace] | None:
                 other = repeat_at(prime, values)
-                return None if other is None else group_by_pattern(other.spaces[number])[kind]
+                return None if other is None else group_by_pattern(other.spaces[number])[pattern]
 
-            distinguished = find_branches(model, alike, names, laboratory.seed, budget, laboratory.root)
+            distinguished = find_branches(model, spaces_at, names, laboratory.seed, budget, laboratory.root)
             if distinguished is None:
                 cause = f"no rational coefficient distinguishes {len(model)} spaces of degree {model[0].degree}"
                 cause = SPENT if budget.is_spent else cause
                 return [], f"integrals were found modulo primes, but no closed form: {cause}"
-            branches.setdefault(number, {})[kind] = distinguished
+            branches.setdefault(number, {})[pattern] = distinguished
 
     def repeated_spaces(map_: ModularMap) -> list[DarbouxSpace] | None:
         repetition = repeat_search(result, map_, reference, branches)
         return None if repetition is None else repetition.all_spaces
 
-    forms = laboratory.formulas(result.all_spaces, repeated_spaces, budget)
-    if forms.bases is None:
-        return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
-    return forms.bases, ""
+    closed_forms = laboratory.formulas(result.all_spaces, repeated_spaces, budget)
+    if closed_forms.bases is None:
+        return [], f"integrals were found modulo primes, but no closed form: {closed_forms.reason}"
+    return closed_forms.bases, ""
 
 
 def find_branches(
     model: Sequence[DarbouxSpace],
-    alike: Alike,
+    spaces_at: SpacesAt,
     names: Sequence[str],
     seed: int,
     budget: Budget,
@@ -313,10 +313,10 @@ def find_branches(
 ) -> Branches | None:
     """Find a coefficient that distinguishes spaces of one zero pattern at every value of `names`.
 
-    `model` holds the spaces on one map; `alike(prime, values)` returns those on another map in any order, or None at
-    special values. Returns None where the spaces are conjugate over an extension of Q, or the budget is spent first.
+    `model` holds the spaces on one map; `spaces_at(prime, values)` returns those on another map in any order, or None
+    at special values. Returns None where the spaces are conjugate over an extension of Q, or the budget is spent first.
     """
-    places = [
+    distinguishing_places = [
         (i, k)
         for i, vector in enumerate(model[0].basis)
         for k in range(len(vector))
@@ -324,22 +324,22 @@ def find_branches(
     ]
     count, context = len(model), ring((*names, "T"))
     *gens, T = context.gens()
-    origin = {"T": fmpq(0)}
-    for samples, place in cartesian(_SAMPLES, places[:_COEFFICIENTS]):
+    at_zero = {"T": fmpq(0)}
+    for samples, place in cartesian(_SAMPLES, distinguishing_places[:_COEFFICIENTS]):
         if budget.is_spent:
             return None
 
         def symmetric_functions(
             prime: int, values: tuple[int, ...], place: tuple[int, int] = place
         ) -> list[int] | None:
-            spaces = alike(prime, values)
+            spaces = spaces_at(prime, values)
             if spaces is None or len(spaces) != count:
                 return None
             coefficients = [1]  # of prod (T - w), the highest first
             for space in spaces:
                 w = space.basis[place[0]][place[1]]
                 shifted = zip([*coefficients, 0], [0, *coefficients], strict=True)
-                coefficients = [(here - w * before) % prime for here, before in shifted]
+                coefficients = [(coefficient - w * previous) % prime for coefficient, previous in shifted]
             return coefficients[1:]
 
         answer = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, budget=budget)
@@ -349,7 +349,7 @@ def find_branches(
         chi = sum((P * T ** (count - k) for k, P in enumerate(numerators, 1)), denominator * T**count)
         linear = [factor for factor, _ in irreducible_factors(chi) if factor.degrees()[-1] == 1]
         roots = tuple(
-            RationalFunction(-substitute(factor, origin), substitute(factor.derivative(len(gens)), origin))
+            RationalFunction(-substitute(factor, at_zero), substitute(factor.derivative(len(gens)), at_zero))
             for factor in linear
         )
         return Branches(place, roots) if len(roots) == count else None

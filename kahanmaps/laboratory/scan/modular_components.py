@@ -81,9 +81,9 @@ def find_components(
             rows = null_space(sample, count + 1, prime)
             if len(rows) == count - dimension:
                 ones = np.ones((len(unassigned), 1), dtype=np.int64)
-                inside = ~(np.hstack([unassigned, ones]) @ np.array(rows).T % prime).any(axis=1)
-                if inside.sum() >= needed:
-                    yield tuple(map(tuple, rows)), inside
+                is_inside = ~(np.hstack([unassigned, ones]) @ np.array(rows).T % prime).any(axis=1)
+                if is_inside.sum() >= needed:
+                    yield tuple(map(tuple, rows)), is_inside
 
     for dimension in range(count - 1, max(min_dimension, 1) - 1, -1):
         # Affine subspaces first, then hypersurfaces of affine subspaces of one dimension more. Largest dimension first:

@@ -73,25 +73,25 @@ def _permutes_members(change: Change, p: int, special: Mapping[Point, Degrees]) 
 
 def _candidate_changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
     """Yield the changes to be tried; their shifts and factors take one rational point to another."""
-    signed = [
+    signed_permutations = [
         tuple(
-            tuple(fmpq(sign * (k == place)) for k in range(count + 1))
-            for place, sign in zip(places, (*signs, 1), strict=True)
+            tuple(fmpq(sign * (k == position)) for k in range(count + 1))
+            for position, sign in zip(permutation, (*signs, 1), strict=True)
         )
         for signs in sorted(product((1, -1), repeat=count), key=lambda signs: signs.count(-1))
-        for places in permutations(range(count + 1))
+        for permutation in permutations(range(count + 1))
     ]
-    affine_changes = [change for change in signed if change[-1][-1] != 0]
+    affine_changes = [change for change in signed_permutations if change[-1][-1] != 0]
     yield from affine_changes
-    rational = [component for component in components if component.is_rational_point][:_MAX_POINTS]
-    points = [(*(component.values or {}).values(), fmpq(1)) for component in rational]
+    rational_components = [component for component in components if component.is_rational_point][:_MAX_POINTS]
+    points = [(*(component.values or {}).values(), fmpq(1)) for component in rational_components]
     for change, point in product(affine_changes, points):
         image = _times(change, points[0])
         yield tuple((*row[:-1], row[-1] + y - x) for row, x, y in zip(change, image, point, strict=True))
         if all(image) and all(point):
             yield tuple(tuple(y / x * c for c in row) for row, x, y in zip(change, image, point, strict=True))
     if count > 1:
-        yield from signed
+        yield from signed_permutations
 
 
 def _times(change: Change, vector: Sequence[fmpq]) -> Row:

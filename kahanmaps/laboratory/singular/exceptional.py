@@ -31,7 +31,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.work import count
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.following import AlongCurves, Range, TestCurve, divided
+from kahanmaps.laboratory.singular.following import AlongCurves, Range, TestCurve, divided_powers
 from kahanmaps.laboratory.singular.jets import Function, JetStep, form_order, image_of, modulo, roots_modulo
 from kahanmaps.laboratory.singular.outcomes import CONFINED, NOT_CONFINED, POINTS_DIFFER, Hypersurface
 from kahanmaps.maps.equation import Equation
@@ -83,8 +83,8 @@ def components(
     common = reduce(nmod_mpoly.gcd, image)
     image = [entry / common for entry in image]
     multiplicities: dict[str, tuple[nmod_mpoly, list[int]]] = {}
-    for k, (form, is_there) in enumerate(forms):
-        value = modulo(form, field).compose(*(image if is_there else X), ctx=ring)
+    for k, (form, at_image) in enumerate(forms):
+        value = modulo(form, field).compose(*(image if at_image else X), ctx=ring)
         for factor, exponent in factored(value):
             _, exponents = multiplicities.setdefault(str(factor), (factor, [0] * len(forms)))
             exponents[k] = exponent
@@ -102,14 +102,14 @@ def components(
 
 _MIN_LINES, _MAX_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
 _REPEATED = 4  # after this number of equal multiplicities for the same orders of forms, they are not computed again
-_FIRST = 12  # steps by which hypersurfaces are distinguished
+_DISTINGUISHING_STEPS = 12  # first steps, by which hypersurfaces are distinguished
 _MAX_DIGITS = 1000  # in forms that are factored
 _TRIES = 16  # lines on a surface, for a point of a component
 _PRECISION = 8  # of the orders at points themselves
 _BITS = 31  # of primes: with larger ones python-flint does not order the factors of polynomials in several variables
 
 
-Key = tuple[Any, ...]
+Key = tuple[Any, ...]  # whether it is contracted; its orders in the poles, in Z and in all forms; its first rows
 
 
 class OrbitDataUnknown(ArithmeticError):
@@ -118,7 +118,7 @@ class OrbitDataUnknown(ArithmeticError):
 
 @dataclass(frozen=True)
 class _Forms:
-    """The factors over Q of det M, which count at a point, those of det M', which count at its image, and Z."""
+    """The factors over Q of det M, which are evaluated at a point, those of det M', evaluated at its image, and Z."""
 
     poles: tuple[Any, ...]
     images: tuple[Any, ...]
@@ -126,7 +126,7 @@ class _Forms:
 
     @property
     def all(self) -> list[tuple[Any, bool]]:
-        """The forms in the order of columns, each with whether it counts at the image; one may stand there twice."""
+        """The forms in the order of columns, each with whether it is evaluated at the image; some occur twice."""
         at_points = [(form, False) for form in self.poles]
         return [*at_points, *((form, True) for form in self.images), (self.infinity, False)]
 
@@ -135,8 +135,8 @@ class _Forms:
 class _Curve:
     """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
 
-    `across` is another random vector, for surfaces. `excess` are the exponents of the forms in the common factor of the
-    minors of the equation, which is no part of the map. Curves are followed within the limits.
+    `across` is another random vector, for surfaces. `minor_exponents` are the exponents of the forms in the common
+    factor of the minors of the equation, which is no part of the map. Curves are followed within the limits.
     """
 
     equation: Equation
@@ -145,7 +145,7 @@ class _Curve:
     direction: tuple[int, ...]
     across: tuple[int, ...]
     functions: tuple[Function, ...]
-    excess: tuple[int, ...]
+    minor_exponents: tuple[int, ...]
     forms: _Forms
     limits: Range
 
@@ -164,7 +164,7 @@ class _Curve:
         return [nmod_poly([x, v], self.prime) for x, v in zip(self.point, self.direction, strict=True)]
 
     @cached_property
-    def own(self) -> tuple[int, ...]:
+    def initial_orders(self) -> tuple[int, ...]:
         """The orders of the forms at the point itself."""
         return tuple(function(self.line, _PRECISION) or 0 for function in self.functions)
 
@@ -174,28 +174,39 @@ class _Curve:
 
         Raises OrbitDataUnknown where there is no first step.
         """
-        run = self.test_curve(self).steps(_FIRST)[0]
+        run = self.test_curve(self).steps(_DISTINGUISHING_STEPS)[0]
         if not run:
             raise OrbitDataUnknown(
                 "work limit reached (raise --effort), or a curve touches a hypersurface in too high an order"
             )
         is_contracted = image_of([self.inverse], run[0].limit) is None
-        return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
+        return (
+            is_contracted,
+            self.initial_orders[: len(self.forms.poles)],
+            self.initial_orders[-1],
+            *self.form_orders(run)[:1],
+            self.rows(run),
+        )
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """The rows of `OrbitData` for steps along the curve but the last, with forms in place of hypersurfaces."""
         return tuple(
-            (mu, *level) for mu, level in zip(divided(run, self.own, self.excess), self.levels(run)[1:], strict=False)
+            (mu, *orders)
+            for mu, orders in zip(
+                divided_powers(run, self.initial_orders, self.minor_exponents), self.form_orders(run)[1:], strict=False
+            )
         )
 
-    def levels(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
+    def form_orders(self, run: Sequence[JetStep]) -> list[tuple[int, ...]]:
         """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
-        poles, levels = len(self.forms.poles), []
-        orders = [self.own, *(step.orders for step in run)]
-        for mu, here, there in zip(divided(run, self.own, self.excess), orders, orders[1:], strict=False):
+        poles, form_orders = len(self.forms.poles), []
+        orders = [self.initial_orders, *(step.orders for step in run)]
+        for mu, here, there in zip(
+            divided_powers(run, self.initial_orders, self.minor_exponents), orders, orders[1:], strict=False
+        ):
             images = zip(self.forms.images, there[poles:-1], strict=True)
-            levels.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
-        return levels
+            form_orders.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
+        return form_orders
 
     def components(self, curve: Sequence[nmod_poly]) -> list[HypersurfaceComponent]:
         """Return the components of the forms on a surface through any curve."""
@@ -210,7 +221,7 @@ class _Curve:
         raise OrbitDataUnknown("a hypersurface has no point modulo a prime")
 
     @cached_property
-    def census(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
+    def components_with_points(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
         """Return all components on a plane, each with a curve through one of its points; empty if one has no point."""
         try:
             return [(component, self.through(component, self.line)) for component in self.components(self.line)]
@@ -222,16 +233,17 @@ class _Curve:
 class _Resolved:
     """The orders of hypersurfaces along a curve, from those of forms: the rows of `OrbitData`.
 
-    `exponents` are those of the hypersurfaces in the forms; `solved` turns orders back, exactly or not. Without it
-    forms are factored on surfaces: `places` has the keys of the hypersurfaces with components of a kind, `keys` those
-    of all, in their order, and `multiplicities` the results after each number of steps.
+    `exponents` are those of the hypersurfaces in the forms; `left_inverse` gives the orders of hypersurfaces from those
+    of forms, and its results are checked. Without it forms are factored on surfaces: `keys_of_kind` has the keys of the
+    hypersurfaces with components of a kind, `keys` those of all, in their order, and `multiplicities` the results after
+    each number of steps.
     """
 
     curve: _Curve
     exponents: fmpq_mat
-    solved: fmpq_mat | None
+    left_inverse: fmpq_mat | None
     keys: Sequence[Key]
-    places: dict[Kind, set[Key]]
+    keys_of_kind: dict[Kind, set[Key]]
     multiplicities: dict[int, fmpq_mat] = field(default_factory=dict)
 
     @property
@@ -241,12 +253,12 @@ class _Resolved:
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """Return the rows of all steps except the last. Raises OrbitDataUnknown."""
-        rows, mus = [], divided(run, self.curve.own, self.curve.excess)
-        for t, (mu, level) in enumerate(zip(mus, self.curve.levels(run)[1:], strict=False)):
-            column = fmpq_mat(len(level), 1, list(level))
+        rows, powers = [], divided_powers(run, self.curve.initial_orders, self.curve.minor_exponents)
+        for t, (mu, orders_of_forms) in enumerate(zip(powers, self.curve.form_orders(run)[1:], strict=False)):
+            column = fmpq_mat(len(orders_of_forms), 1, list(orders_of_forms))
             if t not in self.multiplicities:
                 self.multiplicities[t] = (
-                    self._on_surface(column, run[t].curve) if self.solved is None else self.solved * column
+                    self._on_surface(column, run[t].curve) if self.left_inverse is None else self.left_inverse * column
                 )
             nu = self.multiplicities[t]
             if self.exponents * nu != column or any(entry.q != 1 or entry < 0 for entry in nu.entries()):
@@ -254,19 +266,19 @@ class _Resolved:
             rows.append((mu, *(int(entry) for entry in nu.entries())))
         return tuple(rows)
 
-    def _on_surface(self, level: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
+    def _on_surface(self, orders_of_forms: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
         """The orders along a curve by the factors of forms on a surface through it. Raises OrbitDataUnknown."""
-        nu, largest = fmpq_mat(len(self.keys), 1), max(level.entries())
+        nu, largest = fmpq_mat(len(self.keys), 1), max(orders_of_forms.entries())
         if largest == 0:
             return nu
         # Equal orders of forms often have the same multiplicities; otherwise the fewest terms that show them are taken.
-        same = [component for component in self.multiplicities.values() if self.exponents * component == level]
-        if len(same) >= _REPEATED and all(component == same[0] for component in same):
-            return same[0]
-        terms = 1 + max((int(max(component.entries())) for component in same), default=1)
+        known = [column for column in self.multiplicities.values() if self.exponents * column == orders_of_forms]
+        if len(known) >= _REPEATED and all(column == known[0] for column in known):
+            return known[0]
+        terms = 1 + max((int(max(column.entries())) for column in known), default=1)
         while True:
-            cut = [entry.truncate(terms) for entry in curve]
-            components = self.curve.components(cut)
+            truncated = [entry.truncate(terms) for entry in curve]
+            components = self.curve.components(truncated)
             if all(component.order is not None and component.order < terms for component in components):
                 break
             if terms > largest:
@@ -274,8 +286,12 @@ class _Resolved:
             terms *= 2
         for component in components:
             if component.order:
-                places = self.places.get(component.kind, set())
-                key = next(iter(places)) if len(places) == 1 else self.curve.through(component, cut).key
+                candidate_keys = self.keys_of_kind.get(component.kind, set())
+                key = (
+                    next(iter(candidate_keys))
+                    if len(candidate_keys) == 1
+                    else self.curve.through(component, truncated).key
+                )
                 if key not in self.keys:
                     raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
                 nu[self.keys.index(key), 0] += component.order
@@ -291,92 +307,98 @@ def exceptional_hypersurfaces(
     point. Only points modulo random primes are followed. If the forms do not suffice to tell the hypersurfaces
     apart, their degrees are 0 and their orders those of the forms. Raises OrbitDataUnknown.
     """
-    here = map_.at(eps)
+    map_at_eps = map_.at(eps)
 
     def factors(equation: Equation) -> tuple[Any, ...]:
         form = kernel_minors([[*row[:-1], None] for row in equation.polynomials()], counted_product)[-1]
         return (form,) if map_.digits > _MAX_DIGITS else tuple(factor for factor, _ in factored(form))
 
-    infinity = here.equations[0].polynomials()[0][0].context().gens()[-1]
-    poles = tuple(form for form in factors(here.equations[0]) if form != infinity)
-    forms = _Forms(poles, factors(here.inverse.equations[0]), infinity)
-    kinds: dict[Key, list[_Curve]] = {}
+    infinity = map_at_eps.equations[0].polynomials()[0][0].context().gens()[-1]
+    poles = tuple(form for form in factors(map_at_eps.equations[0]) if form != infinity)
+    forms = _Forms(poles, factors(map_at_eps.inverse.equations[0]), infinity)
+    curves_by_key: dict[Key, list[_Curve]] = {}
     for line in range(_MAX_LINES):
         if limits.budget.is_spent:
             break
         field = GF(random_prime(rng, _BITS))
         try:
-            over = map_.at(eps, field)
+            map_at_prime = map_.at(eps, field)
             functions = tuple(form_order(form, field) for form, _ in forms.all)
         except BadPrime:
             continue
-        degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits, rng)
+        degree, zeros, curves = _on_line(map_at_prime.factors[0], forms, functions, limits, rng)
         for curve in curves:
-            kinds.setdefault(curve.key, []).append(curve)
+            curves_by_key.setdefault(curve.key, []).append(curve)
         # A hypersurface that splits over an extension has points modulo some primes only.
-        if line >= _MIN_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
-            kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
+        if line >= _MIN_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in curves_by_key.values()):
+            curves_by_key = dict(sorted(curves_by_key.items()))  # the same order for all random choices
             try:
-                return degree, _resolved(kinds, forms, degree, zeros)
+                return degree, _resolved(curves_by_key, forms, degree, zeros)
             except OrbitDataUnknown:
                 continue  # a hypersurface without points modulo the primes so far
-    if limits.budget.is_spent or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
+    if limits.budget.is_spent or any(len({curve.prime for curve in kind}) < 2 for kind in curves_by_key.values()):
         raise OrbitDataUnknown("the exceptional hypersurfaces could not be distinguished by random points")
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
-        key: [(curve, curve) for curve in curves] for key, curves in kinds.items()
+        key: [(curve, curve) for curve in curves] for key, curves in curves_by_key.items()
     }
-    return degree, _followed(followed, [0] * len(kinds), range(len(forms.all)))
+    return degree, _followed(followed, [0] * len(curves_by_key), range(len(forms.all)))
 
 
-def _resolved(kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
+def _resolved(curves_by_key: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int) -> list[Hypersurface]:
     """The exceptional hypersurfaces with their degrees and patterns. Raises OrbitDataUnknown."""
-    keys = list(kinds)
+    keys = list(curves_by_key)
     exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
-    total = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]
-    column, sizes = fmpq_mat(len(total), 1, total), fmpq_mat(len(keys), 1)
+    form_degrees = [int(form.total_degree()) * (degree if at_image else 1) for form, at_image in forms.all]
+    total_degrees, degrees = fmpq_mat(len(form_degrees), 1, form_degrees), fmpq_mat(len(keys), 1)
     followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {key: [] for key in keys}
     if exponents.rank() == len(keys):
-        solved = (exponents.transpose() * exponents).inv() * exponents.transpose()
-        sizes = solved * column
-        for key, curves in kinds.items():
-            followed[key] = [(curve, _Resolved(curve, exponents, solved, keys, {})) for curve in curves]
+        left_inverse = (exponents.transpose() * exponents).inv() * exponents.transpose()
+        degrees = left_inverse * total_degrees
+        for key, curves in curves_by_key.items():
+            followed[key] = [(curve, _Resolved(curve, exponents, left_inverse, keys, {})) for curve in curves]
     else:
-        lines = {curve.prime: curve for curves in kinds.values() for curve in curves}
-        for census in [line.census for line in lines.values() if line.census][:2]:
-            places: dict[Kind, set[Key]] = {}
-            sizes = fmpq_mat(len(keys), 1)
-            for component, curve in census:
-                if curve.key not in kinds:
+        lines = {curve.prime: curve for curves in curves_by_key.values() for curve in curves}
+        on_planes = [line.components_with_points for line in lines.values() if line.components_with_points]
+        for components_with_points in on_planes[:2]:
+            keys_of_kind: dict[Kind, set[Key]] = {}
+            degrees = fmpq_mat(len(keys), 1)
+            for component, curve in components_with_points:
+                if curve.key not in curves_by_key:
                     raise OrbitDataUnknown("the image of a curve lies in an unknown hypersurface")
-                places.setdefault(component.kind, set()).add(curve.key)
-                sizes[keys.index(curve.key), 0] += component.degree
-                followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, places)))
-    if exponents * sizes != column or sum(sizes.entries(), fmpq(0)) != zeros:
+                keys_of_kind.setdefault(component.kind, set()).add(curve.key)
+                degrees[keys.index(curve.key), 0] += component.degree
+                followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, keys_of_kind)))
+    if exponents * degrees != total_degrees or sum(degrees.entries(), fmpq(0)) != zeros:
         raise OrbitDataUnknown("some hypersurfaces have no point on the random lines")
     # Orders on hypersurfaces that are not contracted are not needed.
-    chosen = [k for k, key in enumerate(keys) if key[0]]
-    return _followed(followed, [int(size) for size in sizes.entries()], chosen)
+    contracted = [k for k, key in enumerate(keys) if key[0]]
+    return _followed(followed, [int(size) for size in degrees.entries()], contracted)
 
 
 def _followed(
-    curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int]
+    curves: dict[Key, list[tuple[_Curve, AlongCurves]]], degrees: Sequence[int], columns: Sequence[int]
 ) -> list[Hypersurface]:
     """The exceptional hypersurfaces with these columns of their patterns, by two primes. Raises OrbitDataUnknown."""
     hypersurfaces = []
-    for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
+    for degree, (key, pairs) in zip(degrees, curves.items(), strict=True):
         if key[0]:
             by_prime = {curve.prime: (curve, tracked) for curve, tracked in pairs}
-            orders = [curve.test_curve(tracked).orbit_data(_FIRST) for curve, tracked in list(by_prime.values())[:2]]
-            if len(orders) < 2:
+            data = [
+                curve.test_curve(tracked).orbit_data(_DISTINGUISHING_STEPS)
+                for curve, tracked in list(by_prime.values())[:2]
+            ]
+            if len(data) < 2:
                 raise OrbitDataUnknown("a hypersurface has points modulo one prime only")
-            if orders[0].known != orders[1].known:
+            if data[0].compared != data[1].compared:
                 raise OrbitDataUnknown(POINTS_DIFFER)
-            along = orders[0].of(columns)
-            status = CONFINED if any(row[0] for row in along.rows) else NOT_CONFINED
-            known = Hypersurface("Z" if key[2] else "?", size, any(key[1]), 1, status, 1, orbit_data=along)
-            settled = along.settled_at if along.is_settled else None
+            orbit_data = data[0].of(columns)
+            status = CONFINED if any(row[0] for row in orbit_data.rows) else NOT_CONFINED
+            hypersurface = Hypersurface(
+                "Z" if key[2] else "?", degree, any(key[1]), 1, status, 1, orbit_data=orbit_data
+            )
+            settled = orbit_data.settled_at if orbit_data.is_settled else None
             hypersurfaces.append(
-                replace(known, primes=tuple(by_prime)[:2], followed=along.followed, settled_at=settled)
+                replace(hypersurface, primes=tuple(by_prime)[:2], followed=orbit_data.followed, settled_at=settled)
             )
     return hypersurfaces
 
@@ -396,20 +418,22 @@ def _on_line(
     degree = max(int(entry.degree()) for entry in image)
     at_points = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
     at_images = [evaluate(form, map_.field, image) for form in forms.images]
-    excess = []  # how often each divides the common factor
+    point_exponents = []  # how often each divides the common factor
     for value in at_points:
         quotient, exponent = common, 0
         while value.degree() > 0 and (quotient % value).is_zero():
             quotient, exponent = quotient // value, exponent + 1
-        excess.append(exponent)
-    if sum(k * int(value.degree()) for k, value in zip(excess, at_points, strict=True)) != common.degree():
+        point_exponents.append(exponent)
+    if sum(k * int(value.degree()) for k, value in zip(point_exponents, at_points, strict=True)) != common.degree():
         raise OrbitDataUnknown("the minors of the equation have a common factor of another kind")
     product = reduce(nmod_poly.__mul__, [*at_points, *at_images])
     if product.is_zero():
         raise OrbitDataUnknown("the map or its inverse is defined nowhere")
     radical = product // product.gcd(product.derivative())
-    every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
+    minor_exponents = (*point_exponents[:-1], *([0] * len(forms.images)), point_exponents[-1])
     points = [tuple((x + s * v) % p for x, v in zip(a, b, strict=True)) for s in roots_modulo(radical)]
     (inverse,) = map_.inverse.equations
-    curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, limits) for point in points]
+    curves = [
+        _Curve(equation, inverse, point, b, across, functions, minor_exponents, forms, limits) for point in points
+    ]
     return degree, int(radical.degree()), curves

@@ -32,9 +32,10 @@ from kahanmaps.laboratory.singular.jets import (
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
-_FIRST_ALONG, _MOST_ALONG = 512, 2048  # terms of long series: the cost of a step is at least proportional to them
+# Numbers of terms of long series: the cost of a step is at least proportional to them.
+_FIRST_PRECISION, _LONG_PRECISION = 512, 2048
 _CONSTANT = 8  # a column is constant if its last entries, at least this number, are equal
-_CHECKED = 4  # number of orders that must satisfy a recurrence beyond those that determine it
+_CONFIRMING_ORDERS = 4  # that must satisfy a recurrence, beyond those that determine it
 _FREE_STEPS = 100  # steps for which a confined hypersurface is followed
 
 
@@ -61,7 +62,7 @@ class OrbitData:
     eventually_in: tuple[int, ...] = ()
 
     @property
-    def known(self) -> tuple[object, ...]:
+    def compared(self) -> tuple[object, ...]:
         """The data in which two points on one hypersurface have to agree."""
         return self.rows[: 2 * self.settled_at], self.is_settled, self.continues_as, self.eventually_in
 
@@ -146,37 +147,37 @@ class AlongCurves(Protocol):
 class Tracked:
     """The functions whose orders are measured along curves through a hypersurface.
 
-    `excess` are their exponents in the common factor of the minors of the equation, which is no part of the map;
-    `first` are their orders on the hypersurface itself: 1 for its own, 0 for others. The first `critical` of them are
-    those of contracted hypersurfaces.
+    `minor_exponents` are their exponents in the common factor of the minors of the equation, which is no part of the
+    map; `initial_orders` are their orders on the hypersurface itself: 1 for its own, 0 for others. The first `critical`
+    of them are those of contracted hypersurfaces.
     """
 
     functions: tuple[Function, ...] = ()
-    excess: tuple[int, ...] = ()
-    first: tuple[int, ...] = ()
+    minor_exponents: tuple[int, ...] = ()
+    initial_orders: tuple[int, ...] = ()
     critical: int = 0
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
         """Return the rows of `OrbitData` for steps along a curve; without tracked functions those of det M(x)."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
-        pairs = zip(divided(run, self.first, self.excess), run, strict=True)
+        pairs = zip(divided_powers(run, self.initial_orders, self.minor_exponents), run, strict=True)
         return tuple((mu, *step.orders[: self.critical]) for mu, step in pairs)
 
 
-def divided(run: Sequence[JetStep], first: Sequence[int], excess: Sequence[int]) -> list[int]:
+def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], minor_exponents: Sequence[int]) -> list[int]:
     """The powers of t divided out that belong to the map, not to the common factor of the minors of its equation.
 
-    `first` are the orders of the functions before the steps, `excess` their exponents in that factor.
+    `initial_orders` are the orders of the functions before the steps, `minor_exponents` their exponents in that factor.
     """
-    before = [first, *(step.orders for step in run)]
+    before = [initial_orders, *(step.orders for step in run)]
     return [
-        step.common - sum(k * order for k, order in zip(excess, orders, strict=True))
+        step.common - sum(k * order for k, order in zip(minor_exponents, orders, strict=True))
         for step, orders in zip(run, before, strict=False)
     ]
 
 
-NOTHING = Tracked()
+NOTHING_TRACKED = Tracked()
 
 
 @dataclass(frozen=True)
@@ -185,15 +186,15 @@ class Range:
 
     A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
     point of the image is followed, which is fast. Where it reaches the locus, series are needed, which are slow: for
-    at most `along` steps, or `enough` if multiplicities repeat and each step uses up terms, so that series are long.
-    The computation stops when the `budget` is spent.
+    at most `series_steps` steps, or `repeating_steps` if multiplicities repeat and each step uses up terms, so that
+    series are long. The computation stops when the `budget` is spent.
     """
 
     shown: int
     reach: int
-    along: int
+    series_steps: int
     budget: Budget
-    enough: int
+    repeating_steps: int
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ class TestCurve:
     point: Sequence[int]
     direction: Sequence[int]
     limits: Range
-    tracked: AlongCurves = NOTHING
+    tracked: AlongCurves = NOTHING_TRACKED
 
     @property
     def prime(self) -> int:
@@ -212,7 +213,7 @@ class TestCurve:
         return self.equations[0].over.characteristic
 
     def steps(
-        self, count: int, tangents: Sequence[Sequence[int]] = (), most: int = _MAX_PRECISION
+        self, count: int, tangents: Sequence[Sequence[int]] = (), max_precision: int = _MAX_PRECISION
     ) -> tuple[list[JetStep], bool]:
         """Return `count` steps along series of sufficient length, and whether budget and precision allowed all of them.
 
@@ -230,9 +231,9 @@ class TestCurve:
                         return run, len(run) == count
                 return run, True
             except PrecisionTooLow:
-                if precision >= most or self.limits.budget.is_spent:
+                if precision >= max_precision or self.limits.budget.is_spent:
                     return run, False
-                precision = min(most, max(2 * precision, 8 + precision * count // max(1, len(run))))
+                precision = min(max_precision, max(2 * precision, 8 + precision * count // max(1, len(run))))
 
     def all_steps(self, count: int, tangents: Sequence[Sequence[int]] = ()) -> tuple[JetStep, ...]:
         """Return `count` steps. Raises PrecisionTooLow if fewer are possible."""
@@ -242,9 +243,9 @@ class TestCurve:
         return tuple(run)
 
     def orbit_data_until_return(self, up: int) -> OrbitData:
-        """The orders along a curve whose hypersurface is one again after the step `up`, until it is a critical one.
+        """The orders along a curve if the image is a hypersurface again after the step `up`.
 
-        From then on they are those of the other.
+        If it is a critical hypersurface after some step, the later orders are those of that hypersurface.
         """
         steps = self.limits.shown
         reach = min(self.limits.reach, steps + _FREE_STEPS)
@@ -256,88 +257,95 @@ class TestCurve:
                     if sorted(nu)[-2:] not in ([1], [0, 1]):
                         raise NotGeneric("a point on several critical hypersurfaces")
                     return OrbitData(rows[:t], (), t, True, (t, nu.index(1)))
-            hit, reached = self._next_hit(run[-1].limit, len(run), reach)
-            if hit is None or not self.tracked.functions:  # nothing is needed beyond the next indeterminacy point
+            event, reached = self._next_event(run[-1].limit, len(run), reach)
+            if event is None or not self.tracked.functions:  # nothing is needed beyond the next indeterminacy point
                 return OrbitData(rows[:up], (), reached, True)
-            steps = hit
+            steps = event
 
-    def orbit_data(self, first: int) -> OrbitData:
+    def orbit_data(self, first_steps: int) -> OrbitData:
         """Return the orbit data along the curve, with more steps until it is settled or the limits are reached.
 
-        `first` is the number of steps to begin with. The image may move on a critical hypersurface until something
-        happens, so that orders have to repeat for as long as curves are followed.
+        `first_steps` is the number of steps to begin with. The image may move on a critical hypersurface until
+        something happens, so that orders have to repeat for as long as curves are followed.
         """
-        steps, limits, most = first, self.limits, _FIRST_ALONG
+        steps, limits, max_precision = first_steps, self.limits, _FIRST_PRECISION
         while True:
-            run, is_complete = self.steps(steps, most=most)
+            run, is_complete = self.steps(steps, max_precision=max_precision)
             rows = self.tracked.rows(run)
             last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
-            hit = None
+            event = None
             if is_complete and len(rows) - last >= _CONSTANT:
-                hit, reached = self._next_hit(run[-1].limit, len(run), limits.reach)
-                if hit is None:
+                event, reached = self._next_event(run[-1].limit, len(run), limits.reach)
+                if event is None:
                     return OrbitData(rows[:last], (), reached, True)
             recurrences = [find_recurrence(column) for column in zip(*rows, strict=True)]
             repeats = all(
-                recurrence is not None and len(rows) >= max(_CONSTANT, 2 * recurrence.order + _CHECKED)
+                recurrence is not None and len(rows) >= max(_CONSTANT, 2 * recurrence.order + _CONFIRMING_ORDERS)
                 for recurrence in recurrences
             )
             is_cut = not is_complete and not limits.budget.is_spent  # by the precision
-            is_far = len(run) >= min(limits.reach, limits.along)
-            if rows and repeats and (is_far or (is_cut and (most == _MOST_ALONG or len(rows) >= limits.enough))):
-                laws = tuple(recurrence.characteristic for recurrence in recurrences if recurrence is not None)
-                kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
-                return OrbitData(rows[:kept], laws, len(run), True)
-            if is_cut and most < _MOST_ALONG:
-                most *= 2
+            is_far = len(run) >= min(limits.reach, limits.series_steps)
+            if (
+                rows
+                and repeats
+                and (is_far or (is_cut and (max_precision == _LONG_PRECISION or len(rows) >= limits.repeating_steps)))
+            ):
+                polynomials = tuple(recurrence.characteristic for recurrence in recurrences if recurrence is not None)
+                row_count = max(_CONSTANT, *(2 * int(law.degree()) for law in polynomials))
+                return OrbitData(rows[:row_count], polynomials, len(run), True)
+            if is_cut and max_precision < _LONG_PRECISION:
+                max_precision *= 2
                 continue
-            longest = min(limits.reach, max(limits.along, 2 * (hit or 0)))
-            if rows and is_cut and (beyond := self._met_for_ever(run[-1].limit)) is not None:
-                others = (
+            longest = min(limits.reach, max(limits.series_steps, 2 * (event or 0)))
+            if rows and is_cut and (met_forever := self._met_for_ever(run[-1].limit)) is not None:
+                other_steps = (
                     t
                     for t, (mu, *nu) in enumerate(rows, 1)
-                    if mu or any(order for k, order in enumerate(nu) if k not in beyond)
+                    if mu or any(order for k, order in enumerate(nu) if k not in met_forever)
                 )
-                return OrbitData(rows[: max(others, default=1)], (), limits.reach, True, None, beyond)
+                return OrbitData(rows[: max(other_steps, default=1)], (), limits.reach, True, None, met_forever)
             if not is_complete or steps >= longest:
                 return OrbitData(rows, (), len(rows), False)
             steps = longest
 
     def _met_for_ever(self, point: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the critical hypersurfaces on the later orbit of a point; None unless it closes at points of
-        definition.
+        """Return the critical hypersurfaces that the orbit of a point meets, if the orbit closes; otherwise None.
 
-        Then no power of t is ever divided out again. None elsewhere. Lines in this direction show the value of the map.
+        None also if a point of the orbit is an indeterminacy point, so that a power of t would be divided out. The map
+        is evaluated along lines in the direction of the curve.
         """
         tracked, p = self.tracked, self.prime
         if not isinstance(tracked, Tracked) or isinstance(self.equations, Letters):
             return None
-        point, seen, met = _normal(point, p), set[tuple[int, ...]](), set[int]()
+        point, visited, met = _normal(point, p), set[tuple[int, ...]](), set[int]()
         for _ in range(self.limits.reach):
-            seen.add(point)
+            visited.add(point)
             line = [nmod_poly([x, v], p) for x, v in zip(point, self.direction, strict=True)]
-            first = [function(line, _MAX_PRECISION) for function in tracked.functions]
+            orders_here = [function(line, _MAX_PRECISION) for function in tracked.functions]
             run = replace(self, point=point).steps(1)[0]
-            if not run or None in first:
+            if not run or None in orders_here:
                 return None
-            ((mu, *orders),) = replace(tracked, first=tuple(k or 0 for k in first)).rows(run)
+            ((mu, *orders),) = replace(tracked, initial_orders=tuple(k or 0 for k in orders_here)).rows(run)
             if mu:
                 return None
             point = _normal(run[0].limit, p)
             met |= {k for k, order in enumerate(orders) if order}
-            if point in seen:
+            if point in visited:
                 return tuple(sorted(met))
         return None
 
-    def _next_hit(self, limit: Sequence[int], steps: int, reach: int) -> tuple[int | None, int]:
-        """The next step that a point does not have, or with a zero of a function, and for how long it was followed."""
-        at: Sequence[int] = limit
+    def _next_event(self, limit: Sequence[int], steps: int, reach: int) -> tuple[int | None, int]:
+        """Follow a point to the next step at which the map is undefined or a tracked function is zero.
+
+        Returns this step, None if there is none up to `reach`, and the step up to which the point was followed.
+        """
+        point: Sequence[int] = limit
         for step in range(steps + 1, reach + 1):
-            image = image_of(equations_of(self.equations, step), at)
+            image = image_of(equations_of(self.equations, step), point)
             if image is None:
                 return step, step
-            at = image
-            constants = [nmod_poly([x], self.prime) for x in at]
+            point = image
+            constants = [nmod_poly([x], self.prime) for x in point]
             if None in orders_of(self.equations, self.tracked.functions, step, constants, 1):
                 return step, step
             if self.limits.budget.is_spent:

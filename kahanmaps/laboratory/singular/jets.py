@@ -114,7 +114,7 @@ def images_of_curve(
     curves = [line, *([x + power * w for x, w in zip(line, tangent, strict=True)] for tangent in tangents)]
     curves = [[entry.truncate(shift + precision) for entry in curve] for curve in curves]
     for number in integers(1):
-        divided, denominators = 0, list[int | None]()
+        divided_power, denominators = 0, list[int | None]()
         for equation in equations_of(equations, number):
             pivots: list[Pivot] = []
             images = [_image(equation, curve, precision, shift + precision, pivots) for curve in curves]
@@ -124,42 +124,44 @@ def images_of_curve(
             precision -= common
             curves = [[entry.truncate(shift + precision) for entry in curve] for curve in images]
             # The differences between the coordinates of the neighbours and those of the curve.
-            slopes = [b - a for neighbour in curves[1:] for a, b in zip(curves[0], neighbour, strict=True)]
-            if not all(slope.truncate(shift).is_zero() for slope in slopes):
+            differences = [b - a for neighbour in curves[1:] for a, b in zip(curves[0], neighbour, strict=True)]
+            if not all(difference.truncate(shift).is_zero() for difference in differences):
                 raise NotGeneric("the valuation differs at neighbouring points")
-            last = valuation(curves[0][-1], precision)
-            divided = divided * equation.image_degree + common
-            denominators.append(None if last is None else last + common)
+            order_of_Z = valuation(curves[0][-1], precision)
+            divided_power = divided_power * equation.image_degree + common
+            denominators.append(None if order_of_Z is None else order_of_Z + common)
         orders = orders_of(equations, functions, number, curves[0], precision) if functions else []
         if None in orders:
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in curves[0])
         rank = 0
         if tangents:  # at t = 0 in projective space, where tangent vectors are modulo the limit point
-            entries = [*limit, *(int(slope[shift]) for slope in slopes)]
+            entries = [*limit, *(int(difference[shift]) for difference in differences)]
             rank = int(nmod_mat(len(curves), len(limit), entries, prime).rank()) - 1
         valuations = tuple(order or 0 for order in orders)
         denominator = None if None in denominators else sum(order or 0 for order in denominators)
-        yield JetStep(divided, last, denominator, rank, limit, valuations, tuple(curves[0]) if functions else ())
+        yield JetStep(
+            divided_power, order_of_Z, denominator, rank, limit, valuations, tuple(curves[0]) if functions else ()
+        )
 
 
 def _image(
-    equation: Equation, X: Sequence[nmod_poly], precision: int, known: int, pivots: list[Pivot]
+    equation: Equation, X: Sequence[nmod_poly], precision: int, known_terms: int, pivots: list[Pivot]
 ) -> list[nmod_poly]:
-    """Return the image of a curve known below t^known, divided by a common power of t.
+    """Return the image of a curve known below t^known_terms, divided by a common power of t.
 
     An empty list `pivots` is filled with the pivots used, which determine this power. For the neighbours of a curve
     the pivots of the curve must be given. Raises PrecisionTooLow.
     """
-    zero, unit = X[0] * 0, product_units(known, known)
-    count(row_units(equation, known))
+    zero, units_per_product = X[0] * 0, product_units(known_terms, known_terms)
+    count(row_units(equation, known_terms))
 
     def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
-        count(unit)
-        return left.mul_low(right, known)
+        count(units_per_product)
+        return left.mul_low(right, known_terms)
 
     if equation.dim >= _MIN_ELIMINATION_DIMENSION and equation.explicit is None:
-        return kernel(equation.rows(equation.monomials(X, times), zero), precision, known, pivots)
+        return kernel(equation.rows(equation.monomials(X, times), zero), precision, known_terms, pivots)
     image = equation.image(X, zero, times)
     if not pivots:
         pivots.append(_search_pivot([image], [0], range(len(image)), precision))
@@ -169,7 +171,7 @@ def _image(
 def kernel(
     rows: list[list[nmod_poly]],
     precision: int,
-    known: int,
+    known_terms: int,
     pivots: list[Pivot],
     check: Callable[[], None] = lambda: None,
 ) -> list[nmod_poly]:
@@ -180,7 +182,7 @@ def kernel(
     its exponent must be below `precision`. `check` is called before each row, and may raise. Raises PrecisionTooLow.
     """
     free_rows, free_columns = list(range(len(rows))), list(range(len(rows) + 1))
-    inversion, product = series_units(known), 0.3 + product_units(known, known)
+    units_per_inversion, units_per_product = series_units(known_terms), 0.3 + product_units(known_terms, known_terms)
     solved: list[tuple[int, dict[int, nmod_poly]]] = []
     for k in range(len(rows)):
         if len(pivots) == k:
@@ -188,21 +190,21 @@ def kernel(
         power, i, j = pivots[k]
         free_rows.remove(i)
         free_columns.remove(j)
-        count(inversion + product * len(free_columns) * 2)  # includes the products for the kernel
-        inverse = rows[i][j].right_shift(power).inverse_series_trunc(known - power)
-        normal = {c: rows[i][c].right_shift(power).mul_low(inverse, known - power) for c in free_columns}
+        count(units_per_inversion + units_per_product * len(free_columns) * 2)  # includes the products for the kernel
+        inverse = rows[i][j].right_shift(power).inverse_series_trunc(known_terms - power)
+        scaled_row = {c: rows[i][c].right_shift(power).mul_low(inverse, known_terms - power) for c in free_columns}
         for r in free_rows:
             check()
             factor = rows[r][j]
             if not factor.is_zero():
-                count(product * sum(not entry.is_zero() for entry in normal.values()))
+                count(units_per_product * sum(not entry.is_zero() for entry in scaled_row.values()))
                 for c in free_columns:
-                    if not normal[c].is_zero():
-                        rows[r][c] = rows[r][c] - factor.mul_low(normal[c], known)
-        solved.append((j, normal))
+                    if not scaled_row[c].is_zero():
+                        rows[r][c] = rows[r][c] - factor.mul_low(scaled_row[c], known_terms)
+        solved.append((j, scaled_row))
     X = [rows[0][0] * 0 + 1] * (len(rows) + 1)
-    for j, normal in reversed(solved):
-        X[j] = -sum((entry.mul_low(X[c], known) for c, entry in normal.items()), 0 * X[j])
+    for j, scaled_row in reversed(solved):
+        X[j] = -sum((entry.mul_low(X[c], known_terms) for c, entry in scaled_row.items()), 0 * X[j])
     return X
 
 

@@ -30,7 +30,7 @@ from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.following import (
     NO_ORBIT_DATA,
-    NOTHING,
+    NOTHING_TRACKED,
     AlongCurves,
     OrbitData,
     Range,
@@ -51,11 +51,11 @@ from kahanmaps.maps.implicit import MapFamily
 _MAX_TANGENT_PRECISION = 1024
 _KEY_PRECISION = 64  # terms of the series by which points are distinguished
 _TRIES = 40
-_MIN_LINES = 6  # on which critical points are searched, and more while a multiplicity has no point
-_POINTS = 2  # each modulo a prime of its own
+_MIN_LINES = 6  # lines on which critical points are searched; more lines while there is a multiplicity without a point
+_POINTS = 2  # of a hypersurface, each modulo a prime of its own
 MAX_CHARACTERS = 60  # characters of a polynomial in a sentence
 
-FIRST_STEPS = 12  # that are printed
+FIRST_STEPS = 12  # the number of steps that are printed
 
 
 @dataclass(frozen=True)
@@ -104,31 +104,31 @@ def critical_points(
                 excluded = excluded * X[-1] if is_line else excluded
         return total
 
-    value = function(line, counted_product, is_line=True)
-    while (shared := value.gcd(excluded)).degree() > 0:
-        value = value // shared
-    if value.degree() < 1:
+    E_on_line = function(line, counted_product, is_line=True)
+    while (common_zeros := E_on_line.gcd(excluded)).degree() > 0:
+        E_on_line = E_on_line // common_zeros
+    if E_on_line.degree() < 1:
         return [], {}
     points, degrees = [], dict[int, int]()
-    for part, exponent in value.factor_squarefree()[1]:
+    for part, exponent in E_on_line.factor_squarefree()[1]:
         power = int(exponent)
         degrees[power] = degrees.get(power, 0) + int(part.degree())
         for s in roots_modulo(part):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
             # The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is
             # (t F_v + d F_w)^power G + ... For d a power of t above all relevant ones is used.
-            apart = power + 1
+            gap = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
-            far = nmod_poly([0] * apart + [1], p)
-            moved = [curve, *([x + far if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))]
-            terms = apart + power
+            t_to_gap = nmod_poly([0] * gap + [1], p)
+            curves = [curve, *([x + t_to_gap if i == k else x for i, x in enumerate(curve)] for k in range(len(point)))]
+            terms = gap + power
 
             def times(left: nmod_poly, right: nmod_poly, terms: int = terms) -> nmod_poly:
                 count(product_units(terms, terms))
                 return left.mul_low(right, terms)
 
-            here, *there = (int(function(X, times)[terms - 1]) for X in moved)
-            gradient = [(c - here) % p for c in there]
+            at_point, *nearby = (int(function(X, times)[terms - 1]) for X in curves)
+            gradient = [(c - at_point) % p for c in nearby]
             if any(gradient):
                 points.append(CriticalPoint(tuple(point), tuple(gradient), power))
     return points, degrees
@@ -200,12 +200,12 @@ class Hypersurface(ResultPart):
 
         `at` names the eps of the polynomial if this is not the one over Q[eps].
         """
-        text, most = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
-        cut = text if len(text) <= most else f"{text[:most]} ..."
+        text, max_characters = (self.generic, 2 * MAX_CHARACTERS) if self.generic else (self.polynomial, MAX_CHARACTERS)
+        cut = text if len(text) <= max_characters else f"{text[:max_characters]} ..."
         name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
         if self.orbit_data.continues_as:
-            after, other = self.orbit_data.continues_as
-            outcome = f"mapped onto C{other + 1} after {counted(after, 'step')}"
+            steps, target = self.orbit_data.continues_as
+            outcome = f"mapped onto C{target + 1} after {counted(steps, 'step')}"
         elif self.confined_at is not None:
             outcome = f"confined after {counted(self.confined_at, 'step')}"
         elif self.orbit_data.recurrences:
@@ -214,8 +214,8 @@ class Hypersurface(ResultPart):
             outcome = f"not confined within {counted(self.followed, 'step')}"
         by = "" if self.stage is None else f" by map {self.stage + 1}"
         factor = ", a factor of the denominator" if self.divides_denominator else ""
-        parts = [f"{name}, degree {self.degree}{factor}: contracted{by}, {outcome}", *self.orbit_data.sentences]
-        return "; ".join(parts)
+        phrases = [f"{name}, degree {self.degree}{factor}: contracted{by}, {outcome}", *self.orbit_data.sentences]
+        return "; ".join(phrases)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, without the first steps."""
@@ -236,27 +236,29 @@ class Hypersurface(ResultPart):
 class HypersurfaceForm:
     """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown).
 
-    `excess` is its exponent in the factor by which the minors of an equation exceed the map, and `stage` the number of
-    that map in a word, from 0.
+    `minor_exponent` is its exponent in the common factor of the minors of an equation, and `stage` the number of that
+    map in a word, from 0.
     """
 
     form: Any
     divides_denominator: bool
     multiplicity: int | None
-    excess: int = 0
+    minor_exponent: int = 0
     stage: int = 0
 
 
 @dataclass(frozen=True)
 class Tracking:
-    """The forms whose orders are measured along curves: contracted ones, and those in a common factor of minors.
+    """The forms whose orders are measured along curves: `critical` ones, and those in the common factor of the minors.
 
+    The map contracts the critical ones. The minors are those of an equation of the map; `of_minors` are the forms in
+    their common factor.
     Where the maps of a composition are followed one by one, `stage` is the number of the one that contracts, from 0,
     and steps are single maps of a word of `period`.
     """
 
     critical: Sequence[HypersurfaceForm] = ()
-    excess: Sequence[HypersurfaceForm] = ()
+    of_minors: Sequence[HypersurfaceForm] = ()
     stage: int | None = None
     period: int = 1
 
@@ -266,15 +268,15 @@ class Tracking:
         if self.stage is None:
             return equations
         letters = Letters([*equations[self.stage : self.period], *equations[: self.stage]])
-        letters.places = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.excess))
+        letters.places = tuple(tracked.stage - self.stage for tracked in (*self.critical, *self.of_minors))
         return letters
 
     def along(self, form: Any, field: PrimeField) -> Tracked:
         """Return the functions whose orders are measured along curves through the hypersurface of `form`."""
-        forms, stage = [*self.critical, *self.excess], self.stage or 0
+        forms, stage = [*self.critical, *self.of_minors], self.stage or 0
         return Tracked(
             tuple(form_order(tracked.form, field) for tracked in forms),
-            tuple(tracked.excess for tracked in forms),
+            tuple(tracked.minor_exponent for tracked in forms),
             tuple(int(tracked.form == form and tracked.stage == stage) for tracked in forms),
             len(self.critical),
         )
@@ -315,8 +317,8 @@ def outcome_of(
                 continue
             point = [(x + roots[0] * v) % p for x, v in zip(a, b, strict=True)]
             at = [field.convert(x) for x in point]
-            slopes = [int(evaluate(slope, field, at)) for slope in gradient(form.form)]
-            tangents = _tangents(point, slopes, field) if any(slopes) else None
+            normal = [int(evaluate(slope, field, at)) for slope in gradient(form.form)]
+            tangents = _tangents(point, normal, field) if any(normal) else None
             if tangents is not None:
                 outcomes[p] = _outcome_at(equations, point, tangents, rng, limits, tracked=tracked)
         except (BadPrime, NotGeneric):
@@ -325,18 +327,18 @@ def outcome_of(
             note = BUDGET_SPENT if limits.budget.is_spent else "its series have too few terms"
             break
     if len(outcomes) == _POINTS:
-        first, second = ((h.status, h.contracted_at, h.confined_at, h.orbit_data.known) for h in outcomes.values())
+        first, second = ((h.status, h.contracted_at, h.confined_at, h.orbit_data.compared) for h in outcomes.values())
         outcome, note = next(iter(outcomes.values())), ""
         if first != second:  # a spent budget may be the reason
             outcome, note = Hypersurface(steps=outcome.steps), BUDGET_SPENT if limits.budget.is_spent else POINTS_DIFFER
-    known = replace(
+    hypersurface = replace(
         outcome,
         polynomial=text,
         degree=int(form.form.total_degree()),
         divides_denominator=form.divides_denominator,
         note=note,
     )
-    return replace(known, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
+    return replace(hypersurface, multiplicity=form.multiplicity, primes=tuple(outcomes), stage=tracking.stage)
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
@@ -360,11 +362,12 @@ def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: R
 def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, poles: bool = False) -> list[Hypersurface]:
     """The exceptional hypersurfaces without polynomials, distinguished by multiplicity and outcome of random points.
 
-    At one exact `eps` (half the time step), on lines modulo random primes; the poles, or the others but for infinity.
-    One with a multiplicity of which no point was found is undecided. Source: zander-2021.
+    At one exact `eps` (half the time step), on lines modulo random primes. With `poles` they are the poles, otherwise
+    all others except infinity. If no point with some multiplicity was found, a hypersurface of this multiplicity is
+    returned as undecided. Source: zander-2021.
     """
     hypersurfaces: dict[tuple[Any, ...], Hypersurface] = {}
-    alike: dict[
+    keys_by_orders: dict[
         tuple[Any, ...], list[tuple[Any, ...]]
     ] = {}  # the keys in `hypersurfaces` of points with the same orders
     degrees: dict[int, int] = {}
@@ -373,23 +376,25 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             break
         field = GF(random_prime(rng))
         try:
-            here = map_.at(eps, field)
-            equations, inverses = here.equations, here.inverse.equations[::-1]
+            map_at_prime = map_.at(eps, field)
+            equations, inverses = map_at_prime.equations, map_at_prime.inverse.equations[::-1]
         except BadPrime:
             continue
-        points, seen = critical_points(equations, None if poles else inverses, rng)
-        degrees |= seen
+        points, zeros_by_multiplicity = critical_points(equations, None if poles else inverses, rng)
+        degrees |= zeros_by_multiplicity
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.budget.is_spent:
                 continue
             direction = [rng.randrange(field.prime) for _ in critical.point]
-            run, _ = TestCurve(equations, critical.point, direction, limits).steps(limits.shown, most=_KEY_PRECISION)
+            run, _ = TestCurve(equations, critical.point, direction, limits).steps(
+                limits.shown, max_precision=_KEY_PRECISION
+            )
             orders = critical.multiplicity, *((step.common, step.pole, step.denominator) for step in run)
-            known = alike.setdefault(orders, [])
-            if len(known) >= _POINTS and len(set(known)) == 1:  # a third point would give no new information
-                primes = dict.fromkeys((*hypersurfaces[known[0]].primes, field.prime))
-                hypersurfaces[known[0]] = replace(hypersurfaces[known[0]], primes=tuple(primes))
+            keys = keys_by_orders.setdefault(orders, [])
+            if len(keys) >= _POINTS and len(set(keys)) == 1:  # a third point would give no new information
+                primes = dict.fromkeys((*hypersurfaces[keys[0]].primes, field.prime))
+                hypersurfaces[keys[0]] = replace(hypersurfaces[keys[0]], primes=tuple(primes))
                 continue
             try:
                 outcome = _outcome_at(equations, critical.point, tangents, rng, limits)
@@ -398,17 +403,21 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
             except PrecisionTooLow:
                 outcome = _UNKNOWN
             key = (critical.multiplicity, outcome.status, outcome.contracted_at, outcome.confined_at)
-            known.append(key)
+            keys.append(key)
             hypersurface = replace(
-                outcome, degree=seen[key[0]], divides_denominator=poles, multiplicity=key[0], primes=(field.prime,)
+                outcome,
+                degree=zeros_by_multiplicity[key[0]],
+                divides_denominator=poles,
+                multiplicity=key[0],
+                primes=(field.prime,),
             )
             if key in hypersurfaces:  # if two points have the same outcome, the shorter run counts
-                before = hypersurfaces[key]
-                settled = [k for k in (before.settled_at, hypersurface.settled_at) if k is not None]
+                earlier = hypersurfaces[key]
+                settled = [k for k in (earlier.settled_at, hypersurface.settled_at) if k is not None]
                 hypersurfaces[key] = replace(
-                    before,
-                    primes=tuple(dict.fromkeys((*before.primes, *hypersurface.primes))),
-                    followed=min(before.followed, hypersurface.followed),
+                    earlier,
+                    primes=tuple(dict.fromkeys((*earlier.primes, *hypersurface.primes))),
+                    followed=min(earlier.followed, hypersurface.followed),
                     settled_at=max(settled) if len(settled) == 2 else None,
                 )
             else:
@@ -418,12 +427,12 @@ def unwritten(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, pol
     return sorted(hypersurfaces.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
 
-def _by_ranks(ranks: Sequence[int], full: int) -> tuple[SingularityOutcome, int | None, int | None]:
+def _by_ranks(ranks: Sequence[int], full_rank: int) -> tuple[SingularityOutcome, int | None, int | None]:
     """Return the status, the step that contracts the hypersurface, and the step after which it is confined."""
-    down = next((k for k, rank in enumerate(ranks, 1) if rank < full), None)
+    down = next((k for k, rank in enumerate(ranks, 1) if rank < full_rank), None)
     if down is None:
         return NOT_CONTRACTED, None, None
-    up = next((k for k, rank in enumerate(ranks, 1) if k > down and rank == full), None)
+    up = next((k for k, rank in enumerate(ranks, 1) if k > down and rank == full_rank), None)
     return (NOT_CONFINED, down, None) if up is None else (CONFINED, down, up)
 
 
@@ -433,14 +442,14 @@ def _outcome_at(
     tangents: list[list[int]],
     rng: random.Random,
     limits: Range,
-    tracked: AlongCurves = NOTHING,
+    tracked: AlongCurves = NOTHING_TRACKED,
 ) -> Hypersurface:
     """The outcome for the hypersurface with these tangents at a point, with its singularity pattern."""
-    full = len(tangents)
+    full_rank = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
     curve = TestCurve(equations, point, direction, limits, tracked)
     run, is_complete = curve.steps(limits.shown, tangents, _MAX_TANGENT_PRECISION)
-    status, down, up = _by_ranks([step.rank for step in run], full)
+    status, down, up = _by_ranks([step.rank for step in run], full_rank)
     if not is_complete and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
     if status == NOT_CONTRACTED:
@@ -449,10 +458,10 @@ def _outcome_at(
     if up is None:
         data = curve.orbit_data(limits.shown)
         # After the steps that are shown the image may be a hypersurface again; then its orders are those of that one.
-        longest = min(limits.along, limits.reach)
+        longest = min(limits.series_steps, limits.reach)
         while up is None and is_complete and not data.is_settled and len(run) < longest:
             run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)
-            status, down, up = _by_ranks([step.rank for step in run], full)
+            status, down, up = _by_ranks([step.rank for step in run], full_rank)
     if up is None:
         # At a superattracting point the multiplicities grow too fast for the precision, and yet satisfy a recurrence.
         if not is_complete and not data.is_settled:
@@ -461,7 +470,7 @@ def _outcome_at(
         data = curve.orbit_data_until_return(up)
     if is_complete and data.is_settled and not data.continues_as and len(run) < data.settled_at + 2 <= limits.reach:
         run = list(curve.all_steps(data.settled_at + 2, tangents))
-        status, down, up = _by_ranks([step.rank for step in run], full)
+        status, down, up = _by_ranks([step.rank for step in run], full_rank)
     settled = max(up or 0, data.settled_at) if data.is_settled else None
     if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
         data = replace(NO_ORBIT_DATA, followed=data.followed)

@@ -68,11 +68,11 @@ MAX_STEPS = 10_000
 MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
 _DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # of units, by dimension
 _FEW_DIGITS = 50
-_REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
-_LEAST_REACH = 100
-_ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
-_LEAST_ALONG = 40
-_ENOUGH = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
+_DEFAULT_STEPS = {1: 1000, 2: 1000, 3: 500, 4: 250}  # by dimension
+_LEAST_STEPS = 100  # in dimension 5 and 6
+_SERIES_STEPS = {1: 400, 2: 400, 3: 150, 4: 60}  # steps along series, by dimension
+_LEAST_SERIES_STEPS = 40  # in dimension 5 and 6
+_REPEATING_STEPS = {1: 60, 2: 60}  # steps after which repeating orders are accepted, if longer series would be needed
 _MOST_SHOWN = 200
 _DRAWS = 2  # of two values of eps, if the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
@@ -184,11 +184,11 @@ def singularities(
 
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
-    modulo two random primes; "not confined" means within this number of steps. Stops when the budget is spent, which
-    doubles with each more of `effort`, and at a TimeLimit, which ends a stage of something else, where `effort` is a
-    Budget, as a whole. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and
-    an eps or coefficients of more than 10,000 digits, or so long that writing formulas would exceed the budget. Source:
-    grammaticos-ramani-papageorgiou-1991, zander-2021.
+    modulo two random primes; "not confined" means within this number of steps. The computation stops when the budget is
+    spent, which doubles with each increase of `effort` by 1, or at a TimeLimit; if `effort` is a Budget, the TimeLimit
+    is raised to the caller. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of
+    steps, and an eps or coefficients of more than 10,000 digits, or so long that writing formulas would exceed the
+    budget. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, str(run.verdict)
@@ -207,33 +207,33 @@ def singularities(
     if map_.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
     budget = budget_for("singularities", effort)
-    most = _most_digits(map_.dim, budget)
-    if (digits := _digits(map_, exact_eps)) > most:
+    max_digits = _most_digits(map_.dim, budget)
+    if (digits := _digits(map_, exact_eps)) > max_digits:
         raise InputError(
-            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
+            f"found numbers of about {digits} digits in eps and the system, expected at most {max_digits}: "
             f"in dimension {map_.dim} formulas with longer numbers exceed the work limit; raise --effort"
         )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _range(map_.dim, steps, budget)
-    over, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
+    map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
     try:
-        if is_long(over):
+        if is_long(map_at_eps):
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
-        map_form = homogeneous_map(over)
+        map_form = homogeneous_map(map_at_eps)
         count(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
         try:
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
-        except Stopped as end:
-            raise InputError(f"found a composition that is too long here: {end.message}") from end
+        except Stopped as error:
+            raise InputError(f"found a composition that is too long here: {error.message}") from error
         run = SingularityRun(exact_eps, "?", line.degree)
         if not _is_dominant(map_, exact_eps):
             return replace(run, is_dominant=False)
-        if (known := _map_by_map(map_, run, seed, limits, progress)) is not None:
-            return known
-        if not over.is_bilinear:
+        if (followed_run := _map_by_map(map_, run, seed, limits, progress)) is not None:
+            return followed_run
+        if not map_at_eps.is_bilinear:
             raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
                 "such with equations that are linear in both points: of these the singularities are known by random "
@@ -243,17 +243,19 @@ def singularities(
         return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
     denominator = map_form.denominator
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
-    run = SingularityRun(exact_eps, affine(denominator * (-1) ** (map_.dim * len(over.factors)), map_), map_form.degree)
+    run = SingularityRun(
+        exact_eps, affine(denominator * (-1) ** (map_.dim * len(map_at_eps.factors)), map_), map_form.degree
+    )
     is_undefined = bool(denominator.is_zero())  # det(I - eps f'(x)) = 0 for all x
     if is_undefined or not _is_dominant(map_, exact_eps):
         return replace(run, is_undefined=is_undefined, is_dominant=False)
     if map_form.degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
     forms, critical_degree = written(map_form)
-    if critical_degree is None and len(over.factors) > 1:
-        known = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
-        if known is not None:
-            return known
+    if critical_degree is None and len(map_at_eps.factors) > 1:
+        followed_run = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
+        if followed_run is not None:
+            return followed_run
     tracking = Tracking(*followed_forms(map_form, forms)) if critical_degree else NONE_TRACKED
     hypersurfaces: list[Hypersurface] = []
     is_cut = False
@@ -272,8 +274,10 @@ def singularities(
     if critical_degree is None and not is_cut:
         progress("following critical points")
         too_large = "the polynomials of the exceptional hypersurfaces are too large"
-        unnamed = unwritten(map_, exact_eps, rng, limits) if over.is_bilinear else [Hypersurface(note=too_large)]
-        hypersurfaces += unnamed
+        without_polynomials = (
+            unwritten(map_, exact_eps, rng, limits) if map_at_eps.is_bilinear else [Hypersurface(note=too_large)]
+        )
+        hypersurfaces += without_polynomials
     is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
     return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_cut)
 
@@ -372,26 +376,26 @@ class Patterns:
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
         exceptional = [{"text": text, **h.to_json()} for text, h in zip(self.sentences, self.exceptional, strict=False)]
         maps = self.word.length if self.word_text and self.word else None
-        known = {
+        fields = {
             "generating_function": series or None,
             "exceptional_hypersurfaces": exceptional,
             "eps": self.at or None,
         }
-        return {**data, **known, "maps_a_step": maps}
+        return {**data, **fields, "maps_a_step": maps}
 
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
     """The patterns from runs at one eps, or at two that represent all; `at`: the map depends on eps."""
-    settled = set()
+    results = set()
     for run in runs:
         if not run.is_dominant:
-            known = _not_dominant(run.eps)
+            result = _not_dominant(run.eps)
         elif run.stopped:
-            known = _unknown(_STOPPED)
+            result = _unknown(_STOPPED)
         else:
-            known = _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
-        settled.add(known)
-    return settled.pop() if len(settled) == 1 else _unknown(_DIFFERENT)
+            result = _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
+        results.add(result)
+    return results.pop() if len(results) == 1 else _unknown(_DIFFERENT)
 
 
 def patterns(
@@ -410,38 +414,38 @@ def patterns(
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
     result = _unknown("")
-    for again in range(_DRAWS if eps is None else 1):
-        if again and (not result.running or budget.is_spent):
+    for attempt in range(_DRAWS if eps is None else 1):
+        if attempt and (not result.running or budget.is_spent):
             break
-        values = default_eps(map_, seed + again) if eps is None else (eps,)
+        values = default_eps(map_, seed + attempt) if eps is None else (eps,)
         stages = budget.share([1] * len(values))
         # Random points can be attributed to hypersurfaces only if the equations are linear in both points.
         is_short = map_.dim <= WRITTEN_DIMENSION or not map_.at(values[0]).is_bilinear
         if is_short and all(can_be_written(map_, value, budget.part(1 / len(values))) for value in values):
             try:
-                given = zip(values, stages, strict=True)
-                runs = [singularities(map_, value, steps=steps, seed=seed, effort=stage) for value, stage in given]
+                pairs = zip(values, stages, strict=True)
+                runs = [singularities(map_, value, steps=steps, seed=seed, effort=stage) for value, stage in pairs]
             except TooLongFormula:
                 return _unknown("the composition is too long for its singularities to be followed")
             result = patterns_of(runs, map_.has_eps)
         else:
-            several = set()
+            results = set()
             for value, stage in zip(values, stages, strict=True):
                 limits, equations = _range(map_.dim, steps, stage), map_.at(value).equations
                 rng = random.Random(f"patterns {derive_seed(seed, map_.subject, value)}")
                 if not _is_dominant(map_, value):
-                    known = _not_dominant(value)
+                    result_at_eps = _not_dominant(value)
                 elif period_of(equations) > 1:
                     outcomes = outcomes_at_random(map_, value, rng, limits)
-                    known = _unknown(_STOPPED) if limits.budget.is_spent else _patterns(0, outcomes)
+                    result_at_eps = _unknown(_STOPPED) if limits.budget.is_spent else _patterns(0, outcomes)
                 else:
                     try:
                         degree, hypersurfaces = exceptional_hypersurfaces(map_, value, rng, limits)
-                        known = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
+                        result_at_eps = _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
                     except OrbitDataUnknown as error:
-                        known = _unknown(_STOPPED if limits.budget.is_spent else str(error))
-                several.add(known)
-            result = several.pop() if len(several) == 1 else _unknown(_DIFFERENT)
+                        result_at_eps = _unknown(_STOPPED if limits.budget.is_spent else str(error))
+                results.add(result_at_eps)
+            result = results.pop() if len(results) == 1 else _unknown(_DIFFERENT)
     return result
 
 
@@ -450,12 +454,12 @@ def _digits(map_: MapFamily, eps: fmpq) -> int:
 
 
 def _most_digits(dim: int, budget: Budget) -> int:
-    """The digits with which formulas are written within the budget; a few always are."""
+    """The largest number of digits with which formulas are written within the budget, at least 50."""
     return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
 def can_be_written(system: QuadraticSystem | MapFamily, eps: fmpq, budget: Budget) -> bool:
-    """Whether `singularities` takes a map and eps."""
+    """Whether `singularities` accepts a map and eps: by the dimension, and by the digits that the budget allows."""
     map_ = as_map(system)
     return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, budget)
 
@@ -471,7 +475,7 @@ def _unknown(reason: str) -> Patterns:
 def _patterns(
     map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = "", word: Word | None = None
 ) -> Patterns:
-    maps = 1 if word is None else word.length
+    maps_per_step = 1 if word is None else word.length
     # A pole of multiplicity 0 is no critical hypersurface: its images lower no degree.
     critical = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
     for h in critical:
@@ -481,7 +485,7 @@ def _patterns(
         if h.settled_at is None:
             return _unknown(f"the pattern of {name} has not settled after {h.followed} steps; raise --steps")
     lengths = {h.settled_at for h in critical if h.settled_at}
-    open_ones = [h.followed for h in critical if h.status != CONFINED]
+    unconfined_steps = [h.followed for h in critical if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
     if all(h.orbit_data.is_settled and h.degree for h in critical) and map_degree > 0:
         if needed([h.orbit_data for h in critical]) is None:
@@ -492,15 +496,15 @@ def _patterns(
         fraction = degree_series(
             degrees, [(h.degree, h.orbit_data) for h in critical], [h.stage or 0 for h in critical]
         )
-        if maps > 1:
+        if maps_per_step > 1:
             try:
-                fraction = every_nth(fraction, maps)
+                fraction = every_nth(fraction, maps_per_step)
             except ArithmeticError as error:
                 return _unknown(f"{error}: those of the degrees of a composition")
         series = tuple(tuple(int(c) for c in polynomial.coeffs()) for polynomial in fraction)
     return Patterns(
-        tuple(sorted({-(-length // maps) for length in lengths})),
-        min((steps // maps for steps in open_ones), default=None),
+        tuple(sorted({-(-length // maps_per_step) for length in lengths})),
+        min((steps // maps_per_step for steps in unconfined_steps), default=None),
         any(h.status == CONFINED for h in critical),
         "",
         series,
@@ -512,13 +516,13 @@ def _patterns(
 
 def steps_by_default(dim: int) -> int:
     """The default number of steps for which hypersurfaces are followed in this dimension."""
-    return _REACH.get(dim, _LEAST_REACH)
+    return _DEFAULT_STEPS.get(dim, _LEAST_STEPS)
 
 
 def _range(dim: int, steps: int | None, budget: Budget) -> Range:
-    reach, along = steps or steps_by_default(dim), steps or _ALONG.get(dim, _LEAST_ALONG)
-    enough = steps or min(along, _ENOUGH.get(dim, along))
-    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, along, budget, enough)
+    reach, series_steps = steps or steps_by_default(dim), steps or _SERIES_STEPS.get(dim, _LEAST_SERIES_STEPS)
+    repeating_steps = steps or min(series_steps, _REPEATING_STEPS.get(dim, series_steps))
+    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, series_steps, budget, repeating_steps)
 
 
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
@@ -552,7 +556,10 @@ def default_eps(system: QuadraticSystem | MapFamily, seed: int) -> tuple[fmpq, .
 
 
 def _is_dominant(map_: MapFamily, eps: fmpq) -> bool:
-    """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
+    """Whether det dPhi is not 0 at one of a few random points.
+
+    True is proved. False is wrong only if a determinant that is not identically 0 vanishes at all of them.
+    """
     rng = random.Random(f"dominant {derive_seed(0, map_.subject, eps)}")
     for _ in range(_POINTS):
         field = GF(random_prime(rng))  # a number that is not 0 modulo p is not 0 over Q

@@ -35,7 +35,7 @@ from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 
 _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
-_MAX_PRODUCTS = 300_000  # of terms, for the numerator of that of the affine map
+_MAX_PRODUCTS = 300_000  # of terms, to expand the Jacobian determinant of the affine map
 
 
 @dataclass(frozen=True)
@@ -82,10 +82,10 @@ def written(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
 
 
 def followed_forms(
-    map_: HomogeneousMap, among: list[HypersurfaceForm], stage: int = 0
+    map_: HomogeneousMap, forms: list[HypersurfaceForm], stage: int = 0
 ) -> tuple[list[HypersurfaceForm], list[HypersurfaceForm]]:
     """The forms that a map contracts, and those in the common factor of the minors of its equation."""
-    contracted = [replace(form, stage=stage) for form in among if form.multiplicity]
+    contracted = [replace(form, stage=stage) for form in forms if form.multiplicity]
     common = [] if map_.factor.is_constant() else factored(map_.factor)
     return contracted, [HypersurfaceForm(factor, False, None, k, stage) for factor, k in common]
 
@@ -95,31 +95,31 @@ def followed_map_by_map(
 ) -> tuple[Word, list[Hypersurface]] | None:
     """The hypersurfaces that the maps of a composition contract, at one exact eps, with the word of these maps.
 
-    Steps and limits are those of single maps, but the first steps those of the word. Without those that the
-    budget left out; None where those of a map are too large.
+    Steps and limits are those of single maps, but the first steps those of the word. Hypersurfaces that the budget did
+    not allow to be followed are left out. None where the polynomials of one of the maps are too large.
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
     letters = [homogeneous_map(factor) for factor in map_.at(eps).factors[:period]]
-    several = [written(letter) for letter in letters]
-    if any(degree is None for _, degree in several):
+    by_letter = [written(letter) for letter in letters]
+    if any(degree is None for _, degree in by_letter):
         return None
-    both = [
+    followed = [
         followed_forms(letter, hypersurfaces, k)
-        for k, (letter, (hypersurfaces, _)) in enumerate(zip(letters, several, strict=True))
+        for k, (letter, (hypersurfaces, _)) in enumerate(zip(letters, by_letter, strict=True))
     ]
-    critical = [form for part, _ in both for form in part]
-    excess = [form for _, part in both for form in part]
+    critical = [form for part, _ in followed for form in part]
+    of_minors = [form for _, part in followed for form in part]
     limits = replace(limits, shown=min(limits.shown * period, limits.reach))
     hypersurfaces = []
-    for stage, (own, _) in enumerate(several):
-        for factor in own:
+    for stage, (forms, _) in enumerate(by_letter):
+        for factor in forms:
             if not factor.multiplicity or limits.budget.is_spent:
                 continue
             text = name_of(factor.form, map_)
             progress(f"following {text[:40]}")
             hypersurfaces.append(
-                outcome_of(map_, eps, factor, text, rng, limits, Tracking(critical, excess, stage, period))
+                outcome_of(map_, eps, factor, text, rng, limits, Tracking(critical, of_minors, stage, period))
             )
     return Word(tuple(letter.degree for letter in letters), len(equations) // period), hypersurfaces
 
@@ -138,9 +138,9 @@ def _is_short(size: int, degree: int) -> bool:
 
 def period_of(equations: tuple[Equation, ...]) -> int:
     """The number of maps after which a word repeats itself, a divisor of its length."""
-    known = [(equation.exponents, equation.terms) for equation in equations]
-    size = len(known)
-    return next(k for k in range(1, size + 1) if size % k == 0 and known[k:] == known[: size - k])
+    maps = [(equation.exponents, equation.terms) for equation in equations]
+    size = len(maps)
+    return next(k for k in range(1, size + 1) if size % k == 0 and maps[k:] == maps[: size - k])
 
 
 def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | None:
@@ -232,10 +232,10 @@ def name_of(form: Any, map_: MapFamily) -> str:
 
 
 def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) -> tuple[Hypersurface, ...]:
-    """The hypersurfaces that a map contracts at one eps, each with its polynomial over Q[eps] where that is found.
+    """Add to hypersurfaces that a map contracts at one eps their polynomials over Q[eps], where these are found.
 
-    Exact: at this eps the polynomial is that of the hypersurface, up to a factor. It is left empty for
-    compositions that are multiplied out, where forms are large, and where it is reducible at this eps.
+    Exact: at this eps the polynomial is that of the hypersurface, up to a factor. None is found for compositions that
+    are multiplied out, where forms are too large, and where the polynomial is reducible at this eps.
     """
     polynomials: dict[int | None, dict[str, str]] = {}  # by factor of the map, then by polynomial at this eps
     result = []
@@ -264,15 +264,15 @@ def _generic_polynomials(map_: MapFamily, eps: fmpq, stage: int | None) -> dict[
     n, at_eps, forms = len(variables), ring((*variables, "Z")), forms_over_eps(rows)
     size = max(degree_in(form, n + 1) for form in forms) - 1
     factors = (_critical_factors(forms, (n + 1) * size) or []) if size > 0 else []
-    affine, named = ring((*variables, "eps")), {}
+    affine_ring, named = ring((*variables, "eps")), {}
     for factor, _ in factors:
         if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
             continue
         value = factor.compose(*at_eps.gens(), at_eps.constant(eps), ctx=at_eps)
-        parts = factored(value)
-        if len(parts) == 1 and parts[0][1] == 1:
-            text = format_polynomial(affine.from_dict({(*m[:n], m[-1]): c for m, c in factor.terms()}))
-            named[name_of(parts[0][0], map_)] = text
+        factors_at_eps = factored(value)
+        if len(factors_at_eps) == 1 and factors_at_eps[0][1] == 1:
+            text = format_polynomial(affine_ring.from_dict({(*m[:n], m[-1]): c for m, c in factor.terms()}))
+            named[name_of(factors_at_eps[0][0], map_)] = text
     return named
 
 

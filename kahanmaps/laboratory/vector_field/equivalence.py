@@ -99,24 +99,25 @@ def equivalent_system(
         if load(file.name, values).system.rhs == file.system.rhs:
             return None
     # The candidates: systems of the catalogue, frames, and permutations of the variables, None if P is any matrix.
-    known, candidates = _load_catalogue(f.dim), list[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]()
+    catalogue, candidates = _load_catalogue(f.dim), list[tuple[_CatalogueSystem, fmpq_mat, tuple[int, ...] | None]]()
     budget = budget_for("equivalent systems", effort)
     for frame in _frames(f, fixed_points(f, budget.part(0.5)) if fixed is None else fixed):
         monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
-        for g in known:
+        for g in catalogue:
             if sorted(map(len, monomials)) != sorted(map(len, g.monomials)):
                 continue
-            orders = list[tuple[int, ...]]()  # those that take the monomials of each right-hand side to those of g
+            # The permutations that take the monomials of each right-hand side to those of g.
+            permutations = list[tuple[int, ...]]()
             for order in itertools.permutations(range(f.dim)):
                 inverse = sorted(range(f.dim), key=order.__getitem__)
-                images = ({tuple(m[j] for j in inverse) for m in one} for one in monomials)
+                images = ({tuple(m[j] for j in inverse) for m in support} for support in monomials)
                 if all(g.monomials[i] == image for image, i in zip(images, order, strict=True)):
-                    orders.append(order)
-                if len(orders) == MAX_ORDERS:
+                    permutations.append(order)
+                if len(permutations) == MAX_ORDERS:
                     break
-            candidates += ((g, frame, order) for order in orders)
+            candidates += ((g, frame, order) for order in permutations)
     if f.dim == 2:
-        candidates += ((g, QQ.identity(2), None) for g in known)
+        candidates += ((g, QQ.identity(2), None) for g in catalogue)
     for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # the fast searches first
         for g, frame, permutation in candidates:
             if budget.is_spent:
@@ -127,7 +128,7 @@ def equivalent_system(
 
 
 @dataclass(frozen=True)
-class _Known:
+class _CatalogueSystem:
     """A system of the catalogue with its parameters as symbols, and the quadratic monomials of each right-hand side."""
 
     name: str
@@ -137,7 +138,7 @@ class _Known:
 
 
 @lru_cache(maxsize=MAX_DIMENSION)
-def _load_catalogue(dim: int) -> tuple[_Known, ...]:
+def _load_catalogue(dim: int) -> tuple[_CatalogueSystem, ...]:
     """Return the systems of one dimension, few parameters first.
 
     Systems with more than dim + 2 parameters are left out: nearly every system would be equivalent to one of these.
@@ -150,8 +151,8 @@ def _load_catalogue(dim: int) -> tuple[_Known, ...]:
         if len(file.parameters) <= dim + 2:
             system = with_symbols(file, tuple(file.parameters))
             if system.degree >= 2:
-                systems.append(_Known(name, system, dict(file.parameters), _quadratic_monomials(system)))
-    return tuple(sorted(systems, key=lambda known: len(known.defaults)))
+                systems.append(_CatalogueSystem(name, system, dict(file.parameters), _quadratic_monomials(system)))
+    return tuple(sorted(systems, key=lambda entry: len(entry.defaults)))
 
 
 def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
@@ -163,15 +164,15 @@ def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
     """Yield matrices F such that f in the coordinates F x may look like a system of the catalogue; the first is I."""
     n = f.dim
 
-    def slopes(p: fmpq_mpoly) -> list[fmpq]:
+    def linear_coefficients(p: fmpq_mpoly) -> list[fmpq]:
         """Return the coefficients of the variables in a polynomial of degree 1."""
         return [p.derivative(j)[(0,) * p.context().nvars()] for j in range(p.context().nvars())]
 
     yield QQ.identity(n)
-    planes = [slopes(affine.function) for affine in affine_darboux(f).functions]
-    yield from itertools.islice(_invertible(planes, n), MAX_FRAMES)
+    normals = [linear_coefficients(affine.function) for affine in affine_darboux(f).functions]
+    yield from itertools.islice(_invertible(normals, n), MAX_FRAMES)
     lines = [component for component in fixed.found if component.dimension == 1 and not component.equations]
-    directions = [[sum(slopes(value), fmpq(0)) for value in line.coordinates] for line in lines]
+    directions = [[sum(linear_coefficients(value), fmpq(0)) for value in line.coordinates] for line in lines]
     yield from (columns.transpose().inv() for columns in itertools.islice(_invertible(directions, n), MAX_FRAMES))
 
 
@@ -182,7 +183,12 @@ def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]
 
 
 def _solve_for_equivalence(
-    f: QuadraticSystem, g: _Known, frame: fmpq_mat, order: Sequence[int] | None, is_scaled: bool, budget: Budget
+    f: QuadraticSystem,
+    g: _CatalogueSystem,
+    frame: fmpq_mat,
+    order: Sequence[int] | None,
+    is_scaled: bool,
+    budget: Budget,
 ) -> Equivalence | None:
     """Solve g(P x + q) = c P f(x) for P = c T F, where F is the frame.
 
@@ -199,11 +205,11 @@ def _solve_for_equivalence(
     defaults += g.defaults.values()
     highest, lower = _equivalence_equations(f, g, frame, entries, unknowns)
     # Without scaling and translation first: then the equations for the parameters are usually linear.
-    simple = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
-    shift, scale = simple[: n + 1], simple[n + 1 :][: len(entries)]
-    always = shift if f.is_homogeneous and g.system.is_homogeneous else []
-    for start in (always,) if is_scaled else ([*shift, *scale], [*always, *scale]):
-        solved = solve_system([*highest, *start], unknowns.gens(), budget)
+    default_equations = [t - value for t, value in zip(unknowns.gens(), defaults, strict=True)]
+    fixed_shift, fixed_scale = default_equations[: n + 1], default_equations[n + 1 :][: len(entries)]
+    untranslated = fixed_shift if f.is_homogeneous and g.system.is_homogeneous else []
+    for fixed in (untranslated,) if is_scaled else ([*fixed_shift, *fixed_scale], [*untranslated, *fixed_scale]):
+        solved = solve_system([*highest, *fixed], unknowns.gens(), budget)
         for component in (*solved.components, *solved.unsolved):
             equations = [p.compose(*component.values, ctx=unknowns) for p in lower]
             for point in _points([*equations, *component.equations], component.values, defaults, budget):
@@ -221,7 +227,11 @@ def _solve_for_equivalence(
 
 
 def _equivalence_equations(
-    f: QuadraticSystem, g: _Known, frame: fmpq_mat, entries: Sequence[tuple[int, int]], unknowns: fmpq_mpoly_ctx
+    f: QuadraticSystem,
+    g: _CatalogueSystem,
+    frame: fmpq_mat,
+    entries: Sequence[tuple[int, int]],
+    unknowns: fmpq_mpoly_ctx,
 ) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
     """Return the coefficients of g(P x + q) - c P f(x), those of degree 2 in x separately from the others.
 
@@ -238,19 +248,19 @@ def _equivalence_equations(
     images += joint.gens()[2 * n + 1 + len(entries) :]  # the parameters
     at_x = [p.compose(*x, ctx=joint) for p in f.rhs]
     sides = [sum((P0[i][j] * at_x[j] for j in range(n)), zero) * c * c for i in range(n)]
-    parts = [p.compose(*images, ctx=joint) - side for p, side in zip(g.system.rhs, sides, strict=True)]
-    parts.append(g.system.divergence.compose(*images, ctx=joint) - f.divergence.compose(*x, ctx=joint) * c)
+    differences = [p.compose(*images, ctx=joint) - side for p, side in zip(g.system.rhs, sides, strict=True)]
+    differences.append(g.system.divergence.compose(*images, ctx=joint) - f.divergence.compose(*x, ctx=joint) * c)
     highest: list[fmpq_mpoly] = []
     lower: list[fmpq_mpoly] = []
-    for k, part in enumerate(parts):
+    for k, difference in enumerate(differences):
         by_monomial: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}  # in x
-        for monomial, value in part.terms():
+        for monomial, value in difference.terms():
             exponents = tuple(int(e) for e in monomial)
             by_monomial.setdefault(exponents[:n], {})[exponents[n:]] = value
-        for in_x, terms in by_monomial.items():  # c^size divides the coefficient
-            size = sum(in_x)
-            equation = unknowns.from_dict(terms) / unknowns.gen(0) ** size
-            (highest if size == (2 if k < n else 1) else lower).append(equation)
+        for in_x, terms in by_monomial.items():  # c^degree divides the coefficient
+            degree = sum(in_x)
+            equation = unknowns.from_dict(terms) / unknowns.gen(0) ** degree
+            (highest if degree == (2 if k < n else 1) else lower).append(equation)
     return highest, lower
 
 

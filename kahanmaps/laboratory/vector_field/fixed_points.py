@@ -89,20 +89,20 @@ class FixedPoints(ResultPart):
         """
         if eps is None:
             # At one point, or on conjugate points, det(I - eps f') = 0 only for a few eps.
-            alike = self.dimension == 0 or not any(any(m[1:]) for m in self.eigenvalues.monoms())
-            return True if alike else None
+            have_same_eigenvalues = self.dimension == 0 or not any(any(m[1:]) for m in self.eigenvalues.monoms())
+            return True if have_same_eigenvalues else None
         context = self.coordinates[0].context()
         at_eps = self.eigenvalues.compose(context.constant(1 / eps), *context.gens(), ctx=context)
         value = normal_form(at_eps, self.equations)
         if value.is_constant():
             return not value.is_zero()
-        common = groebner([*self.equations, value], Budget(_UNITS)) if self.equations else None
-        return True if common is not None and any(p.is_constant() for p in common) else None
+        basis = groebner([*self.equations, value], Budget(_UNITS)) if self.equations else None
+        return True if basis is not None and any(p.is_constant() for p in basis) else None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        known = attributes(self, "coordinates", "equations", "dimension", "count")
-        return {**known, "eigenvalues": self.eigenvalues_text}
+        fields = attributes(self, "coordinates", "equations", "dimension", "count")
+        return {**fields, "eigenvalues": self.eigenvalues_text}
 
 
 @dataclass(frozen=True)
@@ -156,38 +156,38 @@ def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSear
     context = ring(system.variables)
     budget = budget_for("fixed points", effort)
     solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), budget)
-    components, undecided = [_on(system, part, []) for part in solved.components], ""
+    components, undecided = [_points_of(system, part, []) for part in solved.components], ""
     for part in (*solved.conjugate, *solved.unsolved):
         basis = None if part in solved.without_basis else groebner(part.equations, budget)
         if basis is None:
             undecided = solved.reason or (SPENT if budget.is_spent else "a Groebner basis would be too large")
         elif not any(p.is_constant() for p in basis):
-            components.append(_on(system, part, basis))
+            components.append(_points_of(system, part, basis))
     return FixedPointSearch(tuple(components), undecided)
 
 
-def _on(system: QuadraticSystem, part: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
-    """The points of one part, whose equations have this Groebner basis."""
+def _points_of(system: QuadraticSystem, component: SolutionComponent, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
+    """The fixed points on one component, whose equations have this Groebner basis."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
-    free = sorted({*part.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
+    free = sorted({*component.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
     # The dimension is the largest number of variables of which no power product is a leading monomial.
     sizes = [
-        len(some)
+        len(subset)
         for size in range(len(free) + 1)
-        for some in itertools.combinations(free, size)
-        if not any(all(e == 0 for i, e in enumerate(m) if i not in some) for m in leading)
+        for subset in itertools.combinations(free, size)
+        if not any(all(e == 0 for i, e in enumerate(m) if i not in subset) for m in leading)
     ]
     dimension = max(sizes)
     count = len(quotient_monomials(basis, free) or ()) if basis else 1
     # det(lambda I - f'), reduced modulo the equations of the points
     n = system.dim
     letter = next(name for name in ("lambda", "mu", *(f"mu{k}" for k in range(n))) if name not in system.variables)
-    joint = ring([letter, *names_of(part.values[0])])
+    joint = ring([letter, *names_of(component.values[0])])
     eigenvalue, *x = joint.gens()
-    at_point = [p.compose(*x, ctx=joint) for p in part.values]
+    at_point = [p.compose(*x, ctx=joint) for p in component.values]
     rows = [
         [*((eigenvalue if i == j else 0) - p.derivative(j).compose(*at_point, ctx=joint) for j in range(n)), None]
         for i, p in enumerate(system.rhs)
     ]
     eigenvalues = normal_form(kernel_minors(rows)[-1] * (-1) ** n, [p.compose(*x, ctx=joint) for p in basis])
-    return FixedPoints(part.values, tuple(basis), dimension, None if dimension else count, eigenvalues)
+    return FixedPoints(component.values, tuple(basis), dimension, None if dimension else count, eigenvalues)

@@ -72,14 +72,14 @@ def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int)
     ring = fq_default_poly_ctx(context)
     x = ring([0, 1])  # type: ignore[arg-type]
     c = x * x * x + A * x + B
-    divisions = _DivisionPolynomials(x, c, A, B)
+    division_polynomials = _DivisionPolynomials(x, c, A, B)
     is_odd = (pow(x, q, c) - x).gcd(c).degree() == 0
     trace, modulus, prime = int(is_odd), 2, 2
     while modulus < bound:
         prime = next(n for n in range(prime + 1, 2 * prime) if fmpz(n).is_prime())
         if q % prime == 0:
             continue
-        f, residue = divisions[prime], None
+        f, residue = division_polynomials[prime], None
         while residue is None:
             torsion = _Torsion(f, c, A)  # find the trace that fits on the torsion points with f = 0
             try:
@@ -110,7 +110,7 @@ class _DivisionPolynomials:
         xx = x * x
         xxx = xx * x
         self._square = 16 * c * c
-        self._known: dict[int, Poly] = {
+        self._values: dict[int, Poly] = {
             -1: 0 * x - 1,
             0: 0 * x,
             1: 0 * x + 1,
@@ -121,19 +121,19 @@ class _DivisionPolynomials:
         }
 
     def __getitem__(self, n: int) -> Poly:
-        if n not in self._known:
+        if n not in self._values:
             m, odd = divmod(n, 2)
             # Psi with an even index is stored without its factor 2 y. In the recurrence of an odd index one of the two
             # products has four such factors, 16 y^4 = 16 c^2.
             if odd:
                 first_product = self[m + 2] * self[m] * self[m] * self[m]
                 second_product = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]
-                self._known[n] = (
+                self._values[n] = (
                     first_product - second_product * self._square
                     if m % 2
                     else first_product * self._square - second_product
                 )
             else:
                 bracket = self[m + 2] * self[m - 1] * self[m - 1] - self[m - 2] * self[m + 1] * self[m + 1]
-                self._known[n] = self[m] * bracket
-        return self._known[n]
+                self._values[n] = self[m] * bracket
+        return self._values[n]

@@ -178,8 +178,8 @@ def _by_factors(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[
 
         block = PlanarBlock(*(residue(e.coeffs()) for e in elements))
         others = chi // factor
-        unit = others * others.xgcd(factor)[1] % chi
-        powers = [unit * generator**k % chi for k in range(degree)]
+        idempotent = others * others.xgcd(factor)[1] % chi
+        powers = [idempotent * generator**k % chi for k in range(degree)]
         basis = [[field.convert(int(f[i]) if p else f[i]) for i in range(form.m)] for f in powers]
         return Plane(name, degree, block, residue, coefficients, context), basis
 

@@ -103,11 +103,11 @@ def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
     if r is None:
         u, v = (z + n * (w - z) for z, w in zip(point, image, strict=True))
         return u, v, W / W
-    complement, denominator = r - n, r * r - 1
-    factor = complement * (complement * complement - 1)
+    difference, denominator = r - n, r * r - 1
+    factor = difference * (difference * difference - 1)
     pairs = [(z, (z * r * (r + 1) - w * denominator) / (3 * r)) for z, w in zip(point, image, strict=True)]
     u, v = ((z - double) * r * denominator + double * factor for z, double in pairs)
-    return u, v, complement * denominator
+    return u, v, difference * denominator
 
 
 def _first_points(block: PlanarBlock, points: list[Triple], last: int, is_zero: Callable[[Any], bool]) -> list[Triple]:

@@ -220,9 +220,11 @@ class OrbitRequest(NamedTuple):
         limits: dict[str, Any] = {"backward": self.backward, "max_digits": self.max_digits}
         if method == "doubling" and normal_form is not None:
             return Orbit(map_at_eps, self.start, at=self.at or (), normal_form=normal_form, **limits)
-        normal = normal_form if method == "normal-form" else None
+        used_normal_form = normal_form if method == "normal-form" else None
         is_requested = self.is_requested if self.at is not None or self.every > 1 else None
-        return Orbit(map_at_eps, self.start, self.steps, normal_form=normal, is_requested=is_requested, **limits)
+        return Orbit(
+            map_at_eps, self.start, self.steps, normal_form=used_normal_form, is_requested=is_requested, **limits
+        )
 
 
 class Trajectory(HtmlDisplay):
@@ -426,8 +428,8 @@ class Trajectory(HtmlDisplay):
                 end = self.end
             except OutputFull as full:
                 end = OrbitEnd("budget", full.steps, str(full))
-            end, extra = self._ended(end)
-            writer.end(end, extra)
+            end, float_data = self._ended(end)
+            writer.end(end, float_data)
         return end
 
     def header(self, name: str = "") -> dict[str, Any]:
@@ -452,15 +454,15 @@ class Trajectory(HtmlDisplay):
         """Return how the orbit ended, and the drift and near-singular steps of a float orbit."""
         if self.arithmetic.kind != "float":
             return end, {}
-        message, extra = end.message, {"near_singular": self.orbit.near_singular}
+        message, float_data = end.message, {"near_singular": self.orbit.near_singular}
         if self.orbit.drift:
-            extra["drift"] = {drift.name: json_float(drift.largest) for drift in self.orbit.drift}
+            float_data["drift"] = {drift.name: json_float(drift.largest) for drift in self.orbit.drift}
             largest = max(float(drift.largest) for drift in self.orbit.drift)
             message += f"; largest observed drift of the block integrals: {largest:.3g}"
         if self.orbit.near_singular:
             first = self.orbit.near_singular_at
             message += f"; near-singular steps: {self.orbit.near_singular}, the first from step {first}"
-        return replace(end, message=message), extra
+        return replace(end, message=message), float_data
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         """Return the coordinates as an array of shape (points, dim), for `numpy.asarray`.

@@ -156,23 +156,24 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
         return only_factors(f"more than {MAX_EXTACTIC_DIMENSION} variables")
     if system.digits > LONG_COEFFICIENTS:
         return only_factors(f"coefficients of more than {LONG_COEFFICIENTS} digits")
-    local = system.over(QQ)
-    # A line parallel to a hyperplane misses it. The seed depends on the system, so no system can be built for the line.
+    over_Q = system.over(QQ)
+    # A line parallel to a hyperplane misses it. The seed depends on the system, so that nobody can choose a system with
+    # hyperplanes parallel to the line.
     rng = random.Random(f"affine {derive_seed(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
-    along = _determinant_along(local, start, direction, quotient.free)
-    if along.degree() < 0:
+    determinant_on_line = _determinant_along(over_Q, start, direction, quotient.free)
+    if determinant_on_line.degree() < 0:
         return only_factors("the extactic determinant vanishes identically, there may be infinitely many")
     complete = True
     candidates = list[list[fmpq]]()
-    for t in _rational_roots(along):
+    for t in _rational_roots(determinant_on_line):
         x = [a + t * d for a, d in zip(start, direction, strict=True)]
-        normals = nullspace(QQ, _taylor_rows(local, x, quotient.free))
+        normals = nullspace(QQ, _taylor_rows(over_Q, x, quotient.free))
         if len(normals) > 1:
             # The flow on the hyperplane is degenerate itself. The normal is a combination of these vectors that is a
             # left eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
             basis = fmpq_mat([list(v) for v in normals])
-            action = quotient.rows(local.jacobian(x)) * quotient.section
+            action = quotient.rows(over_Q.jacobian(x)) * quotient.section
             normals = []
             for eigenvalue in _rational_roots(fmpq_poly(action.charpoly().coeffs())):
                 combinations = nullspace(QQ, (basis * action - basis * eigenvalue).transpose())
@@ -185,13 +186,13 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
     return AffineDarbouxList(_affine_darboux_factors(system, candidates), complete, reason)
 
 
-def _taylor_rows(local: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> fmpq_mat:
+def _taylor_rows(over_Q: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> fmpq_mat:
     """Return the coordinates `free` of the first len(free) Taylor coefficients of the solution through x, as rows."""
-    series = [fmpq_mat(local.dim, 1, list(x))]
+    series = [fmpq_mat(over_Q.dim, 1, list(x))]
     forms: list[fmpq_mat] = []
     for k in range(len(free)):
-        forms.append(local.hessian_times(series[k].entries()))
-        total = local.B * series[k] + (local.c if k == 0 else local.c * 0)
+        forms.append(over_Q.hessian_times(series[k].entries()))
+        total = over_Q.B * series[k] + (over_Q.c if k == 0 else over_Q.c * 0)
         for a in range(k + 1):
             total = total + forms[a] * series[k - a] * fmpq(1, 2)
         series.append(total * fmpq(1, k + 1))
@@ -199,23 +200,23 @@ def _taylor_rows(local: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> f
 
 
 def _determinant_along(
-    local: SystemOver, start: Sequence[fmpq], direction: Sequence[fmpq], free: Sequence[int]
+    over_Q: SystemOver, start: Sequence[fmpq], direction: Sequence[fmpq], free: Sequence[int]
 ) -> fmpq_poly:
     """Interpolate the extactic determinant at start + t direction as a polynomial in t."""
     m = len(free)
     count(1000 + 3 * m**5)  # the work of the whole search for hyperplanes, of which this is the main part
     nodes = range(m * (m + 3) // 2 + 1)
     values = [
-        _taylor_rows(local, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes
+        _taylor_rows(over_Q, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes
     ]
     # Divided differences at 0, 1, 2, ...
     for k in range(1, len(values)):
         differences = [(after - before) / k for before, after in pairwise(values[k - 1 :])]
         values[k:] = differences
-    along = fmpq_poly([])
+    determinant = fmpq_poly([])
     for t in reversed(nodes):
-        along = along * fmpq_poly([-t, 1]) + values[t]
-    return along
+        determinant = determinant * fmpq_poly([-t, 1]) + values[t]
+    return determinant
 
 
 def _rational_roots(polynomial: fmpq_poly) -> list[fmpq]:
@@ -269,10 +270,10 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     ['contracted', 'undefined', 'undefined', 'contracted', 'invariant', 'invariant']
     """
     n, context = system.dim, function.context()
-    *slopes, _ = _coefficients(function)
-    k = next(i for i, slope in enumerate(slopes) if slope != 0)
+    *coefficients, _ = _coefficients(function)
+    k = next(i for i, c in enumerate(coefficients) if c != 0)
     on_hyperplane = list(context.gens())
-    on_hyperplane[k] = on_hyperplane[k] - function / slopes[k]  # solves l = 0 for x_k
+    on_hyperplane[k] = on_hyperplane[k] - function / coefficients[k]  # solves l = 0 for x_k
     rng = random.Random("a point of the hyperplane")
     free = [fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)]
     point = [evaluate(x, QQ, free) for x in on_hyperplane]

@@ -45,7 +45,7 @@ from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
-_SPARE = 8
+_SPARE = 8  # points beyond the number of unknowns
 _DETERMINANT_BUDGET = 20_000_000
 _DENOMINATOR_DEGREE, _MAX_DENOMINATORS = 6, 1000  # at most 1000 products of denominators have degree 6 or less
 _MAX_WORK = 4_000_000  # entries of matrices, about two seconds
@@ -120,9 +120,9 @@ def jacobian_factors(map_: MapFamily) -> tuple[Cofactor, ...]:
     field = FunctionField(map_.names, _DETERMINANT_BUDGET, reduces=True)
     *x, eps = field.variables
     try:
-        over = map_.at(eps, field, x[n:])
-        image = over.step(x[:n])
-        numerator, denominator = jacobian_determinant_fraction(over, x[:n], image)
+        map_over_field = map_.at(eps, field, x[n:])
+        image = map_over_field.step(x[:n])
+        numerator, denominator = jacobian_determinant_fraction(map_over_field, x[:n], image)
         J = numerator / denominator
     except BudgetExceeded:
         D = None
@@ -164,12 +164,12 @@ class CofactorProduct:
 
     def text(self, cofactors: Sequence[Cofactor]) -> str:
         """Return the product as text, e.g. C[x1]*C[x3]^2."""
-        parts = [
+        factors = [
             cofactor.text + (f"^{power}" if power > 1 else "")
             for cofactor, power in zip(cofactors, self.powers, strict=True)
             if power
         ]
-        return "*".join(parts) or "1"
+        return "*".join(factors) or "1"
 
     def origin(self, cofactors: Sequence[Cofactor]) -> str:
         """Return a phrase on the origin of integrals that are ratios of polynomials with this cofactor."""
@@ -262,10 +262,10 @@ def cofactor_spaces(
     # satisfy K P = 0 at the other points, and so must M P, M^2 P, ...: few of the equations K M^j P = 0 usually
     # suffice.
     count = len(places)
-    before, after = _values(sample, product, degree, places)
+    at_points, at_images = _values(sample, product, degree, places)
     count_work(count**3 / 500)
-    M = matrix(before[:count], prime).solve(matrix(after[:count], prime))
-    K = matrix(after[count:], prime) - multiply(matrix(before[count:], prime), M)
+    M = matrix(at_points[:count], prime).solve(matrix(at_images[:count], prime))
+    K = matrix(at_images[count:], prime) - multiply(matrix(at_points[count:], prime), M)
     entries = list[nmod]()
     for _ in range(count // _SPARE + 2):
         entries += K.entries()
@@ -273,14 +273,14 @@ def cofactor_spaces(
     basis, dimension = null_space([entries[k : k + count] for k in range(0, len(entries), count)], count, prime), -1
     while basis and len(basis) != dimension:  # shrink to the largest subspace that M maps into itself
         dimension = len(basis)
-        moved = integers(multiply(matrix(basis, prime), M.transpose()))
-        inside = null_space(list(zip(*basis, *moved, strict=True)), 2 * dimension, prime)
-        basis = combine([weights[dimension:] for weights in inside], basis, prime)
+        images = integers(multiply(matrix(basis, prime), M.transpose()))
+        dependences = null_space(list(zip(*basis, *images, strict=True)), 2 * dimension, prime)
+        basis = combine([weights[dimension:] for weights in dependences], basis, prime)
     if not basis:
         return []
     basis = echelon(basis, prime)
-    moved = integers(multiply(matrix(basis, prime), M.transpose()))
-    action = matrix([[row[k] for k in pivots(basis)] for row in moved], prime)
+    images = integers(multiply(matrix(basis, prime), M.transpose()))
+    action = matrix([[row[k] for k in pivots(basis)] for row in images], prime)
     spaces = []
     count_work(10 + 2 * len(basis) ** 3)
     for factor, _ in action.charpoly().factor()[1]:
@@ -300,9 +300,9 @@ def _values(
     at_points, at_images, count = [], [], len(places) + _SPARE
     count_work(count * len(places) / 8)
     for (x, image), fraction in zip(sample.pairs[:count], sample.values(product, count), strict=True):
-        before, after = sample.map.moved(x, image, degree, fraction)
-        at_points.append([before[k] for k in places])
-        at_images.append([after[k] for k in places])
+        at_point, at_image = sample.map.monomials_at_both(x, image, degree, fraction)
+        at_points.append([at_point[k] for k in places])
+        at_images.append([at_image[k] for k in places])
     return at_points, at_images
 
 
@@ -338,7 +338,7 @@ class SearchStep:
     degree: int
     product: CofactorProduct | None
     text: str
-    lift: TwoPointBasis | None = None  # of "iterates"
+    two_point_basis: TwoPointBasis | None = None  # of "iterates"
     up_to_numbers: bool = False  # whether the cofactors of the spaces are numerical multiples of the product
 
 
@@ -366,12 +366,12 @@ class SpaceSearch:
     @property
     def tried(self) -> str:
         """A phrase for the functions among which integrals were searched for."""
-        parts = []
+        phrases = []
         if self.cofactor_degree:
-            parts.append(f"P and Q of degree up to {self.cofactor_degree} with known cofactors or denominators")
+            phrases.append(f"P and Q of degree up to {self.cofactor_degree} with known cofactors or denominators")
         if self.searched:
-            parts.append(f"relations of degree {', '.join(map(str, self.searched))} along orbits")
-        return f"among {' and '.join(parts)}" if parts else "that was found"
+            phrases.append(f"relations of degree {', '.join(map(str, self.searched))} along orbits")
+        return f"among {' and '.join(phrases)}" if phrases else "that was found"
 
     def add(self, step: SearchStep, spaces: list[DarbouxSpace]) -> None:
         """Append a step with its spaces."""
@@ -383,7 +383,7 @@ def search_cofactors(
     map_: ModularMap,
     cofactors: Sequence[Cofactor],
     denominators: Sequence[Cofactor],
-    known: Sequence[DarbouxSpace],
+    known_spaces: Sequence[DarbouxSpace],
     required: int,
     max_degree: int,
     budget: Budget,
@@ -391,9 +391,9 @@ def search_cofactors(
     """Search by increasing degree for spaces with a common cofactor whose ratios are new integrals.
 
     The search ends when `required` independent integrals are known, when it takes too much work, or when the `budget`
-    is spent. A space counts only if it gives an integral independent of those of `known` and of earlier spaces. The
-    cofactors are products of the `cofactors`, or of the `denominators`; at last, if the `cofactors` are known up to
-    numbers only, their products times any number.
+    is spent. A space counts only if it gives an integral independent of those of the `known_spaces` and of earlier
+    spaces. The cofactors are products of the `cofactors`, or of the `denominators`; at last, if the `cofactors` are
+    known up to numbers only, their products times any number.
 
     To save unknowns: if P/Q = c on an orbit, then P - c Q is a relation along this orbit, so only its coordinates in a
     basis of these relations are unknown. And Q is, up to a factor, the difference of relations along two orbits, which
@@ -401,8 +401,8 @@ def search_cofactors(
     """
     prime, dim, all_cofactors, work = map_.prime, map_.dim, [*cofactors, *denominators], 0
     result = SpaceSearch(cofactors=all_cofactors)
-    spaces = list(known)
-    independent = gradient_rank(map_, spaces)
+    spaces = list(known_spaces)
+    independent_count = gradient_rank(map_, spaces)
     context, field = nmod_mpoly_ctx.get([f"x{k}" for k in range(dim)], modulus=prime), GF(prime)
     arguments = [*context.gens(), *(context.constant(c) for c in (*map_.values, map_.eps))]
     polynomials = [
@@ -411,7 +411,7 @@ def search_cofactors(
         if denominator.polynomial is not None
     ]
     for degree in range(1, max_degree + 1):
-        if independent >= required:
+        if independent_count >= required:
             break
         cut = f"polynomials of degree {degree} and more with known cofactors were not all tried: {SPENT}"
         if budget.is_spent:
@@ -419,8 +419,8 @@ def search_cofactors(
         orbit = relations_on_orbit(map_, degree)
         relations, places = orbit.vectors, places_of(dim, degree)
         if relations:
-            sums = echelon([*relations, *relations_on_orbit(map_, degree).vectors], prime)
-            rows = dict(zip(pivots(sums), sums, strict=True))
+            joint_relations = echelon([*relations, *relations_on_orbit(map_, degree).vectors], prime)
+            rows = dict(zip(pivots(joint_relations), joint_relations, strict=True))
             candidates = [
                 replace(product, powers=(*product.powers, *[0] * len(denominators)))
                 for product in products(cofactors, min(degree + 1, max_degree))
@@ -432,10 +432,12 @@ def search_cofactors(
             count = len(relations) + _SPARE
             sample = Sample.of(map_, all_cofactors, points_needed(dim, degree))
             basis = matrix(relations, prime).transpose()
-            moved = zip(*(map_.moved(x, image, degree) for x, image in sample.pairs[:count]), strict=True)
-            at_points, at_images = (multiply(matrix(list(values), prime), basis).tolist() for values in moved)
+            pairs_of_values = zip(
+                *(map_.monomials_at_both(x, image, degree) for x, image in sample.pairs[:count]), strict=True
+            )
+            at_points, at_images = (multiply(matrix(list(values), prime), basis).tolist() for values in pairs_of_values)
         for product in candidates if relations else ():
-            if independent >= required:
+            if independent_count >= required:
                 break
             work += count**2
             if work > _MAX_WORK or budget.is_spent:
@@ -447,14 +449,16 @@ def search_cofactors(
             ]
             coordinates = null_space(equations, len(relations), prime)
             # At a point of the orbit P = c Q, so the gradient of P/Q is that of P - c Q up to a factor.
-            slopes = [gradient_values(R, orbit.point, degree, prime)[1] for R in combine(coordinates, relations, prime)]
-            before = gradients_of_ratios(orbit.point, spaces, prime)
-            if rank([*before, *slopes], prime) == rank(before, prime):
+            gradients = [
+                gradient_values(R, orbit.point, degree, prime)[1] for R in combine(coordinates, relations, prime)
+            ]
+            known_gradients = gradients_of_ratios(orbit.point, spaces, prime)
+            if rank([*known_gradients, *gradients], prime) == rank(known_gradients, prime):
                 continue
             space = cofactor_space(sample, product, degree)
             new_rank = gradient_rank(map_, [*spaces, space])
-            if new_rank > independent:
-                independent = new_rank
+            if new_rank > independent_count:
+                independent_count = new_rank
                 spaces.append(space)
                 result.add(SearchStep("cofactor", degree, product, product.origin(all_cofactors)), [space])
         result = replace(result, cofactor_degree=degree)
@@ -464,7 +468,7 @@ def search_cofactors(
         return result
     sample = Sample.of(map_, all_cofactors, points_needed(dim, max_degree))
     for degree, product in cartesian(range(1, max_degree + 1), products(cofactors, max_degree)[1:]):
-        if independent >= required:
+        if independent_count >= required:
             break
         if product.weight > degree + 1:
             continue
@@ -476,9 +480,9 @@ def search_cofactors(
             break
         product = replace(product, powers=(*product.powers, *[0] * len(denominators)))
         new_spaces = [space for _, space in cofactor_spaces(sample, product, degree) if len(space.basis) > 1]
-        new_rank = gradient_rank(map_, [*spaces, *new_spaces]) if new_spaces else independent
-        if new_rank > independent:
-            independent = new_rank
+        new_rank = gradient_rank(map_, [*spaces, *new_spaces]) if new_spaces else independent_count
+        if new_rank > independent_count:
+            independent_count = new_rank
             spaces += new_spaces
             text = f"{product.origin(all_cofactors)}, up to a number"
             step = SearchStep("cofactor", degree, product, text, up_to_numbers=True)

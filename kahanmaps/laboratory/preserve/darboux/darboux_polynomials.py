@@ -178,15 +178,15 @@ def darboux_polynomials(
                 break
             progress(f"cofactor {product.text(cofactors)}")
             all_spaces |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
-        known = dict[Law, DarbouxSpace]()
+        nonconstant = dict[Law, DarbouxSpace]()
         for law, space in all_spaces.items():
             basis = [vector for vector in space.basis if any(vector[1:])]  # without constants, which have C = 1
             if basis:
-                known[law] = DarbouxSpace(space.dim, space.degree, basis)
+                nonconstant[law] = DarbouxSpace(space.dim, space.degree, basis)
         # Different products of cofactors may be the same function. If products span the space of one of them, the equal
         # spaces of the others are left out as well.
-        listed = [space for law, space in known.items() if _is_spanned_by_products(known, law, map_.prime)]
-        for law, space in known.items():
+        listed = [space for law, space in nonconstant.items() if _is_spanned_by_products(nonconstant, law, map_.prime)]
+        for law, space in nonconstant.items():
             if space not in listed:
                 listed.append(space)
                 others = [other for key, other in all_spaces.items() if key[0] == law[0] and key != law]
@@ -200,10 +200,10 @@ def darboux_polynomials(
     return DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), reason, flow=flow)
 
 
-def _is_spanned_by_products(known: dict[Law, DarbouxSpace], law: Law, prime: int) -> bool:
+def _is_spanned_by_products(spaces: dict[Law, DarbouxSpace], law: Law, prime: int) -> bool:
     """Whether products P Q of elements of other spaces, with cofactors of product `law`, span the space of `law`."""
-    space, (product, c) = known[law], law
-    others = {(key[0].powers, key[1]): other for key, other in known.items() if key != law}
+    space, (product, c) = spaces[law], law
+    others = {(key[0].powers, key[1]): other for key, other in spaces.items() if key != law}
     rows = []
     for (powers, number), space_of_P in others.items():
         quotient = tuple(a - b for a, b in zip(product.powers, powers, strict=True)), c * pow(number, -1, prime) % prime

@@ -49,7 +49,7 @@ from kahanmaps.laboratory.modular_points import (
 )
 from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit, span_of_relations
 
-_SPARE = 8
+_SPARE = 8  # points beyond the number of unknowns
 _MAX_FORMS = 12
 # Bounds of dim W: the s (s - 1)/2 unknown entries of A take 0.2 seconds for s = 30 and 10 seconds for s = 60.
 SMALL_SPAN, LARGEST_SPAN = 30, 60
@@ -79,11 +79,11 @@ class DarbouxSpace:
     ) -> DarbouxSpace:
         """Return the span of vectors modulo a prime, given on all monomials or on those with the indices `places`."""
         if places is not None:
-            full = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
-            for row, vector in zip(full, vectors, strict=True):
+            full_rows = [[0] * len(exponents_up_to(dim, degree)) for _ in vectors]
+            for row, vector in zip(full_rows, vectors, strict=True):
                 for k, entry in zip(places, vector, strict=True):
                     row[k] = entry
-            vectors = full
+            vectors = full_rows
         descending = echelon([vector[::-1] for vector in vectors], prime)
         basis = [vector[::-1] for vector in reversed(descending)]
         return cls(dim, degree, _sparsest(basis, dim, degree, prime) if len(basis) == 2 else basis)
@@ -116,11 +116,11 @@ def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
     degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
     P, Q = basis
     count_work(len(P) + 2 * len(degrees))
-    used = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
+    occurring = [k for k, pair in enumerate(zip(P, Q, strict=True)) if any(pair)]
     zeros: dict[int | None, set[int]] = {}  # the missing monomials of each special member, by its parameter
-    for k in used:
+    for k in occurring:
         zeros.setdefault(P[k] * pow(Q[k], -1, prime) % prime if Q[k] else None, set()).add(k)
-    supports = [([k for k in used if k not in missing], min(missing)) for missing in zeros.values()]
+    supports = [([k for k in occurring if k not in missing], min(missing)) for missing in zeros.values()]
     members = []
     for support, first in sorted(supports, key=lambda pair: (degrees[pair[0][-1]], len(pair[0]), pair[0]))[:2]:
         member = [(Q[first] * p - P[first] * q) % prime for p, q in zip(P, Q, strict=True)]
@@ -142,34 +142,34 @@ def darboux_spaces(
     if len(span) > 2 * LARGEST_SPAN:
         return None
     multiples = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
-    # `fresh` completes the multiples of known spaces to a basis of the sum.
+    # `complement` completes the multiples of known spaces to a basis of the sum.
     stacked = [*multiples, *span]
     independent = pivots(echelon(list(zip(*stacked, strict=True)), prime)) if stacked else []
-    fresh = [stacked[k] for k in independent if k >= len(multiples)]
-    if not fresh:
+    complement = [stacked[k] for k in independent if k >= len(multiples)]
+    if not complement:
         return []
-    if not multiples and _is_darboux(map_, fresh, degree):
-        return [DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)]
-    if len(fresh) + len(multiples) > largest:
+    if not multiples and _is_darboux(map_, complement, degree):
+        return [DarbouxSpace.spanned_by(map_.dim, degree, complement, prime)]
+    if len(complement) + len(multiples) > largest:
         return None
-    # A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x, w = fresh + multiples.
-    size = len(fresh) + len(multiples)
-    places = [(a, b) for a in range(size) for b in range(a + 1, size)]
-    at_points, at_images = _values(map_, [*fresh, *multiples], degree, len(places) + _SPARE)
-    count_work(len(places) ** 2 / 2)
+    # A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x, w = complement + multiples.
+    size = len(complement) + len(multiples)
+    positions = [(a, b) for a in range(size) for b in range(a + 1, size)]
+    at_points, at_images = _values(map_, [*complement, *multiples], degree, len(positions) + _SPARE)
+    count_work(len(positions) ** 2 / 2)
     rows = []
     for x, y in zip(integers(at_points), integers(at_images), strict=True):
-        rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
+        rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in positions])
     solutions = []
-    for vector in null_space(rows, len(places), prime):
+    for vector in null_space(rows, len(positions), prime):
         A = nmod_mat(size, size, prime)
-        for (a, b), entry in zip(places, vector, strict=True):
+        for (a, b), entry in zip(positions, vector, strict=True):
             A[a, b] = entry
             A[b, a] = -entry
         solutions.append(A)
-    bases = [basis for basis in _separate(solutions, fresh, multiples, prime) if _is_darboux(map_, basis, degree)]
+    bases = [basis for basis in _separate(solutions, complement, multiples, prime) if _is_darboux(map_, basis, degree)]
     if not bases and not multiples:
-        bases = [basis for basis in _of_rank_two(solutions, fresh, prime) if _is_darboux(map_, basis, degree)]
+        bases = [basis for basis in _of_rank_two(solutions, complement, prime) if _is_darboux(map_, basis, degree)]
     return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
 
 
@@ -179,7 +179,7 @@ def _values(map_: ModularMap, basis: Vectors, degree: int, points: int) -> tuple
     polynomials = matrix(basis, prime).transpose()
     at_points, at_images = (
         multiply(matrix(rows, prime), polynomials)
-        for rows in zip(*(map_.moved(x, image, degree) for x, image in map_.pairs(points)), strict=True)
+        for rows in zip(*(map_.monomials_at_both(x, image, degree) for x, image in map_.pairs(points)), strict=True)
     )
     return at_points, at_images
 
@@ -190,26 +190,27 @@ def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
     return all(u[i, 0] * v[i, a] == u[i, a] * v[i, 0] for i in range(u.nrows()) for a in range(1, len(basis)))
 
 
-def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
-    """Compute the spaces with a common cofactor from the matrices A on fresh + multiples.
+def _separate(solutions: list[nmod_mat], complement: Vectors, multiples: Vectors, prime: int) -> list[Vectors]:
+    """Compute the spaces with a common cofactor from the matrices A on complement + multiples.
 
-    The fresh parts of the spaces are eigenspaces of a random E with E A = A E^T for the fresh-fresh block of every A.
+    The projections of the spaces to the complement are eigenspaces of a random E with E A = A E^T, where A stands for
+    the block on the complement of each of the matrices.
     """
-    k, size, rng = len(fresh), len(fresh) + len(multiples), random.Random(prime)
-    # The columns of the fresh-fresh blocks span the fresh parts of the spaces. Take an echelon basis b_i of this span:
-    # then a block is sum A'_ij b_i b_j^T, and A' consists of its entries at the pivots.
+    k, size, rng = len(complement), len(complement) + len(multiples), random.Random(prime)
+    # The columns of the blocks on the complement span the projections of the spaces. Take an echelon basis b_i of this
+    # span: then a block is sum A'_ij b_i b_j^T, and A' consists of its entries at the pivots.
     count_work(len(solutions) * k**2)
     coordinates = echelon([[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)], prime)
-    n, places = len(coordinates), pivots(coordinates)
+    n, pivot_columns = len(coordinates), pivots(coordinates)
     if n < 2:
         return []
     count_work(len(solutions) * n**2)
-    forms = [nmod_mat([[int(A[i, j]) for j in places] for i in places], prime) for A in solutions]
-    if len(forms) > _MAX_FORMS:  # a few random combinations give the same conditions on E
-        forms = [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_MAX_FORMS)]
+    blocks = [nmod_mat([[int(A[i, j]) for j in pivot_columns] for i in pivot_columns], prime) for A in solutions]
+    if len(blocks) > _MAX_FORMS:  # a few random combinations give the same conditions on E
+        blocks = [combination_of([rng.randrange(prime) for _ in blocks], blocks) for _ in range(_MAX_FORMS)]
     rows = []
     count_work(n**3 + n**4 / 100)
-    for A in forms[:2]:  # two A leave few E with E A = A E^T; the other A are applied to these
+    for A in blocks[:2]:  # two A leave few E with E A = A E^T; the other A are applied to these
         for i in range(n):
             for j in range(i, n):
                 row = [0] * (n * n)
@@ -218,7 +219,7 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, pri
                     row[j * n + m] = (row[j * n + m] - int(A[i, m])) % prime
                 rows.append(row)
     algebra = [nmod_mat(n, n, entries, prime) for entries in null_space(rows, n * n, prime)]
-    for A in forms[2:]:
+    for A in blocks[2:]:
         count_work(len(algebra) * (n**3 / 500 + n**2))
         differences = [(E * A - A * E.transpose()).entries() for E in algebra]
         weights = null_space([list(map(int, row)) for row in zip(*differences, strict=True)], len(algebra), prime)
@@ -231,16 +232,16 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, multiples: Vectors, pri
             continue  # these spaces are conjugate over an extension of the field
         root = -int(factor[0]) * pow(int(factor[1]), -1, prime) % prime
         shifted = [[(int(E[i, j]) - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
-        eigen = null_space(shifted, n, prime)
-        if len(eigen) > 1:
-            block = echelon(combine(eigen, coordinates, prime), prime)
+        eigenvectors = null_space(shifted, n, prime)
+        if len(eigenvectors) > 1:
+            block = echelon(combine(eigenvectors, coordinates, prime), prime)
             corrected = _add_corrections(solutions, block, k, size, prime)
             if corrected is not None:
-                spaces.append(echelon(combine(corrected, [*fresh, *multiples], prime), prime))
+                spaces.append(echelon(combine(corrected, [*complement, *multiples], prime), prime))
     return spaces
 
 
-def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[Vectors]:
+def _of_rank_two(solutions: list[nmod_mat], complement: Vectors, prime: int) -> list[Vectors]:
     """Return the row space of the matrix of rank 2 among the combinations of few matrices, if there is exactly one.
 
     The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. If they have a single common zero c up to a factor, the
@@ -250,13 +251,13 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
     if not 1 <= count <= _MAX_FORMS:
         return []
     rng = random.Random(prime)
-    size = len(fresh)
+    size = len(complement)
     pairs = [(s, t) for s in range(count) for t in range(s, count)]
     rows = []
     count_work(2 * len(pairs) * (2 * size + count * (3 + size**2 / 100) + 5 * len(pairs)))
     for _ in range(2 * len(pairs)):
         mix = nmod_mat(4, size, [rng.randrange(prime) for _ in range(4 * size)], prime)
-        small = [mix * A * mix.transpose() for A in solutions]
+        compressed = [mix * A * mix.transpose() for A in solutions]
 
         def pfaffian(A: nmod_mat, B: nmod_mat) -> int:
             return int(
@@ -270,7 +271,7 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
 
         # entry (s, t) of c c^T is c_s c_t: its factor is the polar form, half of it on the diagonal
         half = (prime + 1) // 2
-        rows.append([pfaffian(small[s], small[t]) * (half if s == t else 1) % prime for s, t in pairs])
+        rows.append([pfaffian(compressed[s], compressed[t]) * (half if s == t else 1) % prime for s, t in pairs])
     common = null_space(rows, len(pairs), prime)
     if len(common) != 1:
         return []
@@ -280,36 +281,41 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
         return []
     total = combination_of([products[min(lead, t), max(lead, t)] for t in range(count)], solutions)
     coordinates = echelon(integers(total), prime)
-    return [echelon(combine(coordinates, fresh, prime), prime)] if len(coordinates) == 2 else []
+    return [echelon(combine(coordinates, complement, prime), prime)] if len(coordinates) == 2 else []
 
 
 def _add_corrections(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: int) -> Vectors | None:
-    """Add to each vector of the block its correction by multiples, in coordinates of fresh + multiples."""
+    """Add to each vector of `block`, a basis of the projection of a space to the complement, its part in the multiples.
+
+    Returns coordinates on complement + multiples, or None if the matrices do not determine these parts.
+    """
     if size == k:
         return block
-    # Take the combinations of the A with a fresh-fresh block on `block`: its columns are combinations of the vectors.
-    first = pivots(block)
-    others = [i for i in range(k) if i not in first]
+    # Take the combinations of the A whose block on the complement belongs to this space: its columns are combinations
+    # of the vectors of `block`.
+    block_pivots = pivots(block)
+    others = [i for i in range(k) if i not in block_pivots]
     conditions = []
-    count_work(k * len(others) * len(solutions) * len(first) / 2)
+    count_work(k * len(others) * len(solutions) * len(block_pivots) / 2)
     for b in range(k):
         for i in others:
             # entry (i, b) is determined by the entries (pivot, b)
             conditions.append(
                 [
-                    (int(A[i, b]) - sum(int(A[p, b]) * row[i] for p, row in zip(first, block, strict=True))) % prime
+                    (int(A[i, b]) - sum(int(A[p, b]) * row[i] for p, row in zip(block_pivots, block, strict=True)))
+                    % prime
                     for A in solutions
                 ]
             )
     combinations = null_space(conditions, len(solutions), prime)
     n = len(block)
-    system = []
+    equations = []
     for weights in combinations:
         A = combination_of(weights, solutions)
-        for p in first:
+        for p in block_pivots:
             # A = sum a_pq (p + w_p)(q + w_q)^T with corrections w: row p has the entries sum_q a_pq w_q on multiples
-            system.append([int(A[p, q]) for q in first] + [int(A[p, t]) for t in range(k, size)])
-    reduced = echelon(system, prime)
+            equations.append([int(A[p, q]) for q in block_pivots] + [int(A[p, t]) for t in range(k, size)])
+    reduced = echelon(equations, prime)
     if len(reduced) < n or any(reduced[i][j] != (i == j) for i in range(n) for j in range(n)):
         return None
     return [[*block[i], *reduced[i][n:]] for i in range(n)]
@@ -367,8 +373,8 @@ def pairs_of(dim: int) -> tuple[tuple[int, int], ...]:
     """Return for each monomial of degree at most 2 the indices i <= j of its factors in (1, x)."""
     pairs = []
     for exponent in exponents_up_to(dim, TWO_POINT_DEGREE):
-        places = [k for k, e in enumerate(exponent, 1) for _ in range(e)]
-        i, j = [0] * (TWO_POINT_DEGREE - len(places)) + places
+        factors = [k for k, e in enumerate(exponent, 1) for _ in range(e)]
+        i, j = [0] * (TWO_POINT_DEGREE - len(factors)) + factors
         pairs.append((i, j))
     return tuple(pairs)
 
@@ -376,13 +382,13 @@ def pairs_of(dim: int) -> tuple[tuple[int, int], ...]:
 class TwoPointMap(ModularMap):
     """A map modulo a prime that gives monomials of degree at most 2 the values of a `TwoPointBasis`."""
 
-    def __init__(self, base: ModularMap, lift: TwoPointBasis) -> None:
+    def __init__(self, base: ModularMap, two_point_basis: TwoPointBasis) -> None:
         # The same map and random generator; only the values of monomials differ.
         self.prime, self.eps, self.dim, self.values = base.prime, base.eps, base.dim, base.values
-        self.rng, self.map, self.lift = base.rng, base.map, lift
+        self.rng, self.map, self.two_point_basis = base.rng, base.map, two_point_basis
 
     def _values(self, x: Point, y: Point) -> list[int]:
-        p, sign, X, Y = self.prime, self.lift.sign, (1, *x), (1, *y)
+        p, sign, X, Y = self.prime, self.two_point_basis.sign, (1, *x), (1, *y)
         count_work(len(pairs_of(self.dim)) / 2)
         # The Wronskian of a square is 0. Random numbers instead of zeros keep it out of all relations.
         return [
@@ -394,46 +400,48 @@ class TwoPointMap(ModularMap):
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
         """Return the values along an orbit, its first point, and its period if it closes."""
-        points, shift = self.orbit(count + self.lift.shift), self.lift.shift
+        points, shift = self.orbit(count + self.two_point_basis.shift), self.two_point_basis.shift
         closed = len(points) < count + shift
-        ahead = points[shift % len(points) :] + (points[: shift % len(points)] if closed else [])
-        rows = [self._values(x, y) for x, y in zip(points, ahead, strict=False)]
+        shifted = points[shift % len(points) :] + (points[: shift % len(points)] if closed else [])
+        rows = [self._values(x, y) for x, y in zip(points, shifted, strict=False)]
         chosen = rows if support is None else [[row[k] for k in support] for row in rows]
         return chosen, points[0], len(points) if closed else None
 
-    def moved(self, x: Point, image: Point, degree: int, by: tuple[int, int] = (1, 1)) -> tuple[Values, Values]:
-        """Return the values at a point and one step later, times the two factors `by`."""
+    def monomials_at_both(
+        self, x: Point, image: Point, degree: int, factors: tuple[int, int] = (1, 1)
+    ) -> tuple[Values, Values]:
+        """Return the values at a point and one step later, times the two `factors`."""
         points = [x, image]
-        while len(points) < self.lift.shift + 2:
+        while len(points) < self.two_point_basis.shift + 2:
             after = self.step(points[-1])
             if after is None:
                 raise NoPoint("an iterate of a random point modulo a prime is an indeterminacy point")
             points.append(after)
-        at_point, at_image = (self._values(points[k], points[k + self.lift.shift]) for k in (0, 1))
-        return [by[0] * value for value in at_point], [by[1] * value for value in at_image]
+        at_point, at_image = (self._values(points[k], points[k + self.two_point_basis.shift]) for k in (0, 1))
+        return [factors[0] * value for value in at_point], [factors[1] * value for value in at_image]
 
 
-def two_point_spaces(map_: ModularMap, lift: TwoPointBasis) -> list[DarbouxSpace]:
+def two_point_spaces(map_: ModularMap, basis: TwoPointBasis) -> list[DarbouxSpace]:
     """Find the spaces of functions of two points with a common cofactor.
 
     For rank 2 this is the one space of all functions that occur in relations along orbits.
     """
-    two_point_map = TwoPointMap(map_, lift)
-    if lift.rank == 1:
+    two_point_map = TwoPointMap(map_, basis)
+    if basis.rank == 1:
         return darboux_spaces(two_point_map, TWO_POINT_DEGREE) or []
     span = span_of_relations(two_point_map, TWO_POINT_DEGREE)
-    if len(span) - relations_on_orbit(two_point_map, TWO_POINT_DEGREE).dimension != lift.rank:
+    if len(span) - relations_on_orbit(two_point_map, TWO_POINT_DEGREE).dimension != basis.rank:
         return []
     return [DarbouxSpace.spanned_by(map_.dim, TWO_POINT_DEGREE, span, map_.prime)]
 
 
 def bases_with_spaces(
-    map_: ModularMap, lifts: Sequence[TwoPointBasis] = TWO_POINT_BASES
+    map_: ModularMap, bases: Sequence[TwoPointBasis] = TWO_POINT_BASES
 ) -> list[tuple[TwoPointBasis, list[DarbouxSpace]]]:
     """Return the bases of forms that have spaces, with the spaces: of rank 1 or, if there are none, of rank 2."""
     pairs = []
-    for lift in lifts:
-        for candidate in (lift, lift._replace(rank=2)):
+    for basis in bases:
+        for candidate in (basis, basis._replace(rank=2)):
             spaces = two_point_spaces(map_, candidate)
             if spaces:
                 pairs.append((candidate, spaces))

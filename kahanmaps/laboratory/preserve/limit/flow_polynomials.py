@@ -96,14 +96,14 @@ def flow_polynomials(
         extended = PolynomialField((*field.rhs, *[context.constant(0)] * len(field.symbols)))
         result = flow_polynomials(extended, max_degree, budget, seed)
         return replace(result, functions=tuple(P for P in result.functions if degree_in(P, field.dim)))
-    n, top = field.dim, 0
-    requested, most = (4, _DEFAULT_MONOMIALS) if max_degree is None else (max_degree, _MAX_MONOMIALS)
+    n, last_degree = field.dim, 0
+    requested, max_monomials = (4, _DEFAULT_MONOMIALS) if max_degree is None else (max_degree, _MAX_MONOMIALS)
     weights = gradings(field)
     # The work of a degree is about the sum of the cubes of the sizes of its supports.
-    while top < requested and comb(n + top + 1, n) <= _MAX_LISTED:
-        if sum(len(support) ** 3 for support in _supports(n, top + 1, weights)) > most**3:
+    while last_degree < requested and comb(n + last_degree + 1, n) <= _MAX_LISTED:
+        if sum(len(support) ** 3 for support in _supports(n, last_degree + 1, weights)) > max_monomials**3:
             break
-        top += 1
+        last_degree += 1
     budget = budget or Budget()
     rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
     known: dict[str, fmpq_mpoly] = {}
@@ -112,22 +112,22 @@ def flow_polynomials(
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             known.setdefault(str(P), P)
-    settled, reason = 0, ""
+    settled_degree, reason = 0, ""
     primes = [random_prime(rng) for _ in range(_PRIMES)]
-    while settled < top and not reason:
-        for support in _supports(n, settled + 1, weights):
-            reason = _Search(field, settled + 1, support, rng, known).run(primes, budget)
+    while settled_degree < last_degree and not reason:
+        for support in _supports(n, settled_degree + 1, weights):
+            reason = _Search(field, settled_degree + 1, support, rng, known).run(primes, budget)
             if reason:
                 break
         else:
-            settled += 1
-    if not reason and max_degree is not None and top < max_degree:
+            settled_degree += 1
+    if not reason and max_degree is not None and last_degree < max_degree:
         reason = "too many monomials"
     listed = [P for P in known.values() if not field.derivative(P).is_zero()]
     by_size = sorted(
         listed, key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()], str(P))
     )
-    return FlowPolynomials(tuple(by_size), settled, reason)
+    return FlowPolynomials(tuple(by_size), settled_degree, reason)
 
 
 def gradings(field: PolynomialField) -> list[tuple[int, ...]]:
@@ -189,7 +189,7 @@ class _Search:
                 flow = ModularFlow(self.field, prime, (), self.rng.getrandbits(64))
             except BadPrime:
                 continue
-            vectors, are_all = self._modulo(flow, budget)
+            vectors, is_complete = self._modulo(flow, budget)
             missing = list[list[int]]()
             for vector in vectors:
                 if not self._lifts(vector, prime):  # a higher power decides: rational, or with conjugates
@@ -197,7 +197,7 @@ class _Search:
                     is_known = residues and self._lifts(residues, modulus)
                     if not is_known and not any(_is_irrational(c, modulus) for c in residues):
                         missing.append(vector)
-            if not are_all:
+            if not is_complete:
                 continue
             pairs = [(chinese(old, m, new, prime), m * prime, new) for old, m in combined for new in missing]
             combined = []
@@ -266,10 +266,10 @@ class _Search:
         cofactor = [context.from_dict({m: 1}) for m in exponents_up_to(field.dim, max(0, field.degree - 1))]
         terms = [context.from_dict({m: 1}) for m in self.monomials]
 
-        def total(weights: Sequence[int], polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
+        def combination(weights: Sequence[int], polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
             return sum((c * P for c, P in zip(weights, polynomials, strict=True) if c), context.constant(0))
 
-        def along(P: fmpq_mpoly) -> fmpq_mpoly:
+        def flow_derivative(P: fmpq_mpoly) -> fmpq_mpoly:
             return sum((P.derivative(k) * g for k, g in enumerate(f)), context.constant(0))
 
         def solve(columns: Sequence[fmpq_mpoly], rhs: fmpq_mpoly) -> list[int] | None:
@@ -281,29 +281,29 @@ class _Search:
             return [row[-1] for row in solution] if is_unique else None
 
         # P is determined up to a factor. One coefficient stays fixed, so that the linear systems have one solution.
-        first = next(k for k, c in enumerate(vector) if c)
-        P, P_known = total(vector, terms), list(vector)
-        K_known = solve([P * k for k in cofactor], along(P))
-        if K_known is None:
+        fixed = next(k for k, c in enumerate(vector) if c)
+        P, P_coefficients = combination(vector, terms), list(vector)
+        K_coefficients = solve([P * k for k in cofactor], flow_derivative(P))
+        if K_coefficients is None:
             return []
-        K = total(K_known, cofactor)
-        others = [k for k in range(len(terms)) if k != first]
-        columns = [*(along(terms[k]) - K * terms[k] for k in others), *(-P * k for k in cofactor)]
+        K = combination(K_coefficients, cofactor)
+        free = [k for k in range(len(terms)) if k != fixed]
+        columns = [*(flow_derivative(terms[k]) - K * terms[k] for k in free), *(-P * k for k in cofactor)]
         modulus = p
         for _ in range(_PRECISION - 1):
-            P = total(P_known, terms)
-            residual = along(P) - total(K_known, cofactor) * P
+            P = combination(P_coefficients, terms)
+            residual = flow_derivative(P) - combination(K_coefficients, cofactor) * P
             if any(int(c.p) % modulus for c in residual.coeffs()):
                 return []
             count(len(terms) * sum(map(len, f)))  # without `solve`, which counts its own work
-            step = solve(columns, residual / -modulus)
-            if step is None:
+            correction = solve(columns, residual / -modulus)
+            if correction is None:
                 return []
-            for k, c in zip(others, step, strict=False):
-                P_known[k] += c * modulus
-            K_known = [a + c * modulus for a, c in zip(K_known, step[len(others) :], strict=True)]
+            for k, c in zip(free, correction, strict=False):
+                P_coefficients[k] += c * modulus
+            K_coefficients = [a + c * modulus for a, c in zip(K_coefficients, correction[len(free) :], strict=True)]
             modulus *= p
-        return P_known
+        return P_coefficients
 
 
 def _is_irrational(residue: int, modulus: int) -> bool:
@@ -352,15 +352,15 @@ class _Line:
         """Return the point with parameter t."""
         return tuple((a + t * b) % self.flow.prime for a, b in zip(self.start, self.slope, strict=True))
 
-    def special(self, along: nmod_poly) -> list[tuple[int, Vectors]]:
+    def special(self, on_line: nmod_poly) -> list[tuple[int, Vectors]]:
         """Return, for each special factor of a polynomial in t, its degree and its space.
 
         The space consists of the polynomials that vanish along the solutions from the zeros of the factor. A factor is
         special if this space is larger than for as many random points, where products of I - c with integrals I vanish.
         """
         points = []
-        count(max(0, int(along.degree())) ** 2)
-        for factor, _ in along.factor()[1] if along.degree() > 0 else ():
+        count(max(0, int(on_line.degree())) ** 2)
+        for factor, _ in on_line.factor()[1] if on_line.degree() > 0 else ():
             if factor.degree() <= self.degree:
                 space = null_space(self._conjugates(factor), self.count, self.flow.prime)
                 if len(space) > self._generic_dimension(factor.degree()):
@@ -389,19 +389,19 @@ class _Line:
         waiting: list[tuple[int, int, Vectors]] = [(0, 0, [])]
         tried = 0
         while waiting:
-            start, size, shared = waiting.pop()
+            start, total_degree, space_so_far = waiting.pop()
             for k in range(start, len(points)):
                 degree, space = points[k]
-                if size + degree > self.degree:
+                if total_degree + degree > self.degree:
                     continue
                 tried += 1
-                intersection = _intersection(shared, space, p) if size else space
-                if size and len(intersection) <= self._generic_dimension(size + degree):
+                intersection = _intersection(space_so_far, space, p) if total_degree else space
+                if total_degree and len(intersection) <= self._generic_dimension(total_degree + degree):
                     continue
-                if size + degree == self.degree:
+                if total_degree + degree == self.degree:
                     spaces.append(intersection)
                 else:
-                    waiting.append((k + 1, size + degree, intersection))
+                    waiting.append((k + 1, total_degree + degree, intersection))
             if tried > _MAX_CHOICES:
                 return None
         return spaces
@@ -427,8 +427,8 @@ class _Line:
             others = all_nodes // nmod_poly([-t, 1], p)
             L = others * ~others(t) % factor
             basis.append([int(L[k]) for k in range(factor.degree())])
-        mixed = combine(list(zip(*basis, strict=True)), values, p)
-        return [row[k : k + self.count] for row in mixed for k in range(0, len(row), self.count)]
+        coefficients = combine(list(zip(*basis, strict=True)), values, p)
+        return [row[k : k + self.count] for row in coefficients for k in range(0, len(row), self.count)]
 
     def _extactic(self) -> nmod_poly:
         """Return the common factor, on the line, of the minors of the matrix of Taylor coefficients.
@@ -444,13 +444,15 @@ class _Line:
             mixes[1] = nmod_mat(self.count, size, [flow.rng.randrange(p) for _ in range(self.count * size)], p)
         # The i-th derivative of a monomial has a degree higher by i (deg f - 1).
         step = max(0, flow.degree - 1)
-        top = sum(self.degree + order * step for order in range(size)) + step
+        degree_bound = sum(self.degree + order * step for order in range(size)) + step
         values: list[tuple[int, ...]] = []
-        for t in range(top + 1):
-            *rows, last, following = flow.series(self.at(t), self.degree, size + 1, self.support)
-            minors = (multiply(matrix([*rows, row], p), mix) for row, mix in zip((last, following), mixes, strict=True))
+        for t in range(degree_bound + 1):
+            *rows, last_row, next_row = flow.series(self.at(t), self.degree, size + 1, self.support)
+            minors = (
+                multiply(matrix([*rows, row], p), mix) for row, mix in zip((last_row, next_row), mixes, strict=True)
+            )
             values.append(tuple(map(determinant, minors)))
-        first, second = (interpolated(range(top + 1), column, p) for column in zip(*values, strict=True))
+        first, second = (interpolated(range(degree_bound + 1), column, p) for column in zip(*values, strict=True))
         return first.gcd(second)
 
     def restricted(self, P: fmpq_mpoly) -> nmod_poly:

@@ -88,8 +88,8 @@ class Limit:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         second = None if self.second is None else format_factored(self.second)
-        known = attributes(self, "name", "combination", "order", "conserved")
-        return {**known, "leading": format_factored(self.leading), "second": second}
+        fields = attributes(self, "name", "combination", "order", "conserved")
+        return {**fields, "leading": format_factored(self.leading), "second": second}
 
 
 @dataclass(frozen=True)
@@ -170,9 +170,9 @@ class FlowAndMap:
         if self.polynomials:
             formulas = ", ".join(map(format_polynomial, self.polynomials))
             statements.append(("proved", f"Darboux polynomials of the flow, apart from affine ones: {formulas}"))
-        for timed in self.search.time_dependent if others and self.search is not None else ():
-            text = f"{timed.name} = {timed.text} is a time-dependent integral of the flow"
-            statements.append((str(timed.integral.verdict), text))
+        for time_dependent in self.search.time_dependent if others and self.search is not None else ():
+            text = f"{time_dependent.name} = {time_dependent.text} is a time-dependent integral of the flow"
+            statements.append((str(time_dependent.integral.verdict), text))
         if self.polynomials_degree > 1:
             which, exceptions = ("other ", "except") if self.polynomials else ("", "other than affine ones and")
             degrees = f"of the flow of degree <= {self.polynomials_degree} were found"
@@ -230,9 +230,9 @@ def flow_and_map(
     """
     if not isinstance(search, IntegralSearch):
         raise wrong_kind(search, "what km.find_integrals found", "km.flow_and_map(km.find_integrals(...))")
-    given = search.file.map
-    is_kahan = isinstance(given, KahanFamily)
-    if search.eps is not None or not (is_kahan or (isinstance(given, ImplicitMap) and given.of_field is not None)):
+    map_ = search.file.map
+    is_kahan = isinstance(map_, KahanFamily)
+    if search.eps is not None or not (is_kahan or (isinstance(map_, ImplicitMap) and map_.of_field is not None)):
         return None
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
     stages = budget_for("limits", effort).share([2, 2, 1])  # Darboux polynomials; integrals; densities
@@ -292,7 +292,8 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
     map_laboratory = Laboratory(search.file, symbols, None, search.seed)
     independent = Independent(laboratory.maps[0])
     limits: list[Limit] = []
-    used: list[tuple[Function, Function]] = []  # integrals of the map, and their formulas in terms of the given ones
+    # The combinations of integrals that have limits, as functions of x and as formulas in the names of the integrals.
+    combinations: list[tuple[Function, Function]] = []
     for integral, name in zip(search.integrals, formal.variables, strict=False):
         I = Function(field, integral.function.numerator, integral.function.denominator)
         R = None
@@ -303,8 +304,10 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
                 if independent.adds(independent.gradient(leading)):
                     break
                 R = _relation([leading, *(limit.leading for limit in limits)], n, len(symbols))
-                I = evaluate(R, field, [I, *(before for before, _ in used), *field.variables[n:-1]])
-                name = evaluate(R, formal, [name, *(before for _, before in used), *formal.variables[len(labels) : -1]])
+                I = evaluate(R, field, [I, *(before for before, _ in combinations), *field.variables[n:-1]])
+                name = evaluate(
+                    R, formal, [name, *(before for _, before in combinations), *formal.variables[len(labels) : -1]]
+                )
             else:
                 continue
             remainder = I - Function(field, leading.numerator, leading.denominator)
@@ -319,13 +322,15 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
             continue
         independent.add(independent.gradient(leading))
         verdict = integral.verdict if second is None and R is None else map_laboratory.verdict_on(leading)[0]
-        used.append((I, name))
+        combinations.append((I, name))
         limits.append(Limit(f"L{len(limits) + 1}", formal.format(name), leading, order, second, verdict))
     return tuple(limits)
 
 
 def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
-    """Compute such integrals for a map of several successive points x, x_1, ... of a method of second order.
+    """Compute the integrals of the flow that integrals of a polarized map tend to.
+
+    A point of such a map consists of several successive points x, x_1, ... of a method of order 2.
 
     Along a smooth solution x_k = x + h_k f + h_k^2/2 f'f + O(eps^3) with h_k = 2 k eps. So the terms of numerator and
     denominator up to eps^2 are known, and an integral has a limit if its leading terms are among these.
@@ -347,8 +352,8 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
     limits: list[Limit] = []
     for integral, name in zip(search.integrals, formal.variables, strict=False):
         P, Q = (
-            _truncate_at_third_order(part.compose(*images, ctx=context))
-            for part in (integral.function.numerator, integral.function.denominator)
+            _truncate_at_third_order(polynomial.compose(*images, ctx=context))
+            for polynomial in (integral.function.numerator, integral.function.denominator)
         )
         try:
             # A constant leading term says nothing: subtract it and take the next term, once.
@@ -365,8 +370,12 @@ def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tupl
             continue
         independent.add(row)
         combination = formal.format(name * formal.variables[-1] ** -order / formal.convert(content))
-        parts = (part.compose(*map_gens, ctx=map_ring) for part in (leading.numerator, leading.denominator))
-        verdict, _ = Laboratory(search.file, search.symbols, None, search.seed).verdict_on(RationalFunction(*parts))
+        polynomials = (
+            polynomial.compose(*map_gens, ctx=map_ring) for polynomial in (leading.numerator, leading.denominator)
+        )
+        verdict, _ = Laboratory(search.file, search.symbols, None, search.seed).verdict_on(
+            RationalFunction(*polynomials)
+        )
         limits.append(Limit(f"L{len(limits) + 1}", combination, leading, 0, None, verdict, on_solutions=True))
     return tuple(limits)
 

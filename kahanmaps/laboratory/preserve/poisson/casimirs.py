@@ -22,7 +22,7 @@ from kahanmaps.algebra.residues import rational_vector
 from kahanmaps.algebra.work import Budget
 from kahanmaps.invariants.poisson import MatrixPoissonTensor
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, slopes
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, scaled_gradient
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral
 
@@ -30,7 +30,7 @@ _DEGREE = 2  # of polynomials in the integrals
 _MAX_TERMS = 40  # of these polynomials
 _MAX_EXPONENT = 12  # in a product of powers
 _BUDGET = 200_000  # products of terms, to expand a candidate
-_SPARE = 4
+_SPARE = 4  # points beyond the number of unknowns
 
 
 def casimir_candidates(
@@ -85,8 +85,8 @@ def _products(
         exponents = rational_vector(vector, p)
         if exponents is None:
             continue
-        common = lcm(*(int(e.q) for e in exponents))
-        powers = [int(e * common) for e in exponents]
+        common_denominator = lcm(*(int(e.q) for e in exponents))
+        powers = [int(e * common_denominator) for e in exponents]
         if sum(e != 0 for e in powers) > 1 and max(map(abs, powers)) <= _MAX_EXPONENT:
             numerator, denominator = (
                 prod(
@@ -117,7 +117,7 @@ def _polynomials(
             rows.append([sum(w * v for w, v in zip(weights, row, strict=True)) for row in zip(*fields, strict=True)])
         return rows
 
-    for P in _forms(laboratory, tensor, integrals, powers, columns, budget):
+    for P in _linear_relations(laboratory, tensor, integrals, powers, columns, budget):
         if degree_in(P, len(integrals)) > 1 or len(P) > 1:
             yield RationalFunction(P, P.context().constant(1))
 
@@ -140,7 +140,7 @@ def _fractions(
         J, P = [1, *values], [[0] * len(fields[0]), *fields]
         return [[J[a] * y - J[b] * x for x, y in zip(P[a], P[b], strict=True)] for a, b in pairs]
 
-    for form in _forms(laboratory, tensor, integrals, powers, columns, budget):
+    for form in _linear_relations(laboratory, tensor, integrals, powers, columns, budget):
         letters, zero = [form.context().constant(1), *form.context().gens()[:count]], form.context().constant(0)
         w = dict.fromkeys(pairs, zero)
         for monomial, value in form.terms():
@@ -154,7 +154,7 @@ def _fractions(
         yield RationalFunction.reduced(u, v)
 
 
-def _forms(
+def _linear_relations(
     laboratory: Laboratory,
     tensor: MatrixPoissonTensor,
     integrals: Sequence[FoundIntegral],
@@ -183,8 +183,8 @@ def _forms(
         return ()
     eps_enters = "symbol" if laboratory.eps is None and laboratory.map.has_eps else "not"
     names = [integral.name for integral in integrals]
-    forms = laboratory.formulas([model], lambda map_: [space(map_)], budget, names, eps_enters)
-    return forms.bases[0] if forms.bases is not None else ()
+    closed_forms = laboratory.formulas([model], lambda map_: [space(map_)], budget, names, eps_enters)
+    return closed_forms.bases[0] if closed_forms.bases is not None else ()
 
 
 def _hamiltonian_fields(
@@ -204,7 +204,7 @@ def _hamiltonian_fields(
         value, denominator = function.value(field, [*x, eps]), evaluate(function.denominator, field, [*x, eps])
         if P is None or value is None or value == 0:
             raise NoPoint("an integral or the tensor is 0 or infinite at a random point modulo a prime")
-        column = (P * field.column(slopes(function, field, [*x, eps], map_.dim))).entries()
+        column = (P * field.column(scaled_gradient(function, field, [*x, eps], map_.dim))).entries()
         values.append(int(value))
         fields.append([int(entry / (denominator * denominator)) for entry in column])
     return values, fields

@@ -141,17 +141,17 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
     """Return a basis of the skew K for which K f_y is a gradient with respect to the coordinates y of the quotient."""
     m, n = len(quotient.free), system.dim
     count_work(n**4 + 5 * n**3)
-    local = system.over(QQ)
+    over_Q = system.over(QQ)
     units = [[fmpq(int(i == k)) for i in range(n)] for k in range(n)]
     # K f'(x) must be symmetric. One random point first, since it leaves few forms; then the origin and each direction.
-    parts = [local.jacobian([fmpq(rng.randint(-99, 99)) for _ in range(n)]), local.B]
-    parts += [local.hessian_times(unit) for unit in units]
+    jacobians = [over_Q.jacobian([fmpq(rng.randint(-99, 99)) for _ in range(n)]), over_Q.B]
+    jacobians += [over_Q.hessian_times(unit) for unit in units]
     pairs = [(i, j) for i in range(m) for j in range(i + 1, m)]
     forms = [_skew(m, {pair: 1}) for pair in pairs]
-    for part in parts:
+    for jacobian in jacobians:
         if not forms:
             return ()
-        by_y = quotient.rows(part) * quotient.section
+        by_y = quotient.rows(jacobian) * quotient.section
         products = [K * by_y for K in forms]
         conditions = fmpq_mat([[P[i, j] - P[j, i] for P in products] for i, j in pairs])
         forms = [combination_of(vector, forms) for vector in nullspace(QQ, conditions)]
@@ -230,7 +230,10 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
 
 @dataclass(frozen=True, eq=False)
 class InheritedIntegrals:
-    """The result of `inherited_integrals`: the affine integrals in `quotient`, and the K with respect to y, `forms`."""
+    """The result of `inherited_integrals`.
+
+    `quotient` holds the affine integrals; `forms` are the K of the modified Hamiltonians, in the coordinates y.
+    """
 
     system: QuadraticSystem
     quotient: QuotientForms
@@ -240,8 +243,8 @@ class InheritedIntegrals:
     def text(self) -> str:
         """The numbers of integrals as a phrase; empty without any."""
         affine, modified = len(self.quotient.integrals), len(self.forms)
-        parts = [counted(affine, "affine integral")] if affine else []
-        return " and ".join([*parts, counted(modified, "modified Hamiltonian")] if modified else parts)
+        phrases = [counted(affine, "affine integral")] if affine else []
+        return " and ".join([*phrases, counted(modified, "modified Hamiltonian")] if modified else phrases)
 
     def gradients(self, map_: ModularMap, x: Point) -> list[list[int]]:
         """Return covectors with the same span as the gradients of all these integrals at a point.
@@ -288,8 +291,8 @@ class InheritedIntegrals:
     def modified(self, k: int, field: Field, eps: Any, x: tuple[Any, ...]) -> Any:
         """Evaluate the modified Hamiltonian of the k-th form at a point over a field."""
         H = self.hamiltonian(k)
-        slopes = [H.derivative(i) for i in range(self.system.dim)]
-        return modified(H, slopes, KahanFamily(self.system).at(eps, field), x)
+        gradient = [H.derivative(i) for i in range(self.system.dim)]
+        return modified(H, gradient, KahanFamily(self.system).at(eps, field), x)
 
 
 def inherited_integrals(system: QuadraticSystem, *, seed: int = 0) -> InheritedIntegrals:

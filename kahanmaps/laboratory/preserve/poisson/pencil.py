@@ -175,22 +175,22 @@ class _Reduced:
         x, y = self.ring.gens()
         forms = (modulo(f, self.field) for f in (integral.numerator, integral.denominator))
         at_eps = [f.compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
-        top, zero = int(max(f.total_degree() for f in at_eps)), self.ring.constant(0)
-        count_work(500 + 60 * top**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
+        degree, zero = int(max(f.total_degree() for f in at_eps)), self.ring.constant(0)
+        count_work(500 + 60 * degree**3)  # of factors, resultants and points, of a degree up to MAX_DEGREE
         X, Y, Z = (
-            [line**k for k in range(top + 1)]
+            [line**k for k in range(degree + 1)]
             for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
         )
-        P, Q = (sum((X[i] * Y[j] * Z[top - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
+        P, Q = (sum((X[i] * Y[j] * Z[degree - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in at_eps)
         curves: list[nmod_mpoly] = []  # each the component through a random point of the curve of the pencil through it
         for _ in range(3):
-            at = [self._random(), self._random()]
-            member = P * int(Q(*at)) - Q * int(P(*at))
+            point = [self._random(), self._random()]
+            member = P * int(Q(*point)) - Q * int(P(*point))
             _require(not member.is_zero())
-            through = [(C, e) for C, e in member.factor()[1] if not int(C(*at))]
-            _require(len(through) == 1 and through[0][1] == 1)
-            curves.append(through[0][0])
-            _require(any(int(curves[-1].derivative(k)(*at)) for k in range(2)))
+            through_point = [(C, e) for C, e in member.factor()[1] if not int(C(*point))]
+            _require(len(through_point) == 1 and through_point[0][1] == 1)
+            curves.append(through_point[0][0])
+            _require(any(int(curves[-1].derivative(k)(*point)) for k in range(2)))
         d = int(curves[0].total_degree())
         coefficients = [[int(C[i, j]) for i in range(d + 1) for j in range(d + 1 - i)] for C in curves]
         _require(all(C.total_degree() == d for C in curves) and nmod_mat(coefficients, self.prime).rank() == 2)
@@ -213,9 +213,9 @@ class _Reduced:
         for (i, _), c in C.resultant(D, "y").terms():
             eliminant[i] = int(c)
         _require(eliminant[-1] != 0)
-        for factor, number in nmod_poly(eliminant, self.prime).factor()[1]:
-            if number < 4:  # less than 2^2: a chain of simple points, each infinitely near to the preceding one
-                self._add_simple(int(factor.degree()), int(number), near=False)
+        for factor, intersection in nmod_poly(eliminant, self.prime).factor()[1]:
+            if intersection < 4:  # less than 2^2: a chain of simple points, each infinitely near to the preceding one
+                self._add_simple(int(factor.degree()), int(intersection), near=False)
                 continue
             K = fq_default_ctx(self.prime, int(factor.degree()))
             a = _root(K, [K(int(c)) for c in factor.coeffs()])
@@ -230,39 +230,39 @@ class _Reduced:
             _require(k > 0)
             b = -common[k - 1] / K(k)
             _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates there is one point for each a
-            most = int(number)
-            f, g = (  # F(x + a, y + b) without terms of a degree above `most`
+            max_intersection = int(intersection)
+            f, g = (  # F(x + a, y + b) without terms of a degree above the bound
                 _nonzero(
                     ((k, l), c * comb(i, k) * a ** (i - k) * comb(j, l) * b ** (j - l))
                     for (i, j), c in ((exponents, K(int(c))) for exponents, c in F.terms())
-                    for k in range(min(i, most) + 1)
-                    for l in range(min(j, most - k) + 1)
+                    for k in range(min(i, max_intersection) + 1)
+                    for l in range(min(j, max_intersection - k) + 1)
                 )
                 for F in (C, D)
             )
-            self._resolve(K, f, g, most, exact=True, near=False)
+            self._resolve(K, f, g, max_intersection, exact=True, near=False)
 
     def _add_simple(self, conjugates: int, chain: int, near: bool) -> None:
         self.points[1, near] += conjugates
         self.points[1, True] += conjugates * (chain - 1)
 
-    def _resolve(self, K: Any, f: _Local, g: _Local, most: int, *, exact: bool, near: bool) -> None:
+    def _resolve(self, K: Any, f: _Local, g: _Local, max_intersection: int, *, exact: bool, near: bool) -> None:
         """Count a point over K that two curves may share, and the points infinitely near to it.
 
-        The intersection number is at most `most`, or equal to it if `exact`: terms of a higher degree than that are not
-        needed.
+        The intersection number is at most `max_intersection`, or equal to it if `exact`: terms of a higher degree than
+        that are not needed.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())
-        m = min(map(sum, f), default=most + 1)
-        _require(m == min(map(sum, g), default=most + 1) and m * m <= most)
+        m = min(map(sum, f), default=max_intersection + 1)
+        _require(m == min(map(sum, g), default=max_intersection + 1) and m * m <= max_intersection)
         if m == 0:
             return
         if m == 1 and exact:
-            self._add_simple(K.degree(), most, near)
+            self._add_simple(K.degree(), max_intersection, near)
             return
         self.points[m, near] += K.degree()
-        if m * m == most:
+        if m * m == max_intersection:
             return
         shear = K(self._random())  # afterwards x = 0 is tangent to neither curve
         f, g = (  # F(x + s y, y)
@@ -277,8 +277,8 @@ class _Reduced:
             L = fq_default_ctx(self.prime, K.degree() * k)
             embedded = _embedding(K, L)
             slope = _root(L, [embedded(c) for c in direction.coeffs()])
-            bound = (most - m * m) // (k if len(directions) == 1 else 1)
-            above, beside = (  # F(x, x (y + slope))/x^m without terms of a degree above `bound`
+            bound = (max_intersection - m * m) // (k if len(directions) == 1 else 1)
+            f_blown_up, g_blown_up = (  # F(x, x (y + slope))/x^m without terms of a degree above `bound`
                 _nonzero(
                     ((i + j - m, k), c * comb(j, k) * slope ** (j - k))
                     for (i, j), c in ((exponents, embedded(c)) for exponents, c in F.items())
@@ -286,7 +286,7 @@ class _Reduced:
                 )
                 for F in (f, g)
             )
-            self._resolve(L, above, beside, bound, exact=exact and len(directions) == 1, near=True)
+            self._resolve(L, f_blown_up, g_blown_up, bound, exact=exact and len(directions) == 1, near=True)
 
 
 def _polynomial(K: Any, coefficients: list[Any]) -> Any:

@@ -45,7 +45,7 @@ from kahanmaps.laboratory.modular_points import (
     exponents_up_to,
     places_of,
     product_of,
-    slopes,
+    scaled_gradient,
 )
 from kahanmaps.laboratory.preserve.darboux.cofactors import CofactorProduct, Sample, cofactor_space, points_needed
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import DarbouxSpace
@@ -58,7 +58,7 @@ from kahanmaps.maps.kahan import SystemLike
 
 _MAX_UNKNOWNS = 2000
 _MAX_LOG_CANONICAL_DIM = 16  # up to this dimension all monomials of degree 4 in x and d are listed
-_SPARE = 8
+_SPARE_POINTS = 8  # beyond those that determine the unknowns
 _SHOWN_CHARACTERS = 2000  # of the brackets of one tensor
 _MAX_INTEGRALS = 12  # the number of integrals of which all subsets are tested for involution
 _MAX_PENCIL = 8  # tensors whose combinations are tested for the Jacobi identity
@@ -107,18 +107,18 @@ class FoundTensor(LatexDisplay, ResultPart):
     @property
     def statement(self) -> str:
         """The further properties of the tensor as a phrase: rank, Jacobi identity, Casimirs, involution."""
-        parts = [f"rank {self.rank}"]
+        phrases = [f"rank {self.rank}"]
         if self.jacobi.holds:
-            parts.append(f"a Poisson tensor ({self.jacobi})")
+            phrases.append(f"a Poisson tensor ({self.jacobi})")
         else:
-            parts.append("no Poisson tensor: the Jacobi identity fails")
+            phrases.append("no Poisson tensor: the Jacobi identity fails")
         if self.casimirs:
-            parts.append(f"{'a Casimir' if len(self.casimirs) == 1 else 'Casimirs'}: {', '.join(self.casimirs)}")
+            phrases.append(f"{'a Casimir' if len(self.casimirs) == 1 else 'Casimirs'}: {', '.join(self.casimirs)}")
         if self.involution is not None and self.involution.holds and len(self.in_involution) > 1:
-            parts.append(f"{', '.join(self.in_involution)} in involution ({self.involution})")
+            phrases.append(f"{', '.join(self.in_involution)} in involution ({self.involution})")
         if self.is_liouville_integrable:
-            parts.append("Liouville integrable")
-        return "; ".join(parts)
+            phrases.append("Liouville integrable")
+        return "; ".join(phrases)
 
     def latex(self) -> str:
         """Return the matrix in LaTeX."""
@@ -241,9 +241,9 @@ def find_poisson(
     if denominator is not None:
         context = ring(laboratory.map.names)  # with the symbols
         gens = (*context.gens()[:dim], context.gens()[-1])
-        parts = (denominator.numerator, denominator.denominator)
-        denominator = RationalFunction(*(part.compose(*gens, ctx=context) for part in parts))
-        if any(part.is_zero() for part in at_eps(denominator, laboratory.eps)):
+        polynomials = (denominator.numerator, denominator.denominator)
+        denominator = RationalFunction(*(polynomial.compose(*gens, ctx=context) for polynomial in polynomials))
+        if any(polynomial.is_zero() for polynomial in at_eps(denominator, laboratory.eps)):
             at = "" if laboratory.eps is None else f" at eps = {laboratory.eps}"
             raise InputError(
                 f"found the denominator {quoted(format_rational_function(denominator))}, which is identically 0 or "
@@ -260,27 +260,31 @@ def find_poisson(
         progress(f"tensors of degree up to {degree}")
         # The stages: all tensors; log-canonical ones; tensors over a density; verification; brackets.
         stages = budget.share([3, 1, 2, 2, 3])
-        forms, reason = _tensors(laboratory, degree, denominator, next(stages))
-        logarithmic, over_density = next(stages), next(stages)
-        if not forms and degree < 2 <= requested and dim <= _MAX_LOG_CANONICAL_DIM and denominator is None:
+        candidate_tensors, reason = _tensors(laboratory, degree, denominator, next(stages))
+        log_canonical_budget, density_budget = next(stages), next(stages)
+        if not candidate_tensors and degree < 2 <= requested and dim <= _MAX_LOG_CANONICAL_DIM and denominator is None:
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
-            forms, _ = _tensors(laboratory, 2, None, logarithmic, log_canonical(dim))
-        if not forms and denominator is None:
+            candidate_tensors, _ = _tensors(laboratory, 2, None, log_canonical_budget, log_canonical(dim))
+        if not candidate_tensors and denominator is None:
             # Try the product of the factors of a known density as denominator, and raise the degree by its degree.
             density = None
             with suppress(NoPoint):
-                density = products_of(laboratory, candidates(laboratory, laboratory.cofactors(), over_density)).density
+                density = products_of(
+                    laboratory, candidates(laboratory, laboratory.cofactors(), density_budget)
+                ).density
             factors = [g for g, _ in density.factors] if density is not None else []
-            higher = degree + sum(degree_in(g, dim) for g in factors)
-            if factors and pairs * comb(dim + higher, dim) <= _MAX_UNKNOWNS // 2:
+            higher_degree = degree + sum(degree_in(g, dim) for g in factors)
+            if factors and pairs * comb(dim + higher_degree, dim) <= _MAX_UNKNOWNS // 2:
                 psi = reduce(lambda a, b: a * b, factors)
                 density_denominator = RationalFunction(psi, psi.context().constant(1))
-                forms, _ = _tensors(laboratory, higher, density_denominator, over_density)
-                denominator = density_denominator if forms else None
-                addition = f", and none of degree at most {higher} over {format_rational_function(density_denominator)}"
-                reason = "" if forms else reason + addition
-        for k, tensor in enumerate(forms, 1):
-            progress(f"verifying tensor {k} of {len(forms)}")
+                candidate_tensors, _ = _tensors(laboratory, higher_degree, density_denominator, density_budget)
+                denominator = density_denominator if candidate_tensors else None
+                addition = (
+                    f", and none of degree at most {higher_degree} over {format_rational_function(density_denominator)}"
+                )
+                reason = "" if candidate_tensors else reason + addition
+        for k, tensor in enumerate(candidate_tensors, 1):
+            progress(f"verifying tensor {k} of {len(candidate_tensors)}")
             law = transformation_identity(laboratory.map, tensor, laboratory.eps)
             # In high dimension the law is too long to expand, so no budget is given to it.
             verdict, evidence = _verdict(laboratory, law, budget if dim <= MAX_DIMENSION else Budget(0))
@@ -291,7 +295,7 @@ def find_poisson(
             rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], laboratory.maps[0].prime)
             tensors.append(FoundTensor("P", tensor, verdict, evidence, jacobi, jacobi_evidence, rank_of_P))
             on_result(PoissonSearch(*laboratory.request, tuple(tensors), (), degree, denominator, None, UNFINISHED))
-        if len(tensors) < len(forms):
+        if len(tensors) < len(candidate_tensors):
             reason = "a tensor that was found modulo primes did not pass as an identity"
         # Poisson tensors first, then by descending rank.
         tensors.sort(key=lambda P: (not P.jacobi.holds, -P.rank))
@@ -349,9 +353,11 @@ def _tensors(
     while any(name.startswith(prefix) for name in variables):
         prefix += "_"
     names = (*variables, *(prefix + name for name in variables))  # x and the d_i
-    forms = laboratory.formulas([model], lambda map_: [tensor_space(map_, degree, denominator, support)], budget, names)
-    if forms.bases is None:
-        return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
+    closed_forms = laboratory.formulas(
+        [model], lambda map_: [tensor_space(map_, degree, denominator, support)], budget, names
+    )
+    if closed_forms.bases is None:
+        return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {closed_forms.reason}"
     # Leave out tensors in the span of the earlier ones and of products of a polynomial integral with a tensor.
     map_, n = laboratory.maps[0], len(variables)
     integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
@@ -363,15 +369,15 @@ def _tensors(
                 in_x_and_d[places[(*exponent, *[0] * n)]] = c
             products = (product_of(in_x_and_d, v, 2 * n, degree + 2, map_.prime) for v in model.basis)
             rows += [P for P in products if P is not None]
-    context, spanned, tensors = ring(laboratory.map.names), rank(rows, map_.prime), list[MatrixPoissonTensor]()
+    context, spanned_rank, tensors = ring(laboratory.map.names), rank(rows, map_.prime), list[MatrixPoissonTensor]()
     divisor, multiplier = context.constant(1), context.constant(1)
     if denominator is not None:
         divisor, multiplier = denominator.numerator, denominator.denominator
-    for vector, bivector in zip(model.basis, forms.bases[0], strict=True):
+    for vector, bivector in zip(model.basis, closed_forms.bases[0], strict=True):
         rows.append(vector)
-        if rank(rows, map_.prime) == spanned:
+        if rank(rows, map_.prime) == spanned_rank:
             continue
-        spanned += 1
+        spanned_rank += 1
         entries: dict[tuple[int, ...], dict[tuple[int, ...], Any]] = {}  # of sum P_ij d_i d_j
         for monomial, coefficient in bivector.terms():
             pair = tuple(k for k in range(n) if monomial[n + k])
@@ -401,13 +407,13 @@ def tensor_space(
     Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
-    number, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))
+    places, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))
     unknowns = []  # for each monomial x^a d_i d_j: its index, the index of the pair (i, j), and that of x^a
     for p, pair in enumerate(pairs):
         directions = tuple(int(k in pair) for k in range(n))
         for m, exponent in enumerate(exponents_up_to(n, degree)):
             if support is None or (*exponent, *directions) in support:
-                unknowns.append((number[(*exponent, *directions)], p, m))
+                unknowns.append((places[(*exponent, *directions)], p, m))
 
     def factor(x: Point) -> int:
         """Return the value of the denominator at a point, or 1. Raises NoPoint where its own denominator is 0."""
@@ -419,11 +425,11 @@ def tensor_space(
             raise NoPoint("the denominator of the tensor is infinite at a random point modulo a prime")
         return int(value)
 
-    by_pair = [sum(p == q for _, q, _ in unknowns) for p in range(len(pairs))]
+    unknowns_by_pair = [sum(p == q for _, q, _ in unknowns) for p in range(len(pairs))]
     rows = []
-    for x, image in map_.pairs(max(by_pair, default=0) + _SPARE):
+    for x, image in map_.pairs(max(unknowns_by_pair, default=0) + _SPARE_POINTS):
         J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
-        monomials, image_monomials = map_.moved(x, image, degree, (factor(image), factor(x)))
+        monomials, image_monomials = map_.monomials_at_both(x, image, degree, (factor(image), factor(x)))
         count(30 + 10 * n + len(pairs) * (len(pairs) + len(unknowns) / 5))
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
@@ -461,18 +467,20 @@ def _with_brackets(
 
     for integral, row in zip(integrals, rows, strict=True):
         add_casimir(integral.name, integral.function, row)
-    most = min(tensor.dim - found_tensor.rank, rank(rows, map_.prime))
-    if len(casimir_gradients.rows) < most and len(integrals) <= _MAX_INTEGRALS and not budget.is_spent:
+    max_casimirs = min(tensor.dim - found_tensor.rank, rank(rows, map_.prime))
+    if len(casimir_gradients.rows) < max_casimirs and len(integrals) <= _MAX_INTEGRALS and not budget.is_spent:
         for name, function in casimir_candidates(laboratory, tensor, integrals, budget):
             row = casimir_gradients.gradient(function)
-            if len(casimir_gradients.rows) < most and casimir_gradients.adds(row):
+            if len(casimir_gradients.rows) < max_casimirs and casimir_gradients.adds(row):
                 add_casimir(name, function, row)
     # The first largest set of integrals whose brackets with each other vanish at the point.
-    fields = [(P * field.column(row)).entries() for row in rows]
-    vanish = [[sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in fields] for row in rows]
+    hamiltonian_fields = [(P * field.column(row)).entries() for row in rows]
+    vanish = [
+        [sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in hamiltonian_fields] for row in rows
+    ]
     indices = range(min(len(rows), _MAX_INTEGRALS))
-    choices = (choice for size in range(len(indices), 0, -1) for choice in combinations(indices, size))
-    best = next((choice for choice in choices if all(vanish[i][j] for i, j in combinations(choice, 2))), ())
+    subsets = (subset for size in range(len(indices), 0, -1) for subset in combinations(indices, size))
+    best = next((subset for subset in subsets if all(vanish[i][j] for i, j in combinations(subset, 2))), ())
     chosen = [integrals[k] for k in best]
     involution = None
     if chosen:
@@ -498,7 +506,7 @@ def _brackets(
         if P is None:
             return None
         with field.working():
-            columns = [field.column(slopes(function, field, (*point, eps), n)) for function in functions]
+            columns = [field.column(scaled_gradient(function, field, (*point, eps), n)) for function in functions]
             brackets: list[Any] = []
             for k, column in enumerate(columns):
                 hamiltonian_field = P * column
@@ -516,19 +524,19 @@ def _brackets(
 def _pencil(tensors: Sequence[MatrixPoissonTensor]) -> MatrixPoissonTensor:
     """Return the sum of the tensors, each times a symbol of its own."""
     names = tensors[0].rows[0][0].names
-    letter = "c"
-    while any(name.startswith(letter) for name in names):
-        letter += "_"
-    context = ring((*names[:-1], *(f"{letter}{k}" for k in range(len(tensors))), names[-1]))
+    prefix = "c"
+    while any(name.startswith(prefix) for name in names):
+        prefix += "_"
+    context = ring((*names[:-1], *(f"{prefix}{k}" for k in range(len(tensors))), names[-1]))
     gens = context.gens()
-    old, symbols = (*gens[: len(names) - 1], gens[-1]), gens[len(names) - 1 : -1]
+    old_gens, symbols = (*gens[: len(names) - 1], gens[-1]), gens[len(names) - 1 : -1]
 
-    def total(entries: Iterable[RationalFunction]) -> RationalFunction:
+    def combination(entries: Iterable[RationalFunction]) -> RationalFunction:
         numerator, denominator = context.constant(0), context.constant(1)
         for symbol, entry in zip(symbols, entries, strict=True):
-            N, D = (part.compose(*old, ctx=context) for part in (entry.numerator, entry.denominator))
+            N, D = (part.compose(*old_gens, ctx=context) for part in (entry.numerator, entry.denominator))
             numerator, denominator = numerator * D + symbol * N * denominator, denominator * D
         return RationalFunction.reduced(numerator, denominator)
 
     n = tensors[0].dim
-    return MatrixPoissonTensor([[total(P.rows[i][j] for P in tensors) for j in range(n)] for i in range(n)])
+    return MatrixPoissonTensor([[combination(P.rows[i][j] for P in tensors) for j in range(n)] for i in range(n)])

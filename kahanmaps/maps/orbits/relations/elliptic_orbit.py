@@ -47,8 +47,8 @@ class TooLongRelation(Exception):
 def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSteps | None:
     """Search for elliptic curves that contain the orbit of `start`, and return its steps; None if none is found.
 
-    Only coefficients much shorter than `bits`, the length of the points, are of use. Raises TooLongRelation if they are
-    longer, and may be of use when the points are.
+    `bits` is the length of the points; only coefficients that are much shorter are of use. Raises TooLongRelation if
+    those of a curve are longer, but may be of use once the points have grown.
     """
     factors = map_over.factors
     period = next(  # the shortest initial sequence of factors of which all factors are a repetition
@@ -68,12 +68,12 @@ def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSte
             search = _Search(period, start_point, stride)
             try:
                 numbers = search.numbers(max_primes)
-                exact = None if numbers is None else _Exact(search, numbers)
+                exact_curves = None if numbers is None else _Exact(search, numbers)
             except ArithmeticError:
                 is_special = True
                 continue
-            if exact is not None and _is_proved(start_point, search, exact.steps(map_over)):
-                return exact.steps(map_over, skipped)
+            if exact_curves is not None and _is_proved(start_point, search, exact_curves.steps(map_over)):
+                return exact_curves.steps(map_over, skipped)
             if search.sections:  # there are curves, but their coefficients are too long
                 if max_primes < _MAX_PRIMES:
                     raise TooLongRelation

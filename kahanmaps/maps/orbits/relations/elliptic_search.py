@@ -83,19 +83,19 @@ def curve(points: Rows, prime: int, known_sections: Sections | None = None) -> C
     Raises ArithmeticError if the dimensions are those of a curve, but the sequences are not: then the prime or the
     initial point is special.
     """
-    tries = [known_sections] if known_sections else list(_tries(points, prime))
-    for sections in tries:
+    constructions = [known_sections] if known_sections else list(_constructions(points, prime))
+    for sections in constructions:
         values = _all_sections(points, sections, prime)
         with suppress(ZeroDivisionError):
             numbers = _numbers(points, sections, values, prime) if values else None
             if numbers is not None:
                 return Curve(sections, numbers)
-    if tries:
+    if constructions:
         raise ArithmeticError("sections are not as on an elliptic curve")
     return None
 
 
-def _tries(points: Rows, prime: int) -> Iterator[Sections]:
+def _constructions(points: Rows, prime: int) -> Iterator[Sections]:
     """Yield possible constructions of the sections; none if the products span too large a space for a curve."""
     coordinates = tuple(pivots(echelon(points[: len(points[0]) + _EXTRA_POINTS], prime)))
     for count, lag in product(_POINTS, _LAGS):

@@ -117,9 +117,9 @@ class Coordinates:
     def at(self, n: int) -> list[fmpz]:
         """Return numerators and denominator in lowest terms, for n >= 2. Raises ArithmeticError if the latter is 0."""
         W, U = self.W, self._U
-        ratio, part = U.mixed_quotient(n), W.own_quotient(n)
+        mixed, own = U.mixed_quotient(n), W.own_quotient(n)
         weights = primitive_integers(
-            tuple(g * ratio**k * part**j for g, (k, _, j) in zip(self._common, self._exponents, strict=True))
+            tuple(g * mixed**k * own**j for g, (k, _, j) in zip(self._common, self._exponents, strict=True))
         )
         first, second = U.integer(n), U.integer(n + 1) * W.integer(n - 1)
         term, (square, outer) = W.integer(n), W.pair(n)
