@@ -144,7 +144,7 @@ class OrbitInPlanes:
         """Return the first undefined step up to n; `value` is the n-th point, to be compared modulo a prime."""
         known_poles = [plane.pole for plane in self._planes if plane.pole is not None and plane.pole <= n]
         undecided_planes = [i for i, plane in enumerate(self._planes) if not plane.numbers_stay_short]
-        generator = random.Random()
+        generator = random.Random(f"first pole {n}")  # same primes on every machine: same work
         for _ in range(_PRIMES):
             poles: list[int] = []
             for i in undecided_planes:
