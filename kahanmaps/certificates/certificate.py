@@ -20,15 +20,13 @@ from kahanmaps.certificates.combinations import (
     changed_function,
     modified_hamiltonian,
 )
+from kahanmaps.certificates.darboux import conserved_function, darboux_polynomial, invariant_volume
 from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
     Claim,
     FalseClaim,
     MapData,
-    conserved_function,
-    darboux_polynomial,
     invariant_tensor,
-    invariant_volume,
     map_data,
     restricted,
 )
