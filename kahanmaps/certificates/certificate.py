@@ -134,7 +134,8 @@ def certificate(
     if claims is None:
         claims = [] if proved and not everything else [*known, *(searches if everything else ())]
         unwanted = {UNPROVED} | (set() if file.is_quadratic else {"symmetry"})
-        unwanted |= set() if everything and checker != "rocq" and not formulas.integrals else {ENTROPY}
+        has_integral = bool(formulas.integrals) or formulas.H is not None  # hence no positive entropy
+        unwanted |= {ENTROPY} if has_integral or checker == "rocq" or not everything else set()
         claims = [name for name in claims if name not in unwanted]
     skipped = []
     for name in claims:

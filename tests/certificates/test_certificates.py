@@ -328,8 +328,14 @@ def test_claims_about_one_map_share_its_equation_and_what_they_have_in_common():
     text = certificate(load("euler_top"), "rocq", ["F1", "F2", "volume", "density"])
     assert [text.count(f"\n{start}") for start in ("Module Map", "Lemma cramer1", "Definition cofactor :")] == [1, 1, 1]
     assert text.count("Lemma derivative_e1_1 :") == 1
-    (second,) = re.findall(r"Lemma num_image_2 : (\w+) x1_new", text)
-    assert second == "num_2"
+    assert re.findall(r"Lemma num_image_claim_2 : (\w+) x1_new", text) == ["num_claim_2"]
+
+
+def test_names_of_factors_and_of_later_claims_differ():
+    text = certificate(load("nahm_octahedral"), "rocq", everything=True)
+    names = re.findall(r"^(?:Definition|Lemma|Theorem) (\w+)", text[: text.index("End Map1.")], flags=re.MULTILINE)
+    assert {"num_2", "num_claim_2"} <= set(names)
+    assert len(names) == len(set(names))
 
 
 @given(st.integers(1, 50), st.integers(1, 50), st.integers(1, 50), st.integers(1, 20))
