@@ -18,7 +18,9 @@ inserted, and both sides are multiplied by a power of D.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from itertools import combinations
@@ -28,12 +30,40 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, degree_in, over_one_denominator, ring
+from kahanmaps.algebra.work import units_at
 from kahanmaps.errors import InputError
 
 Row = Sequence[fmpq_mpoly]
 MAX_DIMENSION = 6
 MAX_TERMS = 20_000  # of one side of an identity, multiplied out: some ten seconds for Coq
 MAX_PRODUCTS = 20_000_000  # of terms, to multiply one side out: some ten seconds for PARI
+
+
+_MULTIPLE: ContextVar[float] = ContextVar("multiple of the limits", default=1.0)
+
+
+@contextmanager
+def limited(effort: int) -> Iterator[None]:
+    """Limits for the identities of a certificate: doubled for each step of the effort above 1."""
+    token = _MULTIPLE.set(units_at(effort, 1.0))
+    try:
+        yield
+    finally:
+        _MULTIPLE.reset(token)
+
+
+def check_limits(terms: int, products: int = 0) -> None:
+    """Refuse a side of an identity that has so many terms, or takes so many products of terms.
+
+    Raises:
+        InputError: if these are too many.
+    """
+    for found, limit, what in (
+        (products, MAX_PRODUCTS, "take more than {} products of terms to multiply out"),
+        (terms, MAX_TERMS, "have more than {} terms when multiplied out"),
+    ):
+        if found > (most := round(limit * _MULTIPLE.get())):
+            raise InputError(f"the identities of the certificate {what.format(most)}; raise --effort")
 
 
 class FalseClaim(InputError):
@@ -313,8 +343,7 @@ def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmp
             while len(powers[k]) <= exponent:
                 powers[k].append(times(powers[k][-1], values[k]))
             products += len(term) * len(powers[k][exponent])
-            if products > MAX_PRODUCTS:
-                raise InputError(f"the identities take more than {MAX_PRODUCTS} products of terms to multiply out")
+            check_limits(0, products)
             term = times(term, powers[k][exponent])
         total += term
     return total
@@ -351,8 +380,5 @@ def quotient(product: fmpq_mpoly, factor: fmpq_mpoly) -> fmpq_mpoly | None:
 def times(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
     """The product. Raises InputError where it has too many terms."""
     product = left * right
-    if len(product) > MAX_TERMS:
-        raise InputError(
-            f"the identities of the certificate are too long: more than {MAX_TERMS} terms when multiplied out"
-        )
+    check_limits(len(product))
     return product

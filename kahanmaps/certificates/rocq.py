@@ -50,7 +50,7 @@ class _Script:
 
     def __init__(self, data: MapData) -> None:
         self.data, self.is_solved = data, False
-        self.letters = letters_of(data, r"[acd-hlmnprw]\d+")  # a11, e1, ... are the script's own
+        self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # a11, e1, ... are the script's own
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
         self.third = [self.letters[f"{name}2"] for name in data.new]
@@ -273,9 +273,12 @@ class _Script:
     def expand(self, *further: str) -> str:
         """Return the tactic that unfolds all definitions and proves an identity of polynomials."""
         n = self.data.dim
-        defined = ["det", *(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
+        defined = [*(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
         defined += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
-        return f"cbv delta [{' '.join((*further, *defined))}] beta; ring."
+        if not self.is_solved:
+            return f"cbv delta [{' '.join((*further, 'det', *defined))}] beta; ring."
+        first = f"cbv delta [{' '.join(further)}] beta; " if further else ""
+        return f"{first}rewrite ?det_value; cbv delta [{' '.join(('d', *defined))}] beta; ring."
 
     def map(self, is_solved: bool) -> list[str]:
         """The variables, the equation, and Cramer's rule where it is needed."""
@@ -296,7 +299,13 @@ class _Script:
         lines += [f"Definition det : R := {determinant_text(entries('m', n))}.", "Hypothesis regular : det <> 0."]
         if not is_solved:
             return lines
-        lines += ["", "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)"]
+        used = " ".join(["det", "d", *(name for row in entries("m", n) for name in row)])
+        lines += [
+            "",
+            f"Definition d : R := {self.text(data.determinant)}.",
+            f"Lemma det_value : det = d. Proof. cbv delta [{used}] beta; ring. Qed.",
+            "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)",
+        ]
         for i in range(n):
             lines += [f"Definition a{i + 1}{j + 1} : R := {self.text(data.adjugate[i][j])}." for j in range(n)]
             lines.append(f"Definition n{i + 1} : R := {self.text(data.numerators[i])}.")

@@ -366,6 +366,8 @@ class _Script:
             content = f"({self.text(product.content)})" + " * one" * (self.to is PYTHON)
             if product.is_single or not parts:
                 monomial = product.cofactor(power, len(fraction.letters)).text("D")
+                if parts and power >= product.degree:
+                    monomial = f"D^{power - product.degree}*{product.factors[0].cofactor.text('D')}"
                 if not parts:
                     self.define(name, content)
             else:
