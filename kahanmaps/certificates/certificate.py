@@ -20,15 +20,14 @@ from kahanmaps.certificates.combinations import (
     changed_function,
     modified_hamiltonian,
 )
+from kahanmaps.certificates.darboux import conserved_function, darboux_polynomial, invariant_volume
 from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
     Claim,
     FalseClaim,
     MapData,
-    conserved_function,
-    darboux_polynomial,
     invariant_tensor,
-    invariant_volume,
+    limited,
     map_data,
     restricted,
 )
@@ -74,6 +73,7 @@ def certificate(
     everything: bool = False,
     commute: SystemLike | None = None,
     period: int | None = None,
+    effort: int = 1,
     command: str = "",
 ) -> str:
     """Write a proof that another program checks: integrals, invariant volume forms and further claims, for every eps.
@@ -94,6 +94,7 @@ def certificate(
             commuting family this is written in coordinates in which the planes separate; "associates" stands for all
             pairs of rational associated systems.
         period: certify that this iterate of the map is the identity.
+        effort: the limit for the length of the identities; each increment by 1 doubles it.
         command: the command line that writes this script, for the comment on top.
 
     Returns:
@@ -110,60 +111,64 @@ def certificate(
     >>> print(certificate(load("harmonic"), "gp", ["E"]).splitlines()[-1])
     quit(!ok)
     """
-    file = as_file(system)
-    formulas, data = _prepared(file, checker)
-    planes, proved = _Planes(file, data), list[Claim]()
-    if commute is not None:
-        if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
-            raise InputError("a certificate that two maps commute cannot be combined with other claims")
-        proved = _commuting(file, data, commute)
-    if period is not None:
-        if integer(period, "period") < 1:
-            raise InputError(f"found period = {period}, expected a positive integer")
-        proved.append(periodic(data, integer(period, "period")))
-    if integrals is not None:
-        for name, f in claimed_functions(file, integrals).items():
-            proved += planes.claims(conserved_function, name, f)
-    if density is not None:
-        proved.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
-    if tensor is not None:
-        matrix = claimed_tensor(file, tensor)
-        assert matrix is not None
-        proved.append(invariant_tensor(data, "P", matrix.rows))
-    known = dict(_known_claims(formulas, planes))
-    searches = {name: search for name, search in _SEARCHES.items() if name not in known}
-    is_required = claims is not None
-    if claims is None:
-        claims = [] if proved and not everything else [*known, *(searches if everything else ())]
-        unwanted = {UNPROVED} | (set() if file.is_quadratic else {"symmetry"})
-        unwanted |= set() if everything and checker != "rocq" and not formulas.integrals else {ENTROPY}
-        claims = [name for name in claims if name not in unwanted]
-    skipped = []
-    for name in claims:
-        if name not in known and name not in searches:
-            expected = ", ".join([*known, *searches])
-            raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected one of {expected}")
-        try:
-            new = known[name]() if name in known else _claims_of(searches[name](file), data, planes)
-            if is_required and not new:
-                raise InputError(f"the search for {name!r} proves nothing about {file.name}: no certificate is written")
-            proved += [claim for claim in new if all(claim is not other for other in proved)]
-        except FalseClaim:
-            raise
-        except InputError as error:  # of all claims those that are short enough
-            if is_required:
+    with limited(effort):
+        file = as_file(system)
+        formulas, data = _prepared(file, checker)
+        planes, proved = _Planes(file, data), list[Claim]()
+        if commute is not None:
+            if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
+                raise InputError("a certificate that two maps commute cannot be combined with other claims")
+            proved = _commuting(file, data, commute)
+        if period is not None:
+            if integer(period, "period") < 1:
+                raise InputError(f"found period = {period}, expected a positive integer")
+            proved.append(periodic(data, integer(period, "period")))
+        if integrals is not None:
+            for name, f in claimed_functions(file, integrals).items():
+                proved += planes.claims(conserved_function, name, f)
+        if density is not None:
+            proved.append(invariant_volume(data, VOLUME, claimed_function(file, density)))
+        if tensor is not None:
+            matrix = claimed_tensor(file, tensor)
+            assert matrix is not None
+            proved.append(invariant_tensor(data, "P", matrix.rows))
+        known = dict(_known_claims(formulas, planes))
+        searches = {name: search for name, search in _SEARCHES.items() if name not in known}
+        is_required = claims is not None
+        if claims is None:
+            claims = [] if proved and not everything else [*known, *(searches if everything else ())]
+            unwanted = {UNPROVED} | (set() if file.is_quadratic else {"symmetry"})
+            has_integral = bool(formulas.integrals) or formulas.H is not None  # hence no positive entropy
+            unwanted |= {ENTROPY} if has_integral or checker == "rocq" or not everything else set()
+            claims = [name for name in claims if name not in unwanted]
+        skipped = []
+        for name in claims:
+            if name not in known and name not in searches:
+                expected = ", ".join([*known, *searches])
+                raise InputError(f"no claim {str(name)[:40]!r} of {file.name}: expected one of {expected}")
+            try:
+                new = known[name]() if name in known else _claims_of(searches[name](file), data, planes)
+                if is_required and not new:
+                    raise InputError(
+                        f"the search for {name!r} proves nothing about {file.name}: no certificate is written"
+                    )
+                proved += [claim for claim in new if all(claim is not other for other in proved)]
+            except FalseClaim:
                 raise
-            skipped.append(f"{name}: {error}")
-    if skipped and not proved:
-        raise InputError(f"no certificate of {file.name} can be written: {skipped[0]}")
-    if not proved:
-        raise InputError(
-            f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
-            f"or search with kahanmaps find-integrals {file.name} --toml"
+            except InputError as error:  # of all claims those that are short enough
+                if is_required:
+                    raise
+                skipped.append(f"{name}: {error}")
+        if skipped and not proved:
+            raise InputError(f"no certificate of {file.name} can be written: {skipped[0]}")
+        if not proved:
+            raise InputError(
+                f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
+                f"or search with kahanmaps find-integrals {file.name} --toml"
+            )
+        return CHECKERS[checker](
+            proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
         )
-    return CHECKERS[checker](
-        proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
-    )
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:

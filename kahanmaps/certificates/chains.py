@@ -15,7 +15,7 @@ from flint import fmpq_mpoly, nmod, nmod_mat
 
 from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.polynomials import common_denominator, ring
-from kahanmaps.certificates.identities import MAX_PRODUCTS, MAX_TERMS, EquationClaim, FalseClaim, MapData
+from kahanmaps.certificates.identities import EquationClaim, FalseClaim, MapData, check_limits
 from kahanmaps.errors import InputError
 
 MAX_PERIOD = 1000
@@ -164,8 +164,7 @@ def value_at(polynomial: fmpq_mpoly, point: RationalPoint, data: MapData) -> tup
             for _ in range(exponent):
                 products += len(term) * len(factor)
                 term *= factor
-                if len(term) > MAX_TERMS or products > MAX_PRODUCTS:
-                    raise InputError("the identities of the certificate are too long: a composition of the maps")
+                check_limits(len(term), products)
         total += term
     return total, powers
 

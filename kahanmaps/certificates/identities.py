@@ -18,9 +18,11 @@ inserted, and both sides are multiplied by a power of D.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import combinations
 from math import lcm
 
@@ -28,12 +30,40 @@ from flint import fmpq_mpoly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, degree_in, over_one_denominator, ring
+from kahanmaps.algebra.work import units_at
 from kahanmaps.errors import InputError
 
 Row = Sequence[fmpq_mpoly]
 MAX_DIMENSION = 6
 MAX_TERMS = 20_000  # of one side of an identity, multiplied out: some ten seconds for Coq
 MAX_PRODUCTS = 20_000_000  # of terms, to multiply one side out: some ten seconds for PARI
+
+
+_MULTIPLE: ContextVar[float] = ContextVar("multiple of the limits", default=1.0)
+
+
+@contextmanager
+def limited(effort: int) -> Iterator[None]:
+    """Limits for the identities of a certificate: doubled for each step of the effort above 1."""
+    token = _MULTIPLE.set(units_at(effort, 1.0))
+    try:
+        yield
+    finally:
+        _MULTIPLE.reset(token)
+
+
+def check_limits(terms: int, products: int = 0) -> None:
+    """Refuse a side of an identity that has so many terms, or takes so many products of terms.
+
+    Raises:
+        InputError: if these are too many.
+    """
+    for found, limit, what in (
+        (products, MAX_PRODUCTS, "take more than {} products of terms to multiply out"),
+        (terms, MAX_TERMS, "have more than {} terms when multiplied out"),
+    ):
+        if found > (most := round(limit * _MULTIPLE.get())):
+            raise InputError(f"the identities of the certificate {what.format(most)}; raise --effort")
 
 
 class FalseClaim(InputError):
@@ -122,7 +152,7 @@ class MapData:
         """Det M and det M times the solution of M y = right: (M | right) annihilates (y, -1)."""
         n = self.dim
         rows = [[*row[:-1], entry] for row, entry in zip(self.rows, right, strict=True)]
-        *minors, last = kernel_minors(rows, _times)
+        *minors, last = kernel_minors(rows, times)
         sign = -1 if n % 2 else 1  # the last of the signed minors is (-1)^n det M
         return [sign * last, *(-sign * minor for minor in minors)]
 
@@ -144,39 +174,6 @@ class EquationClaim(Claim):
     """A claim that follows from the equation of the map as a relation, which is not solved for x~."""
 
     is_free = True
-
-
-@dataclass(frozen=True)
-class ConservedFunction(Claim):
-    """F = P/Q with D^k P(N/D) = C P and D^k Q(N/D) = C Q; P, Q and C are polynomials over Z."""
-
-    numerator: fmpq_mpoly
-    denominator: fmpq_mpoly
-    degree: int
-    cofactor: fmpq_mpoly
-
-
-@dataclass(frozen=True)
-class DarbouxPolynomial(Claim):
-    """P of degree k with D^k P(N/D) = C P, polynomials over Z: P(x~) is P times the cofactor C/D^k."""
-
-    polynomial: fmpq_mpoly
-    degree: int
-    cofactor: fmpq_mpoly
-
-
-@dataclass(frozen=True)
-class InvariantVolume(Claim):
-    """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L.
-
-    `is_free`: the identity holds for any two points, also if x~ is not the image of x, as for Hamiltonian systems.
-    """
-
-    numerator: fmpq_mpoly
-    denominator: fmpq_mpoly
-    degree: int
-    is_free: bool
-    cofactors: tuple[fmpq_mpoly, fmpq_mpoly, int] | None = None  # C and B, j: of P and, times D^j, of Q, if there are
 
 
 @dataclass(frozen=True)
@@ -209,7 +206,7 @@ class InvariantTensor(Claim):
 def map_data(
     equation: Sequence[Sequence[fmpq_mpoly]], variables: Sequence[str], new: Sequence[str], names: Sequence[str]
 ) -> MapData:
-    """The map given by the rows of (M | r), over Z.
+    """The map given by the rows of (M | r), over Z and without common factors.
 
     Args:
         equation: n rows of n + 1 polynomials over Q in `names`.
@@ -224,8 +221,11 @@ def map_data(
     if n > MAX_DIMENSION:
         raise InputError(f"expected a map in at most {MAX_DIMENSION} variables for a certificate, got {n}")
     multiples = (lcm(*(int(common_denominator(entry)) for entry in row)) for row in equation)
-    rows = tuple(tuple(entry * multiple for entry in row) for row, multiple in zip(equation, multiples, strict=True))
-    return MapData(tuple(variables), tuple(new), tuple(names), rows)
+    rows = [[entry * multiple for entry in row] for row, multiple in zip(equation, multiples, strict=True)]
+    commons = [reduce(fmpq_mpoly.gcd, row) for row in rows]  # monic: the quotients are over Z again after the next line
+    primitive = (common * common_denominator(common) for common in commons)
+    divided = tuple(tuple(entry / c for entry in row) for row, c in zip(rows, primitive, strict=True))
+    return MapData(tuple(variables), tuple(new), tuple(names), divided)
 
 
 def restricted(data: MapData, function: RationalFunction) -> MapData:
@@ -247,73 +247,6 @@ def restricted(data: MapData, function: RationalFunction) -> MapData:
     images = [letters.get(name, context.constant(0)) for name in names]
     small = tuple(tuple(row[j].compose(*images, ctx=context) for j in (*kept, n)) for row in rows)
     return MapData(tuple(names[j] for j in kept), tuple(data.new[j] for j in kept), tuple(context.names()), small)
-
-
-def conserved_function(data: MapData, name: str, function: RationalFunction) -> ConservedFunction:
-    """The identities that prove that the map conserves the function.
-
-    Raises:
-        FalseClaim: if it does not.
-        InputError: if the identities have too many terms.
-    """
-    P, Q = coprime(function, data.names)
-    k = max(degree_in(P, data.dim), degree_in(Q, data.dim))
-    if k == 0:
-        raise InputError(f"{name} is a constant, which every map conserves: no certificate is written")
-    moved = [homogeneous_value(polynomial, k, data) for polynomial in (P, Q)]
-    cofactors = [_quotient(image, polynomial) for image, polynomial in zip(moved, (P, Q), strict=True)]
-    if not cofactors[0] or cofactors[0] != cofactors[1]:  # 0: the image of the map lies in Q = 0
-        raise FalseClaim(f"{name} is not conserved: no certificate can be written")
-    return ConservedFunction(name, data, P, Q, k, cofactors[0])
-
-
-def darboux_polynomial(data: MapData, name: str, function: RationalFunction) -> DarbouxPolynomial:
-    """The identity that proves that the function, a polynomial, is a Darboux polynomial of the map.
-
-    Raises:
-        FalseClaim: if it is none.
-        InputError: if the identity has too many terms.
-    """
-    P, _ = coprime(function, data.names)
-    k = degree_in(P, data.dim)
-    if k == 0:
-        raise InputError(f"{name} is a constant, expected a polynomial of positive degree: no certificate is written")
-    cofactor = _quotient(homogeneous_value(P, k, data), P)
-    if not cofactor:
-        raise FalseClaim(f"{name} is no Darboux polynomial: no certificate can be written")
-    return DarbouxPolynomial(name, data, P, k, cofactor)
-
-
-def invariant_volume(data: MapData, name: str, function: RationalFunction) -> InvariantVolume:
-    """The identity that proves that the map leaves the volume form dx/phi invariant, phi the function.
-
-    Raises:
-        FalseClaim: if it does not.
-        InputError: if the identity has too many terms.
-    """
-    P, Q = coprime(function, data.names)
-    n, k = data.dim, max(degree_in(P, data.dim), degree_in(Q, data.dim))
-    if not P:
-        raise InputError("found the density 0, expected another function: no certificate is written")
-    at_old, at_new = data.at_points(P, Q, data.determinant)
-    if _times(_times(at_new[0], at_old[1]), at_old[2]) == _times(
-        _times(at_old[0], at_new[1]), determinant(data.derivative)
-    ):
-        return InvariantVolume(name, data, P, Q, k, True)
-    values = [homogeneous_value(F, k, data) for F in (P, Q)]
-    C, C_Q = (_quotient(value, F) for value, F in zip(values, (P, Q), strict=True))
-    volume = determinant(_derivative_at_image(data))
-    if C and C_Q:
-        power, D = 0, data.determinant
-        while power <= n and (smaller := _quotient(C_Q, D)) is not None:
-            C_Q, power = smaller, power + 1
-        if _times(C, D ** (n + 1 - power)) == _times(C_Q, volume):
-            return InvariantVolume(name, data, P, Q, k, False, (C, C_Q, power))
-    left = _times(_times(values[0], Q), data.determinant ** (n + 1))
-    right = _times(_times(values[1], P), volume)
-    if left != right:
-        raise FalseClaim("dx/phi is not invariant: no certificate can be written")
-    return InvariantVolume(name, data, P, Q, k, False)
 
 
 def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalFunction]]) -> InvariantTensor:
@@ -339,7 +272,7 @@ def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalF
         total = context.constant(0)
         for i, j, l in (indices, (*indices[1:], indices[0]), (indices[2], *indices[:2])):
             for s in range(n):
-                total += _times(P[i][s], _times(P[j][l].derivative(s), Q) - _times(P[j][l], Q.derivative(s)))
+                total += times(P[i][s], times(P[j][l].derivative(s), Q) - times(P[j][l], Q.derivative(s)))
         if total:
             raise FalseClaim(f"{name} is no Poisson tensor: no certificate can be written")
     flat, new = data.at_points(*(entry for row in (*P, *data.rows) for entry in row), Q)
@@ -348,8 +281,8 @@ def invariant_tensor(data: MapData, name: str, rows: Sequence[Sequence[RationalF
     if _sandwich(data.derivative, at_old, new[-1]) == _sandwich(M, at_new, flat[-1]):
         return claim
     moved = [[homogeneous_value(entry, k, data) for entry in row] for row in P]
-    left = _sandwich(_derivative_at_image(data), P, homogeneous_value(Q, k, data))
-    if left != _sandwich([row[:-1] for row in data.rows], moved, _times(Q, data.determinant**2)):
+    left = _sandwich(derivative_at_image(data), P, homogeneous_value(Q, k, data))
+    if left != _sandwich([row[:-1] for row in data.rows], moved, times(Q, data.determinant**2)):
         raise FalseClaim(f"the map is not Poisson for {name}: no certificate can be written")
     return replace(claim, is_free=False)
 
@@ -358,12 +291,12 @@ def _sandwich(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fm
     """The entries above the diagonal of factor A P A^T."""
     n = len(P)
     zero = factor * 0
-    AP = [[sum((_times(row[k], P[k][j]) for k in range(n)), zero) for j in range(n)] for row in A]
+    AP = [[sum((times(row[k], P[k][j]) for k in range(n)), zero) for j in range(n)] for row in A]
     pairs = combinations(range(n), 2)
-    return [_times(factor, sum((_times(AP[i][k], A[j][k]) for k in range(n)), zero)) for i, j in pairs]
+    return [times(factor, sum((times(AP[i][k], A[j][k]) for k in range(n)), zero)) for i, j in pairs]
 
 
-def _derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
+def derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
     """D L(x, N/D), polynomials as L is of degree at most 1 in x~."""
     n, context = data.dim, ring(data.names)
 
@@ -379,7 +312,7 @@ def _derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
 
 def determinant(matrix: Sequence[Sequence[fmpq_mpoly]]) -> fmpq_mpoly:
     """The determinant of a square matrix of polynomials. Raises InputError where it has too many terms."""
-    *_, last = kernel_minors([[*row, row[0] * 0] for row in matrix], _times)
+    *_, last = kernel_minors([[*row, row[0] * 0] for row in matrix], times)
     signed: fmpq_mpoly = -last if len(matrix) % 2 else last  # the last of the signed minors
     return signed
 
@@ -408,11 +341,10 @@ def homogeneous_value(polynomial: fmpq_mpoly, degree: int, data: MapData) -> fmp
         term = context.from_dict({(0,) * n + exponents[n:]: coefficient})
         for k, exponent in enumerate((*map(int, exponents[:n]), degree - sum(map(int, exponents[:n])))):
             while len(powers[k]) <= exponent:
-                powers[k].append(_times(powers[k][-1], values[k]))
+                powers[k].append(times(powers[k][-1], values[k]))
             products += len(term) * len(powers[k][exponent])
-            if products > MAX_PRODUCTS:
-                raise InputError(f"the identities take more than {MAX_PRODUCTS} products of terms to multiply out")
-            term = _times(term, powers[k][exponent])
+            check_limits(0, products)
+            term = times(term, powers[k][exponent])
         total += term
     return total
 
@@ -439,16 +371,14 @@ def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mp
     return P * multiple, Q * multiple
 
 
-def _quotient(product: fmpq_mpoly, factor: fmpq_mpoly) -> fmpq_mpoly | None:
+def quotient(product: fmpq_mpoly, factor: fmpq_mpoly) -> fmpq_mpoly | None:
     """product/factor, or None where it is no polynomial."""
     quotient, remainder = divmod(product, factor)
     return None if remainder else quotient
 
 
-def _times(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
+def times(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
+    """The product. Raises InputError where it has too many terms."""
     product = left * right
-    if len(product) > MAX_TERMS:
-        raise InputError(
-            f"the identities of the certificate are too long: more than {MAX_TERMS} terms when multiplied out"
-        )
+    check_limits(len(product))
     return product

@@ -11,18 +11,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
 from kahanmaps.certificates.chains import Chain
 from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral
-from kahanmaps.certificates.identities import (
-    Claim,
+from kahanmaps.certificates.darboux import (
     ConservedFunction,
     DarbouxPolynomial,
+    DarbouxProducts,
+    InvariantVolume,
+    Monomial,
+)
+from kahanmaps.certificates.identities import (
+    Claim,
     EquationClaim,
     InvariantTensor,
-    InvariantVolume,
     MapData,
     homogeneous_value,
     letters_of,
@@ -46,7 +50,7 @@ class _Script:
 
     def __init__(self, data: MapData) -> None:
         self.data, self.is_solved = data, False
-        self.letters = letters_of(data, r"[ad-hlmnprw]\d+")  # a11, e1, ... are the script's own
+        self.letters = letters_of(data, r"d|[acd-hlmnprw]\d+")  # a11, e1, ... are the script's own
         self.old = [self.letters[name] for name in data.variables]
         self.new = [self.letters[name] for name in data.new]
         self.third = [self.letters[f"{name}2"] for name in data.new]
@@ -269,9 +273,12 @@ class _Script:
     def expand(self, *further: str) -> str:
         """Return the tactic that unfolds all definitions and proves an identity of polynomials."""
         n = self.data.dim
-        defined = ["det", *(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
+        defined = [*(name for k in "ma"[: 1 + self.is_solved] for row in entries(k, n) for name in row)]
         defined += [f"{k}{i + 1}" for k in "rn"[: 1 + self.is_solved] for i in range(n)]
-        return f"cbv delta [{' '.join((*further, *defined))}] beta; ring."
+        if not self.is_solved:
+            return f"cbv delta [{' '.join((*further, 'det', *defined))}] beta; ring."
+        first = f"cbv delta [{' '.join(further)}] beta; " if further else ""
+        return f"{first}rewrite ?det_value; cbv delta [{' '.join(('d', *defined))}] beta; ring."
 
     def map(self, is_solved: bool) -> list[str]:
         """The variables, the equation, and Cramer's rule where it is needed."""
@@ -292,7 +299,13 @@ class _Script:
         lines += [f"Definition det : R := {determinant_text(entries('m', n))}.", "Hypothesis regular : det <> 0."]
         if not is_solved:
             return lines
-        lines += ["", "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)"]
+        used = " ".join(["det", "d", *(name for row in entries("m", n) for name in row)])
+        lines += [
+            "",
+            f"Definition d : R := {self.text(data.determinant)}.",
+            f"Lemma det_value : det = d. Proof. cbv delta [{used}] beta; ring. Qed.",
+            "(* Cramer's rule: det x~ = N with N = a r, a the adjugate of M. *)",
+        ]
         for i in range(n):
             lines += [f"Definition a{i + 1}{j + 1} : R := {self.text(data.adjugate[i][j])}." for j in range(n)]
             lines.append(f"Definition n{i + 1} : R := {self.text(data.numerators[i])}.")
@@ -329,38 +342,69 @@ class _Script:
             "Qed.",
         ]
 
+    def products(self, fraction: DarbouxProducts, *named: tuple[str, str]) -> list[str]:
+        """The functions with these names, and the lemmas that the map multiplies them by their cofactors.
+
+        `named` are the names of each product and of its cofactor.
+        """
+        old, new, k = self.x, self.y, fraction.degree
+        lines = [f"Definition c{j} : R := {self.text(c)}." for j, c in enumerate(fraction.letters, 1)]
+        for (label, letter), product, total in zip(named, fraction.products, fraction.cofactors, strict=True):
+            is_single = product.is_single and product.degree == k
+            names = [label if is_single else f"{label}_{i}" for i in range(1, len(product.factors) + 1)]
+            definition = f"Definition {letter} : R := {_monomial_text(total)}."
+            lines += [] if definition in lines else [definition]
+            for name, factor in zip(names, product.factors, strict=True):
+                lines += self.functions(old, **{name: factor.polynomial})
+                value = letter if is_single else f"({_monomial_text(factor.cofactor)})"
+                used = [f"c{j}" for j, power in enumerate(factor.cofactor.powers[1:], 1) if power]
+                used += [letter] if is_single else []
+                lines += self.moved(name, factor.polynomial, factor.degree, f"{value} * {name} {old}", *used)
+            if is_single:
+                continue
+            content = [] if product.content == 1 and names else [f"({self.text(product.content)})"]
+            factors = list(zip(names, product.factors, strict=True))
+            text = " * ".join(content + [f"{name} {old}" + _power(factor.exponent) for name, factor in factors])
+            scaled = [f"({name} {new} * det ^ {f.degree})" + _power(f.exponent) for name, f in factors]
+            scaled = " * ".join([*content, *scaled, f"det ^ {k - product.degree}"])
+            images = "".join(f"?{name}_image, " for name in names)[:-2]
+            lines += [
+                f"Definition {label} ({old} : R) : R := {text}.",
+                f"Lemma {label}_image : {label} {new} * det ^ {k} = {letter} * {label} {old}.",
+                "Proof.",
+                f"  transitivity ({scaled}); [unfold {label}; ring |].",
+                f"  {f'rewrite {images}. ' if images else ''}unfold {label}, {letter}. ring.",
+                "Qed.",
+            ]
+        return lines
+
     def conserved(self, claim: ConservedFunction, theorem: str) -> list[str]:
         """The theorem that the function has the same value at x and x~."""
-        old, new = self.x, self.y
+        old, new, k = self.x, self.y, claim.fraction.degree
         lines = [
             "(* num / den is an integral; cofactor is that of num and den as Darboux polynomials. *)",
-            *self.functions(old, num=claim.numerator, den=claim.denominator),
-            f"Definition cofactor : R := {self.text(claim.cofactor)}.",
-            *self.moved("num", claim.numerator, claim.degree, f"cofactor * num {old}", "cofactor"),
-            *self.moved("den", claim.denominator, claim.degree, f"cofactor * den {old}", "cofactor"),
+            *self.products(claim.fraction, ("num", "cofactor"), ("den", "cofactor")),
             f"Theorem {theorem} :",
             f"  den {old} <> 0 -> den {new} <> 0 ->",
             f"  num {new} / den {new} = num {old} / den {old}.",
             "Proof.",
             "  intros Hx Hy. apply equal_fractions; [assumption | assumption |].",
-            f"  apply (Rmult_eq_reg_r (det ^ {claim.degree})); [| apply pow_nonzero; exact regular].",
-            f"  transitivity (num {new} * det ^ {claim.degree} * den {old}); [ring |]. rewrite num_image.",
-            f"  transitivity (num {old} * (den {new} * det ^ {claim.degree})); [rewrite den_image; ring | ring].",
+            f"  apply (Rmult_eq_reg_r (det ^ {k})); [| apply pow_nonzero; exact regular].",
+            f"  transitivity (num {new} * det ^ {k} * den {old}); [ring |]. rewrite num_image.",
+            f"  transitivity (num {old} * (den {new} * det ^ {k})); [rewrite den_image; ring | ring].",
             "Qed.",
         ]
         return lines
 
     def darboux(self, claim: DarbouxPolynomial, theorem: str) -> list[str]:
         """The theorem that P(x~) is P(x) times the cofactor."""
-        old, new = self.x, self.y
+        old, new, k = self.x, self.y, claim.product.degree
         return [
             "(* A Darboux polynomial, with its cofactor over a power of det. *)",
-            *self.functions(old, num=claim.polynomial),
-            f"Definition cofactor : R := {self.text(claim.cofactor)}.",
-            *self.moved("num", claim.polynomial, claim.degree, f"cofactor * num {old}", "cofactor"),
-            f"Theorem {theorem} : num {new} = cofactor / det ^ {claim.degree} * num {old}.",
+            *self.products(claim.product, ("num", "cofactor")),
+            f"Theorem {theorem} : num {new} = cofactor / det ^ {k} * num {old}.",
             "Proof.",
-            f"  apply (Rmult_eq_reg_r (det ^ {claim.degree})); [| apply pow_nonzero; exact regular].",
+            f"  apply (Rmult_eq_reg_r (det ^ {k})); [| apply pow_nonzero; exact regular].",
             "  rewrite num_image. field. exact regular.",
             "Qed.",
         ]
@@ -485,7 +529,6 @@ class _Script:
         lines += [
             f"Definition volume : R := {determinant_text(entries('l', n))}.  (* det L *)",
             "(* dx/phi with phi = num / den is invariant: phi(x~) = phi(x) det(M^-1 L). *)",
-            *self.functions(old, num=claim.numerator, den=claim.denominator),
         ]
         statement = [
             f"Theorem {theorem} :",
@@ -500,28 +543,29 @@ class _Script:
         ]
         if claim.is_free:
             further = f"num den volume {flat}"
+            lines += self.functions(old, num=claim.numerator, den=claim.denominator)
             return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {self.expand(further)}", "Qed."]
-        for k, (label, polynomial) in enumerate((("num", claim.numerator), ("den", claim.denominator))):
-            if claim.cofactors is None:
-                image = homogeneous_value(polynomial, power, self.data)
-                lines += self.moved(label, polynomial, power, self.text(image))
-            else:
-                text = self.text(claim.cofactors[0] if k == 0 else claim.cofactors[1])
-                text = f"({text}) * det ^ {claim.cofactors[2]}" if label == "den" else text
-                lines.append(f"Definition cofactor_{label} : R := {text}.")
-                lines += self.moved(label, polynomial, power, f"cofactor_{label} * {label} {old}", f"cofactor_{label}")
+        if claim.fraction is not None:
+            lines += self.products(claim.fraction, ("num", "cofactor_num"), ("den", "cofactor_den"))
+        else:
+            for label, polynomial in (("num", claim.numerator), ("den", claim.denominator)):
+                lines += self.functions(old, **{label: polynomial})
+                lines += self.moved(
+                    label, polynomial, power, self.text(homogeneous_value(polynomial, power, self.data))
+                )
         # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
         scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
         last = [f"  rewrite num_image, den_image, volume_scaled, {self.cramer}.", f"  {self.expand('num', 'den')}"]
         balance = list[str]()
-        if claim.cofactors is not None:
-            j, b = claim.cofactors[2], self.text(claim.cofactors[1])
+        if claim.fraction is not None:
+            common, left, right = map(_monomial_text, claim.balance)
+            used = [f"c{j}" for j in range(1, len(claim.fraction.letters) + 1)]
             balance = [
-                f"Lemma shorter : cofactor_num * det ^ {n + 1 - j} = ({b}) * (volume * det ^ {n}).",
-                f"Proof. rewrite volume_scaled, {self.cramer}. {self.expand('cofactor_num')} Qed.",
+                f"Lemma shorter : {left} = {right} * (volume * det ^ {n}).",
+                f"Proof. rewrite volume_scaled, {self.cramer}. {self.expand(*used)} Qed.",
                 f"Lemma balance : cofactor_num * (det * det ^ {n}) = cofactor_den * (volume * det ^ {n}).",
                 "Proof.",
-                f"  transitivity (cofactor_num * det ^ {n + 1 - j} * det ^ {j}); [ring |].",
+                f"  transitivity ({common} * ({left})); [unfold cofactor_num; ring |].",
                 "  rewrite shorter. unfold cofactor_den. ring.",
                 "Qed.",
             ]
@@ -574,7 +618,7 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
             prove, ending = _PROOFS[type(claim)]
             name = re.sub(r"[^A-Za-z0-9_]", "_", claim.name)
             theorem = f"{name if re.match('[A-Za-z]', name) else f'v_{name}'}_{ending}"
-            proof = _not_yet_known(prove(script, claim, theorem), known, f"_{k}")
+            proof = _not_yet_known(prove(script, claim, theorem), known, f"_claim_{k}")
             theorems += [f"Map{m}.{line.split()[1]}" for line in proof if line.startswith("Theorem ")]
             lines += [*proof, ""]
         lines += ["End Map.", f"End Map{m}.", ""]
@@ -622,6 +666,14 @@ def _not_yet_known(lines: Sequence[str], known: dict[str, str], ending: str) -> 
     return result
 
 
+def _monomial_text(monomial: Monomial) -> str:
+    return monomial.text("det", " * ", " ^ ")
+
+
+def _power(exponent: int) -> str:
+    return "" if exponent == 1 else f" ^ {exponent}"
+
+
 def entries(letter: str, n: int) -> list[list[str]]:
     """The names of the entries of a square matrix."""
     return [[f"{letter}{i + 1}{j + 1}" for j in range(n)] for i in range(n)]
@@ -660,11 +712,20 @@ def determinant_text(entries: Sequence[Sequence[str]]) -> str:
 def _homogeneous_text(
     polynomial: fmpq_mpoly, letters: Sequence[str], degree: int, image: slice, det: str = "det ^ {}"
 ) -> str:
-    """det^degree P with (det x~)/det for x~: in the slice `image`, `letters` holds det x~, or N."""
-    pieces = []
+    """det^degree P with (det x~)/det for x~: in the slice `image`, `letters` holds det x~, or N.
+
+    Terms with the same powers of x~ are collected, so that `ring` computes each product of powers of N once.
+    """
+    terms: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
     for exponents, coefficient in polynomial.terms():
-        spare = degree - sum(map(int, exponents[image]))
-        factors = [*powers_text(letters, exponents), *([det.format(spare)] if spare else [])]
+        powers, rest = tuple(map(int, exponents[image])), list(exponents)
+        rest[image] = [0] * len(powers)
+        terms.setdefault(powers, {})[tuple(rest)] = coefficient
+    pieces = []
+    for powers, coefficients in terms.items():
+        spare = degree - sum(powers)
+        factors = [*powers_text(letters[image], powers), *([det.format(spare)] if spare else [])]
+        coefficient = polynomial_text(polynomial.context().from_dict(coefficients), letters)
         pieces.append(" * ".join([f"({coefficient})", *factors]))
     return " + ".join(pieces) or "0"
 

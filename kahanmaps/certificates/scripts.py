@@ -18,13 +18,16 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.certificates.chains import Chain
 from kahanmaps.certificates.combinations import AffineSymmetry, ChangedFunction, OrbitIntegral
+from kahanmaps.certificates.darboux import (
+    ConservedFunction,
+    DarbouxPolynomial,
+    DarbouxProducts,
+    InvariantVolume,
+)
 from kahanmaps.certificates.entropy import EPS, LINE, PRIME, PositiveEntropy, homogenizing
 from kahanmaps.certificates.identities import (
     Claim,
-    ConservedFunction,
-    DarbouxPolynomial,
     InvariantTensor,
-    InvariantVolume,
     MapData,
     letters_of,
 )
@@ -57,6 +60,8 @@ image(G, k, letters) = {  \\\\ D^k G, with N/D for the letters, in which G has a
   if(poldegree(H, tt) > k, error("degree"));
   sum(j = 0, k, D^(k-j)*substvec(polcoef(H, j, tt), letters, N));
 }""",
+    "monomial": "monomial(v, e) = prod(i = 1, #e, v[i]^e[i]);",
+    "total": "total(v, e) = sum(i = 1, #e, v[i]*e[i]);",
     "images": "images(A, k, letters) = matrix(#A, #A, i, j, image(A[i,j], k, letters));",
     "line_degree": """\
 line_degree(F, steps, p, residue, start, slope) = {  \\\\ of the image of start + t*slope modulo p, at eps = residue
@@ -145,6 +150,12 @@ def image(G, k, letters):  # D^k G, with N/D for the letters, in which G has a d
         factors = [value**e for value, e in zip((*N, D), (*powers, k - sum(powers)))]
         total += prod(factors, start=R({tuple(rest): coefficient}))
     return total""",
+    "monomial": """\
+def monomial(v, e):
+    return prod((a**k for a, k in zip(v, e)), start=R.one)""",
+    "total": """\
+def total(v, e):
+    return sum(a * k for a, k in zip(v, e))""",
     "images": """\
 def images(A, k, letters):
     return [[image(a, k, letters) for a in row] for row in A]""",
@@ -213,7 +224,7 @@ class _Script:
     def __init__(self, to: Language, data: MapData) -> None:
         self.to, self.data, self.lines = to, data, list[str]()
         self.has_points = self.has_equation = self.is_solved = False
-        self.letters = letters_of(data, "[hijknpqrst]") | {homogenizing(data.names): "h"}
+        self.letters = letters_of(data, r"[hijknpqrst]|c\d+") | {homogenizing(data.names): "h"}
 
     def text(self, polynomial: fmpq_mpoly) -> str:
         """The polynomial; a long sum in parts, as Python reads no expression that is nested a thousand times."""
@@ -327,17 +338,47 @@ class _Script:
 
     @prove.register
     def conserved(self, claim: ConservedFunction, label: str) -> None:
-        self.fraction(claim)
-        self.polynomial("C", claim.cofactor)
-        self.check(f"{label}: C is not 0", "C != 0")
-        for name in "PQ":
-            self.check(f"{label}: D^k {name}(N/D) = C {name}", f"image({name}, {claim.degree}, old) == C*{name}")
+        k = claim.fraction.degree
+        left, right = self.products(claim.fraction, label, "PQ", [k, k])
+        self.check(f"{label}: Q is not 0", "Q != 0")
+        says = f"{label}: D^{k} P(N/D) = C P and D^{k} Q(N/D) = C Q with the same C, not 0"
+        self.check(says, f"{left} == {right} && {left} != 0")
 
     @prove.register
     def darboux(self, claim: DarbouxPolynomial, label: str) -> None:
-        self.polynomial("P", claim.polynomial)
-        self.polynomial("C", claim.cofactor)
-        self.check(f"{label}: D^k P(N/D) = C P", f"image(P, {claim.degree}, old) == C*P")
+        self.products(claim.product, label, "P", [0])
+
+    def products(self, fraction: DarbouxProducts, label: str, names: str, powers: Sequence[int]) -> list[str]:
+        """Each product with its identities, factor by factor; returns D^power P(N/D)/P for these powers.
+
+        The exponents of a product are stated once, so that what is checked depends on them.
+        """
+        for j, letter in enumerate(fraction.letters, 1):
+            self.polynomial(f"c{j}", letter)
+        cofactors = []
+        for name, product, power in zip(names, fraction.products, powers, strict=True):
+            parts = [name if product.is_single else f"{name}{i}" for i in range(1, len(product.factors) + 1)]
+            for part, factor in zip(parts, product.factors, strict=True):
+                monomial = factor.cofactor.text("D")
+                self.polynomial(part, factor.polynomial)
+                says = f"{label}: D^{factor.degree} {part}(N/D) = {monomial} {part}"
+                self.check(says, f"image({part}, {factor.degree}, old) == {monomial}*{part}")
+            content = f"({self.text(product.content)})" + " * one" * (self.to is PYTHON)
+            if product.is_single or not parts:
+                monomial = product.cofactor(power, len(fraction.letters)).text("D")
+                if parts and power >= product.degree:
+                    monomial = f"D^{power - product.degree}*{product.factors[0].cofactor.text('D')}"
+                if not parts:
+                    self.define(name, content)
+            else:
+                self.define(f"e{name}", f"[{', '.join(str(factor.exponent) for factor in product.factors)}]")
+                content = "" if product.content == 1 else f"{content}*"
+                self.define(name, f"{content}monomial([{', '.join(parts)}], e{name})")
+                gains = [factor.cofactor.powers[0] - factor.degree for factor in product.factors]
+                rests = ", ".join(factor.cofactor.text("") for factor in product.factors)
+                monomial = f"D^({power} + total({gains}, e{name}))*monomial([{rests}], e{name})"
+            cofactors.append(monomial)
+        return cofactors
 
     def derivative(self, label: str) -> None:
         """L, the derivative of r - M x~ in x at fixed x~; that of the map is M^-1 L."""
@@ -346,7 +387,13 @@ class _Script:
 
     @prove.register
     def volume(self, claim: InvariantVolume, label: str) -> None:
-        self.fraction(claim)
+        if claim.fraction is None:
+            self.fraction(claim)
+        else:
+            k = claim.fraction.degree
+            shared = claim.balance[0].powers[0]
+            left, right = self.products(claim.fraction, label, "PQ", [k + self.data.dim + 1 - shared, k - shared])
+            self.check("Q is not 0", "Q != 0")
         self.derivative(label)
         says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
         if claim.is_free:
@@ -354,15 +401,10 @@ class _Script:
             self.check(f"{says} for any x and x~", identity)
             return
         self.check("D = det M", "D == det(M)")
-        k = claim.degree
-        if claim.cofactors is not None:  # P(x~)/P(x) = C/D^k and Q(x~)/Q(x) = B D^j/D^k
-            *cofactors, j = claim.cofactors
-            for letter, name, power, cofactor in zip("CB", "PQ", ("", f"*D^{j}"), cofactors, strict=True):
-                self.polynomial(letter, cofactor)
-                identity = f"{letter} != 0 && image({name}, {k}, old) == {letter}{power}*{name}"
-                self.check(f"{label}: D^k {name}(N/D) = {letter}{power} {name}", identity)
-            self.check(f"{says} at x~ = N/D", f"C*D^(n + 1 - {j}) == B*det(images(L, 1, new))")
+        if claim.fraction is not None:
+            self.check(f"{says} at x~ = N/D", f"{left} == {right}*det(images(L, 1, new))")
             return
+        k = claim.degree
         identity = f"image(P, {k}, old)*Q*D^(n + 1) == P*image(Q, {k}, old)*det(images(L, 1, new))"
         self.check(f"{says} at x~ = N/D", identity)
 
@@ -459,7 +501,7 @@ class _Script:
         text = f"{value.numerator}, {value.denominator}"
         return text.replace(", ", "/") if self.to is GP else f"QQ({text})"
 
-    def fraction(self, claim: ConservedFunction | InvariantVolume | OrbitIntegral) -> None:
+    def fraction(self, claim: InvariantVolume | OrbitIntegral) -> None:
         """The numerator P and the denominator Q."""
         self.polynomial("P", claim.numerator)
         self.polynomial("Q", claim.denominator)

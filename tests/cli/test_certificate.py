@@ -30,6 +30,14 @@ def test_a_certificate_goes_to_a_file(kahanmaps, tmp_path):
     assert kahanmaps("certificate euler_top --for rocq --claim F1 -q -o", path).err == ""
 
 
+def test_a_claim_that_is_too_long_says_what_to_raise(kahanmaps):
+    outcome = kahanmaps("certificate repaired_icosahedral --for gp --claim F --effort -4")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "have more than 625 terms when multiplied out; raise --effort" in outcome.err
+    first = kahanmaps("certificate lyness --for gp --claim I --effort 2").out
+    assert "--claim I --effort 2" in first
+
+
 def test_a_system_of_which_nothing_is_known_is_refused_with_what_to_type(kahanmaps):
     outcome = kahanmaps("certificate lorenz --for gp")
     assert outcome.status == 2

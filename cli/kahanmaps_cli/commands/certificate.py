@@ -39,6 +39,14 @@ _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certifica
     "associated systems of a member.",
 )
 @click.option("--period", type=Whole(1), metavar="N", help="Certify that the N-th iterate of the map is the identity.")
+@click.option(
+    "--effort",
+    type=click.IntRange(lib.LEAST_EFFORT, lib.MOST_EFFORT),
+    metavar="E",
+    default=1,
+    show_default=True,
+    help="Limit for the length of the identities: each increment by 1 doubles it.",
+)
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @quiet_option
 def command(system: str | None, checker: str, output: str | None, quiet: bool, **options: Any) -> int:
@@ -76,6 +84,7 @@ def command(system: str | None, checker: str, output: str | None, quiet: bool, *
     words += ["--for", checker, *(word for name in options["claims"] for word in ("--claim", name))]
     words += [word for key in ("commute", "period") if options[key] for word in (f"--{key}", str(options[key]))]
     words += ["--all"] if options["everything"] else []
+    words += ["--effort", str(options["effort"])] if options["effort"] != 1 else []
     words += [word for name, text in integrals.items() for word in ("--integral", f"{name}={text}")]
     try:
         everything, command_line = options["everything"], as_typed(words)
@@ -87,6 +96,7 @@ def command(system: str | None, checker: str, output: str | None, quiet: bool, *
             everything=everything,
             commute=other,
             period=options["period"],
+            effort=options["effort"],
             command=command_line,
         )
     except lib.FalseClaim as error:

@@ -1,0 +1,306 @@
+"""Darboux polynomials in factored form, with cofactors in factored form, so that no large product is multiplied out.
+
+P is a Darboux polynomial of degree k if D^k P(N/D) = C P. If P is a product of Darboux polynomials P_i, C is that of
+their cofactors C_i and a power of D; and the C_i often share their factors c_1, c_2, ... So the identities that are
+multiplied out are D^(k_i) P_i(N/D) = C_i P_i, and all others are equal as monomials in D and the c_j.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import gcd, prod
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in
+from kahanmaps.certificates.identities import (
+    Claim,
+    FalseClaim,
+    MapData,
+    coprime,
+    derivative_at_image,
+    determinant,
+    homogeneous_value,
+    quotient,
+    times,
+)
+from kahanmaps.errors import InputError
+
+_MAX_FACTORED_TERMS = 3000  # of a cofactor: longer ones are left as they are
+_MAX_SPARE = 3  # further powers of D
+
+
+@dataclass(frozen=True)
+class Monomial:
+    """A multiple of a product of powers of D, c_1, c_2, ..."""
+
+    constant: int
+    powers: tuple[int, ...]
+
+    def __mul__(self, other: Monomial) -> Monomial:
+        return Monomial(self.constant * other.constant, tuple(map(sum, zip(self.powers, other.powers, strict=True))))
+
+    def __pow__(self, exponent: int) -> Monomial:
+        return Monomial(self.constant**exponent, tuple(exponent * power for power in self.powers))
+
+    def without(self, common: Sequence[int]) -> Monomial:
+        """The quotient by these powers."""
+        return Monomial(self.constant, tuple(a - b for a, b in zip(self.powers, common, strict=True)))
+
+    def at(self, values: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
+        """The polynomial, D, c_1, ... being the values. Raises InputError where it has too many terms."""
+        total = values[0] ** 0 * self.constant
+        for value, power in zip(values, self.powers, strict=True):
+            for _ in range(power):
+                total = times(total, value)
+        return total
+
+    def text(self, D: str, multiply: str = "*", power: str = "^") -> str:
+        """The monomial, with this letter for D, or without powers of D if the letter is empty."""
+        names = [D, *(f"c{j}" for j in range(1, len(self.powers)))]
+        pairs = [(name, k) for name, k in zip(names, self.powers, strict=True) if name and k]
+        factors = [name if k == 1 else f"{name}{power}{k}" for name, k in pairs]
+        constant = [str(self.constant) if self.constant > 0 else f"({self.constant})"]
+        return multiply.join(factors if self.constant == 1 and factors else constant + factors)
+
+
+@dataclass(frozen=True)
+class DarbouxFactor:
+    """P with D^k P(N/D) = C P, polynomials over Z, and its exponent in a product.
+
+    k is `degree`, that of P in the variables, or larger where P has a factor of D.
+    """
+
+    polynomial: fmpq_mpoly
+    degree: int
+    exponent: int
+    cofactor: Monomial
+
+
+@dataclass(frozen=True)
+class DarbouxProduct:
+    """A product of Darboux polynomials, and of `content`, a polynomial over Z without the variables."""
+
+    content: fmpq_mpoly
+    factors: tuple[DarbouxFactor, ...]
+
+    @cached_property
+    def polynomial(self) -> fmpq_mpoly:
+        """The product, multiplied out."""
+        return prod((factor.polynomial**factor.exponent for factor in self.factors), start=self.content)
+
+    @property
+    def is_single(self) -> bool:
+        """Whether it is written as one polynomial."""
+        return self.content == 1 and [factor.exponent for factor in self.factors] == [1]
+
+    @property
+    def degree(self) -> int:
+        """The sum of the degrees of the factors."""
+        return sum(factor.degree * factor.exponent for factor in self.factors)
+
+    def cofactor(self, degree: int, count: int) -> Monomial:
+        """C with D^degree P(N/D) = C P, a monomial in D and `count` factors."""
+        total = Monomial(1, (degree - self.degree, *[0] * count))
+        for factor in self.factors:
+            total *= factor.cofactor**factor.exponent
+        return total
+
+
+@dataclass(frozen=True)
+class DarbouxProducts:
+    """Two or more products whose cofactors are monomials in D and the same polynomials c_1, c_2, ... over Z."""
+
+    products: tuple[DarbouxProduct, ...]
+    letters: tuple[fmpq_mpoly, ...]
+
+    @property
+    def degree(self) -> int:
+        """The largest degree of a product."""
+        return max(product.degree for product in self.products)
+
+    @property
+    def cofactors(self) -> list[Monomial]:
+        """The cofactors of the products, all at the largest degree."""
+        return [product.cofactor(self.degree, len(self.letters)) for product in self.products]
+
+
+@dataclass(frozen=True)
+class ConservedFunction(Claim):
+    """F = P/Q: the two products of Darboux polynomials have the same cofactor."""
+
+    fraction: DarbouxProducts
+
+
+@dataclass(frozen=True)
+class DarbouxPolynomial(Claim):
+    """A Darboux polynomial P of degree k with the cofactor C: P(x~) = P C/D^k."""
+
+    product: DarbouxProducts
+
+
+@dataclass(frozen=True)
+class InvariantVolume(Claim):
+    """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L.
+
+    `is_free`: the identity holds for any two points, also if x~ is not the image of x, as for Hamiltonian systems.
+    """
+
+    numerator: fmpq_mpoly
+    denominator: fmpq_mpoly
+    degree: int
+    is_free: bool
+    fraction: DarbouxProducts | None = None  # if P and Q are Darboux polynomials
+
+    @property
+    def balance(self) -> tuple[Monomial, Monomial, Monomial]:
+        """Common, left and right with C D^(n + 1) = common left, B = common right; left = right D^n det L(x, N/D).
+
+        C and B are the cofactors of P and Q.
+        """
+        assert self.fraction is not None
+        C, B = self.fraction.cofactors
+        C = replace(C, powers=(C.powers[0] + self.data.dim + 1, *C.powers[1:]))
+        shared = tuple(map(min, zip(C.powers, B.powers, strict=True)))
+        return Monomial(1, shared), C.without(shared), B.without(shared)
+
+
+def conserved_function(data: MapData, name: str, function: RationalFunction) -> ConservedFunction:
+    """The identities that prove that the map conserves the function.
+
+    Raises:
+        FalseClaim: if it does not.
+        InputError: if the identities have too many terms.
+    """
+    P, Q = coprime(function, data.names)
+    if max(degree_in(P, data.dim), degree_in(Q, data.dim)) == 0:
+        raise InputError(f"{name} is a constant, which every map conserves: no certificate is written")
+    for splits in (True, False):
+        fraction = darboux_products(data, [P, Q], splits)
+        if fraction is not None and fraction.cofactors[0] == fraction.cofactors[1]:
+            return ConservedFunction(name, data, fraction)
+    raise FalseClaim(f"{name} is not conserved: no certificate can be written")
+
+
+def darboux_polynomial(data: MapData, name: str, function: RationalFunction) -> DarbouxPolynomial:
+    """The identity that proves that the function, a polynomial, is a Darboux polynomial of the map.
+
+    Raises:
+        FalseClaim: if it is none.
+        InputError: if the identity has too many terms.
+    """
+    P, _ = coprime(function, data.names)
+    if degree_in(P, data.dim) == 0:
+        raise InputError(f"{name} is a constant, expected a polynomial of positive degree: no certificate is written")
+    product = darboux_products(data, [P])
+    if product is None:
+        raise FalseClaim(f"{name} is no Darboux polynomial: no certificate can be written")
+    return DarbouxPolynomial(name, data, product)
+
+
+def invariant_volume(data: MapData, name: str, function: RationalFunction) -> InvariantVolume:
+    """The identity that proves that the map leaves the volume form dx/phi invariant, phi the function.
+
+    Raises:
+        FalseClaim: if it does not.
+        InputError: if the identity has too many terms.
+    """
+    P, Q = coprime(function, data.names)
+    n, k = data.dim, max(degree_in(P, data.dim), degree_in(Q, data.dim))
+    if not P:
+        raise InputError("found the density 0, expected another function: no certificate is written")
+    at_old, at_new = data.at_points(P, Q, data.determinant)
+    if times(times(at_new[0], at_old[1]), at_old[2]) == times(
+        times(at_old[0], at_new[1]), determinant(data.derivative)
+    ):
+        return InvariantVolume(name, data, P, Q, k, True)
+    volume = determinant(derivative_at_image(data))
+    fraction = darboux_products(data, [P, Q])
+    if fraction is not None:
+        claim = InvariantVolume(name, data, P, Q, fraction.degree, False, fraction)
+        letters = (data.determinant, *fraction.letters)
+        _, left, right = claim.balance
+        if left.at(letters) == times(right.at(letters), volume):
+            return claim
+    values = [homogeneous_value(F, k, data) for F in (P, Q)]
+    if times(times(values[0], Q), data.determinant ** (n + 1)) != times(times(values[1], P), volume):
+        raise FalseClaim("dx/phi is not invariant: no certificate can be written")
+    return InvariantVolume(name, data, P, Q, k, False)
+
+
+def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: bool = True) -> DarbouxProducts | None:
+    """The polynomials over Z as products of Darboux polynomials of the map, or None if one of them is none.
+
+    Args:
+        data: the map.
+        polynomials: polynomials over Z, not 0, in the names of the map.
+        splits: whether factors of the polynomials are looked at one by one, where these are Darboux polynomials too.
+    """
+    known = list[fmpq_mpoly]()
+    pieces = []
+    for P in polynomials:
+        factors = _with_cofactors(data, _factored(P, data.dim)) if splits else None
+        factors = factors or _with_cofactors(data, (P**0, [(P, 1)]))
+        if factors is None:
+            return None
+        content, parts = factors
+        pieces.append((content, [(f, k, e, _monomial(C, data.determinant, known)) for f, k, e, C in parts]))
+    count = len(known)
+
+    def padded(constant: int, powers: Sequence[int]) -> Monomial:
+        return Monomial(constant, (*powers, *[0] * (count + 1 - len(powers))))
+
+    products = [
+        DarbouxProduct(
+            content,
+            tuple(DarbouxFactor(f, k, e, padded(*cofactor)) for f, k, e, cofactor in parts),
+        )
+        for content, parts in pieces
+    ]  # fmt: skip
+    return DarbouxProducts(tuple(products), tuple(known))
+
+
+def _factored(P: fmpq_mpoly, dim: int) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]]:
+    """The factor without the variables, and the irreducible others with their exponents."""
+    constant, factors = P.factor()
+    content = prod((f ** int(e) for f, e in factors if degree_in(f, dim) <= 0), start=P**0 * constant)
+    return content, [(f, int(e)) for f, e in factors if degree_in(f, dim) > 0]
+
+
+def _with_cofactors(
+    data: MapData, factored: tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]]
+) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int, int, fmpq_mpoly]]] | None:
+    """The factors with k, their exponents and cofactors, or None if one of them has none."""
+    content, factors = factored
+    result = []
+    for f, e in factors:
+        k, D = degree_in(f, data.dim), data.determinant
+        value = homogeneous_value(f, k, data)
+        cofactor, spare = quotient(value, f), 0
+        if cofactor is None and degree_in(f.gcd(D), data.dim) > 0:  # f may divide D^(k + 1) f(N/D), with a larger k
+            while cofactor is None and spare < _MAX_SPARE:
+                value, spare = times(value, D), spare + 1
+                cofactor = quotient(value, f)
+        if not cofactor:  # 0: the image of the map lies in f = 0
+            return None
+        result.append((f, k + spare, e, cofactor))
+    return content, result
+
+
+def _monomial(C: fmpq_mpoly, D: fmpq_mpoly, known: list[fmpq_mpoly]) -> tuple[int, list[int]]:
+    """C as a monomial in D and known polynomials, which new ones are added to."""
+    power, rest = 0, C
+    if not D.is_constant() and gcd(*(int(c.p) for c in D.coeffs())) == 1:  # so that the quotients are over Z
+        while (smaller := quotient(rest, D)) is not None:
+            power, rest = power + 1, smaller
+    constant, factors = (
+        rest.factor() if len(rest) <= _MAX_FACTORED_TERMS else (rest.leading_coefficient() ** 0, [(rest, 1)])
+    )
+    powers = {}
+    for f, e in factors:
+        if f not in known:
+            known.append(f)
+        powers[known.index(f)] = int(e)
+    return int(constant), [power, *(powers.get(j, 0) for j in range(len(known)))]
