@@ -54,6 +54,7 @@ HINTS = {
     **dict.fromkeys(("eps", "h", "time_step", "header"), "orbit.header(), which has the system, eps and the time step"),
     "patterns": "singularities.hypersurfaces, each of which has its pattern",
     "phi": 'phi = km.map(system, "1/10")',
+    "to_json": "analysis.to_dict() or result.to_dict(): the result that this is a part of has it",
     "entropy": "km.algebraic_entropy(system)",
     "genus": "geometry.planes[0].kind: a smooth plane cubic has genus 1",
     "witness": "report.findings[0].witness",

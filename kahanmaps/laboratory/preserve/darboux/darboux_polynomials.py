@@ -20,7 +20,7 @@ from kahanmaps.algebra.printing import attributes, format_polynomial, format_rat
 from kahanmaps.algebra.work import Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.display_protocols import ResultPart, latex
+from kahanmaps.display_protocols import LatexDisplay, ResultPart, latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory, certified
@@ -50,7 +50,7 @@ Law = tuple[CofactorProduct, int]  # a product of cofactors and its numerical fa
 
 
 @dataclass(frozen=True)
-class DarbouxPolynomials(ResultPart):
+class DarbouxPolynomials(LatexDisplay, ResultPart):
     """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
 
     For a flow it is K in P' = K P. The verdict concerns the identity for all P: proved by expansion, or supported at
