@@ -322,6 +322,7 @@ def test_a_system_is_made_from_a_hamiltonian_or_in_the_manner_of_other_libraries
     q, p = sympy.symbols("q p")
     fish = km.System(hamiltonian="p^2/2 + q^2/2 - q^3/3", variables="q,p")
     assert fish.rhs == km.System(FISH).rhs == km.System.from_sympy([p, q**2 - q], (q, p)).rhs
+    assert fish == km.System.from_hamiltonian("p^2/2 + q^2/2 - q^3/3", "q,p")
     assert fish == km.System(hamiltonian=p**2 / 2 + q**2 / 2 - q**3 / sympy.Integer(3), variables=[q, p])
     assert fish.hamiltonian is not None
     assert km.System(hamiltonian="a*q*p", variables="q,p", a=3).f([1, 2]) == (3, -6)

@@ -17,7 +17,7 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_rational_function
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import UNFINISHED, Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.display_protocols import LatexDisplay, ResultPart, latex
@@ -108,6 +108,7 @@ def darboux_polynomials(
     effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[DarbouxSearch], None] = lambda _: None,
 ) -> DarbouxSearch:
     """Search for the discrete Darboux polynomials of degree at most `max_degree` with a cofactor of the usual form.
 
@@ -125,6 +126,7 @@ def darboux_polynomials(
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with the cofactor that is tried.
+        on_result: called with the spaces so far after each, for searches that may be interrupted.
 
     Returns:
         A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). A space spanned by
@@ -195,6 +197,7 @@ def darboux_polynomials(
                     reason = result
                 else:
                     spaces.append(result)
+                    on_result(DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), UNFINISHED))
     except NoPoint as error:
         reason = str(error)
     return DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), reason, flow=flow)
