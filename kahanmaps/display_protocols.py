@@ -126,8 +126,12 @@ class ResultPart(AttributeHints):
 
     def __repr__(self) -> str:
         value = next(getattr(self, name) for name in _TEXTS if hasattr(self, name))
-        text = value if isinstance(value, str) else ", ".join(value)
+        text = value if isinstance(value, str) else ", ".join(map(str, value))
         return f"<{type(self).__name__}: {shorten(text.partition(chr(10))[0], 100)}>"
+
+    def to_dict(self) -> Any:
+        """Return plain data, as `to_json` does."""
+        return self.to_json()  # type: ignore[attr-defined]
 
 
 class LatexDisplay(AttributeHints):

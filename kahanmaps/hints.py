@@ -54,6 +54,7 @@ HINTS = {
     **dict.fromkeys(("eps", "h", "time_step", "header"), "orbit.header(), which has the system, eps and the time step"),
     "patterns": "singularities.hypersurfaces, each of which has its pattern",
     "phi": 'phi = km.map(system, "1/10")',
+    "to_json": "analysis.to_dict() or result.to_dict(): the result that this is a part of has it",
     "entropy": "km.algebraic_entropy(system)",
     "genus": "geometry.planes[0].kind: a smooth plane cubic has genus 1",
     "witness": "report.findings[0].witness",
@@ -83,7 +84,7 @@ HINTS = {
     "subs": "I(x, eps) for a value, or I.to_sympy().subs({...})",
     "divergence": "system.system.divergence()",
     "status": "orbit.end.status",
-    "success": "orbit.end.is_complete",
+    **dict.fromkeys(("success", "is_whole"), "orbit.end.is_complete"),
 }
 
 
@@ -115,7 +116,9 @@ class AttributeHints:
     if not TYPE_CHECKING:  # or every attribute would pass the type checker
 
         def __getattr__(self, name: str) -> Any:
-            if name[:1] == "_" or name.startswith("is_"):  # protocols of Python, NumPy, SymPy and IPython
+            if name[:1] == "_" or (
+                name.startswith("is_") and name not in HINTS
+            ):  # protocols of Python, NumPy, SymPy and IPython
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             known = (other for other in dir(type(self)) if other[0] != "_")
             raise missing_name(f"{type(self).__name__!r} object", name, [*known, *getattr(self, "__dict__", ())])

@@ -67,6 +67,14 @@ def test_an_interrupt_at_a_prompt_leaves_the_commuting_systems_found_so_far(prom
     assert [g.rhs for g in found.solutions] == [g.rhs for g in km.find_commuting(over_root).solutions[:2]]
 
 
+def test_the_darboux_polynomials_so_far_are_handed_over():
+    found = []
+    complete = km.darboux_polynomials("lotka_volterra", 2, on_result=found.append)
+    assert [result.spaces for result in found] == [complete.spaces[:1], complete.spaces]
+    assert "interrupted" in found[0].reason
+    assert not complete.reason
+
+
 def test_an_interrupt_is_an_interrupt_in_scripts_and_where_nothing_was_found(prompt, monkeypatch):
     with pytest.raises(KeyboardInterrupt) as stop:
         km.find_density("lorenz", progress=interrupt_at(""))

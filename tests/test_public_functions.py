@@ -386,6 +386,10 @@ MISSING = [
     ("km.orbit(FISH, [1, 2], '1/10', 2).y", "orbit.x, an array"),
     ("km.degrees(FISH, max_terms=2).degreees", "did you mean degrees"),
     ("km.find_integrals('weierstrass')[0].subs", r"I\(x, eps\) for a value"),
+    ("km.orbit(FISH, [1, 2], '1/10', 2).end.success", "orbit.end.is_complete"),
+    ("km.analyze('riccati', analyses=()).is_integrable", r"km.analyze\(system\).integrable"),
+    ("km.map('lyness').eigenvalues", "see docs/howto/python.md"),
+    ("km.explicit_map(['x'], ['1/x']).inverse", r'map.at\("1/10"\).inverse'),
     ("km.plot.scatter", "'Plot' object has no attribute 'scatter'"),
     ("km.batch.runn", "did you mean run"),
 ]

@@ -20,6 +20,7 @@ from kahanmaps.function_calls import _ARGUMENT_HINTS
 from kahanmaps.hints import HINTS
 
 FISH = "q' = p; p' = q^2 - q"
+DUMP = re.compile(r"\b[A-Z]\w+\(\w+=")  # a dataclass with all its fields: ClassName(field=...)
 
 
 def test_maps_are_equal_when_their_equations_are():
@@ -73,9 +74,85 @@ def test_public_names_are_the_same_after_a_pickle(name):
     assert again is value or (isinstance(value, str) and again == value)
 
 
+RESULTS = {
+    "km.System(FISH)": "_repr_html_ _repr_latex_ latex to_sympy",
+    "km.System(FISH).system": "_repr_latex_ latex to_sympy",
+    "km.System(FISH).map": "_repr_latex_ latex to_sympy",
+    "km.map(FISH, '1/10')": "_repr_latex_ latex to_sympy",
+    "km.map(FISH, '1/10') ** 2": "_repr_latex_ latex to_sympy",
+    "km.explicit_map({'x': 'y', 'y': '(1 + y)/x'}) ** 2": "_repr_latex_ latex to_sympy",
+    "km.orbit(FISH, [1, 2], '1/10', 5)": "_repr_html_",
+    "km.orbit(FISH, [1, 2], '1/10', 5, exact=False)": "_repr_html_",
+    "km.orbit(FISH, [1, 2], '1/10', 5).end": "to_dict to_json",
+    "km.lyapunov(FISH, [0.1, 0.2], '1/10', 9)": "to_dict to_json",
+    "km.find_integrals(FISH)": "_repr_html_ latex to_sympy to_dict to_json",
+    "km.find_integrals(FISH)[0]": "_repr_latex_ latex to_sympy to_dict to_json",
+    "km.find_integrals(FISH)[0].function": "_repr_latex_ latex to_sympy",
+    "km.find_density(FISH)": "_repr_html_ latex to_sympy to_dict to_json",
+    "km.find_density(FISH)[0]": "_repr_latex_ latex to_sympy to_dict to_json",
+    "km.find_poisson('weierstrass')": "_repr_html_ latex to_sympy to_dict to_json",
+    "km.find_poisson('weierstrass')[0]": "_repr_latex_ latex to_sympy to_dict to_json",
+    "km.darboux_polynomials('lotka_volterra', 1)": "_repr_html_ latex to_sympy to_dict to_json",
+    "km.darboux_polynomials('lotka_volterra', 1)[0]": "_repr_latex_ latex to_sympy to_dict to_json",
+    "km.analyze('riccati')": "_repr_html_ to_dict to_json",
+    "km.analyze('riccati').conclusion": "",
+    "km.degrees(FISH, max_terms=3)": "_repr_html_ to_dict to_json",
+    "km.dynamical_degree('riccati')": "to_dict to_json",
+    "km.singularities(FISH)": "_repr_html_ to_dict to_json",
+    "km.singularities(FISH).hypersurfaces[0]": "to_dict to_json",
+    "km.heights(FISH, '1/10', steps=9)": "_repr_html_ to_dict to_json",
+    "km.height_growth(km.map(FISH, '1/10'), [1, 2], 9)": "to_dict to_json",
+    "km.cycles(FISH, '1/10', 101)": "_repr_html_ to_dict to_json",
+    "km.check_integrals(FISH, 'q')": "_repr_html_ to_dict to_json",
+    "km.check_integrals(FISH, 'q').findings[0]": "_repr_html_ to_dict to_json",
+    "km.check_integrals(FISH, 'q').findings[0].witness": "to_dict to_json",
+    "km.find_symmetry('weierstrass')": "_repr_html_ to_dict to_json",
+    "km.find_symmetry('weierstrass').generators[0]": "to_dict to_json",
+    "km.find_commuting('weierstrass')": "_repr_html_ to_dict to_json",
+    "km.find_commuting('weierstrass').solutions[1]": "to_dict to_json",
+    "km.fixed_points('lotka_volterra')": "to_dict to_json",
+    "km.fixed_points('lotka_volterra')[0]": "to_dict to_json",
+    "km.geometry('paper_m2', [1, 2, 0, 1], '1/10')": "_repr_html_ to_dict to_json",
+    "km.period('paper_m2', [1, 2, 0, 1], '1/10')": "_repr_html_ to_dict to_json",
+    "km.constant_structures('euler_top')": "_repr_html_ to_dict to_json",
+    "km.random_member(2, 1)": "_repr_html_",
+    "km.random_member(2, 1).hamiltonians[0]": "_repr_latex_ latex to_sympy",
+    "km.affine_darboux('lotka_volterra')": "",
+    "km.affine_darboux('lotka_volterra').functions[0]": "",
+    "km.system_normal_form('paper_m2')": "",
+    "km.system_normal_form('lorenz')": "",
+    "km.find_family_structure_of('paper_m2')": "",
+    "km.tensor_structure('nahm_tetrahedral')": "",
+    "km.catalogue()": "",
+}
+
+
+@together("expression", RESULTS)
+def test_a_result_is_one_line_a_formula_or_a_table_and_plain_data(expression):
+    value, has = eval(expression, globals()), RESULTS[expression].split()
+    line = repr(value)
+    for text in (line, str(value)):
+        assert not DUMP.search(text), text
+    assert "\n" not in line
+    assert len(line) < 250
+    for name in ("_repr_html_", "_repr_latex_", "latex", "to_sympy", "to_dict", "to_json"):
+        if name not in has:
+            assert name == "to_dict" or not hasattr(value, name), name
+            continue
+        result = getattr(value, name)()
+        assert result
+        assert not DUMP.search(str(result)) or name in ("to_sympy", "latex")
+        if name in ("to_dict", "to_json"):
+            assert result == value.to_json()
+            assert json.loads(json.dumps(result))
+
+
 def test_functions_and_their_results_go_to_other_processes_and_back():
     """`spawn`, so that the other process imports what it needs by what it is sent."""
     with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert [report.holds for report in pool.map(km.check_integrals, ["euler_top", "volterra_periodic_3"])] == [
+            True
+        ] * 2
         others = [
             pool.submit(km.check_integrals, "euler_top"),
             pool.submit(km.analyze, "riccati"),
@@ -245,6 +322,7 @@ def test_a_system_is_made_from_a_hamiltonian_or_in_the_manner_of_other_libraries
     q, p = sympy.symbols("q p")
     fish = km.System(hamiltonian="p^2/2 + q^2/2 - q^3/3", variables="q,p")
     assert fish.rhs == km.System(FISH).rhs == km.System.from_sympy([p, q**2 - q], (q, p)).rhs
+    assert fish == km.System.from_hamiltonian("p^2/2 + q^2/2 - q^3/3", "q,p")
     assert fish == km.System(hamiltonian=p**2 / 2 + q**2 / 2 - q**3 / sympy.Integer(3), variables=[q, p])
     assert fish.hamiltonian is not None
     assert km.System(hamiltonian="a*q*p", variables="q,p", a=3).f([1, 2]) == (3, -6)

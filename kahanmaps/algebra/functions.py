@@ -311,10 +311,8 @@ class FunctionMatrix(EntryMatrix):
                 if self.field.vanishes(last):
                     raise ZeroDivisionError("singular matrix in solve()")
                 if last.is_constant():  # or its digits would double with each step of an affine map
-                    numerator, last = (
-                        [entry / last.leading_coefficient() for entry in numerator],
-                        self.field.one.numerator,
-                    )
+                    factor = last.leading_coefficient() * sign
+                    numerator, last = [entry / factor for entry in numerator], self.field.one.numerator * sign
                 for i, entry in zip(block, numerator, strict=True):
                     solution[i].append(Function(self.field, entry * -sign, last * sign))
         return FunctionMatrix(self.field, self._rows, columns, [entry for row in solution for entry in row])

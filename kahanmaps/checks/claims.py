@@ -51,7 +51,7 @@ class Evidence(ResultPart):
 
 
 @dataclass(frozen=True)
-class Witness:
+class Witness(ResultPart):
     """A point at which a claim fails: x and eps, and the two sides that should be equal, all as exact text."""
 
     point: tuple[str, ...]
@@ -62,6 +62,13 @@ class Witness:
     right_label: str
     field: str = "QQ"
     vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # other choices (vectors, numbers), by name
+
+    @property
+    def text(self) -> str:
+        """The point and the two sides."""
+        at = "" if self.eps is None else f", eps = {self.eps}"
+        sides = f"{self.left_label} = {', '.join(self.left)}, {self.right_label} = {', '.join(self.right)}"
+        return f"x = ({', '.join(self.point)}){at}: {sides}"
 
     def to_json(self) -> dict[str, Any]:
         return {

@@ -17,14 +17,14 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number, format_polynomial
 from kahanmaps.display import markup
-from kahanmaps.display.latex import formula, latex_rational_function
+from kahanmaps.display.latex import formula, latex_polynomial, latex_rational_function
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
 from kahanmaps.display_protocols import html_form, latex_form, text_form
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.cycles import Census
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
-from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxPolynomials, DarbouxSearch
 from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.iterates import IntegralInIterates
@@ -73,6 +73,11 @@ def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> HtmlCell:
 @latex_form.register
 def _found_function(found: FoundFunction) -> str:
     return latex_rational_function(found.function)
+
+
+@latex_form.register
+def _darboux_polynomials(space: DarbouxPolynomials) -> str:
+    return r",\quad ".join(map(latex_polynomial, space.polynomials))
 
 
 @latex_form.register

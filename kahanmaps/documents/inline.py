@@ -112,14 +112,13 @@ def System(
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
 
 
-for _form in (
-    "text",
-    "string",
-    "dict",
-    "sympy",
-    "equations",
-):  # as in other libraries: System.from_sympy
-    setattr(System, f"from_{_form}", System)
+def _from_hamiltonian(H: Any, variables: Any = None, **parameters: Any) -> SystemFile:
+    return System(None, variables, hamiltonian=H, **parameters)
+
+
+# In the manner of other libraries: System.from_sympy([y, x**2], (x, y)).
+vars(System).update({f"from_{form}": System for form in ("text", "string", "dict", "sympy", "equations")})
+vars(System)["from_hamiltonian"] = _from_hamiltonian
 
 
 def map_at(system: SystemLike, eps: Any = None, *, time_step: Any = None, h: Any = None) -> Map:

@@ -24,6 +24,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers, rank, trace
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, names_of, ring
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
 from kahanmaps.family.cubics import third_derivatives
@@ -38,7 +39,7 @@ _T = fmpq_poly([0, 1])
 
 
 @dataclass(frozen=True, eq=False)
-class FamilyStructure:
+class FamilyStructure(ResultPart):
     """The structure of a Hamiltonian system as a member: `member` is the system in the coordinates y with x = T y.
 
     T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq_mat
 
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import HypothesisError
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem, as_system
@@ -23,7 +24,7 @@ _MAX_DIMENSION = 32
 
 
 @dataclass(frozen=True, eq=False)
-class SystemNormalForm:
+class SystemNormalForm(ResultPart):
     """A normal form with x = T S z; `T` is None where the form is in the system's own coordinates.
 
     `declared` says whether the system came as a member of the family, `text` the membership that was found.
@@ -41,7 +42,7 @@ class SystemNormalForm:
 
 
 @dataclass(frozen=True)
-class NoNormalForm:
+class NoNormalForm(ResultPart):
     """The reason why there is no normal form; `text` and `T` are given for a member whose chi has a repeated root."""
 
     reason: str

@@ -21,6 +21,7 @@ from kahanmaps.algebra.functions import DEFAULT_BUDGET, Function, FunctionField,
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
 from kahanmaps.algebra.printing import format_univariate
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import InputError
 from kahanmaps.family.skew_hamiltonian import companion_matrix, evaluate_at_matrix
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem, as_system
@@ -88,7 +89,7 @@ def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFun
 
 
 @dataclass(frozen=True, eq=False)
-class TensorStructure:
+class TensorStructure(ResultPart):
     """A system over Q as one in `rank` variables over K = Q[t]/(chi), where t acts as the matrix `C`.
 
     Verified at construction: C f'(x) = f'(x) C for all x, chi is the minimal polynomial of C, and the module is free.

@@ -48,6 +48,7 @@ from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.parsing import wrong_kind
 from kahanmaps.algebra.work import Budget, count
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.invariants.growth import Growth
@@ -65,7 +66,7 @@ _NOT_GIVEN = NoNormalForm("none was given")
 
 
 @dataclass(frozen=True)
-class HeightGrowth:
+class HeightGrowth(ResultPart):
     """The heights of an orbit at the steps 0, every, 2 every, ..., and how the orbit ended.
 
     The kind of growth is decided with exact numbers. Let w be a quarter of the number of heights, and r_1, ..., r_4 the

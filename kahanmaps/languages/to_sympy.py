@@ -12,6 +12,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxPolynomials
 from kahanmaps.laboratory.preserve.iterates import IntegralInIterates
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import FoundTensor
 from kahanmaps.laboratory.preserve.results import FoundFunction
@@ -65,6 +66,11 @@ def _in_iterates(found: IntegralInIterates) -> Any:
     if letters:
         raise InputError(f"found {found.name}, whose formula has abbreviations: read .text or .latex()")
     return _rational(ratio)
+
+
+@sympy_form.register
+def _darboux(space: DarbouxPolynomials) -> Any:
+    return [_polynomial(P) for P in space.polynomials]
 
 
 @sympy_form.register

@@ -15,7 +15,8 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ, integer
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import degree, evaluate, gradient, is_homogeneous, linear_combinations, names_of
-from kahanmaps.display_protocols import LatexDisplay
+from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -46,6 +47,10 @@ class CubicHamiltonian(LatexDisplay):
 
     H: fmpq_mpoly
     J: fmpq_mat
+
+    def __repr__(self) -> str:
+        kind = "" if self.is_standard else "another "
+        return f"CubicHamiltonian({shorten(format_polynomial(self.H), 100)}; {kind or 'standard '}J)"
 
     def __post_init__(self) -> None:
         n = len(names_of(self.H))

@@ -19,7 +19,7 @@ from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.parsing import check_names, parse_polynomial
 from kahanmaps.algebra.polynomials import digits_of, evaluate, linear_combinations, names_of, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.display_protocols import LatexDisplay
+from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError, counted
 from kahanmaps.systems.polynomial import PolynomialField
 
@@ -182,6 +182,9 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
     def digits(self) -> int:
         """Approximate number of decimal digits of the longest coefficient, over a common denominator."""
         return digits_of(self.rhs)
+
+    def __repr__(self) -> str:
+        return f"QuadraticSystem({shorten(', '.join(str(self).splitlines()), 100)})"
 
     def __str__(self) -> str:
         pairs = zip(self.variables, self.rhs, strict=True)

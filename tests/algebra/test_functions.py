@@ -122,3 +122,13 @@ def test_the_digits_of_the_iterates_of_an_affine_map_grow_linearly():
     for entry, row in zip(x.entries(), exact.tolist(), strict=True):
         assert value(entry, (fmpq(2), fmpq(3))) == 2 * row[0] + 3 * row[1]
         assert len(str(entry.numerator)) + len(str(entry.denominator)) < 800
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_a_constant_determinant_leaves_the_denominator_1(n):
+    # One sign for all: the sum of 1/1 and 1/(-1) would have no denominator.
+    x, y = FIELD.variables
+    matrix = FIELD.matrix(n, n, [FIELD.convert(-3 if i == j else int(j > i)) for i in range(n) for j in range(n)])
+    solution = matrix.solve(FIELD.column([x * y] * n)).entries()
+    assert [str(entry.denominator) for entry in solution] == ["1"] * n
+    assert value(solution[-1], POINT) == POINT[0] * POINT[1] / -3

@@ -66,6 +66,11 @@ def test_searches_checks_and_certificates_take_a_map_at_one_eps():
     assert "~" in km.certificate(LYNESS, "sympy", integrals="(x + 1)*(y + 1)*(x + y + 1)/(x*y)")
 
 
+def test_a_composition_of_maps_with_constant_denominators_is_expanded():
+    image = km.load("qrt_asymmetric").map.image
+    assert [f.names for f in image] == [("x", "y", "eps")] * 2
+
+
 def test_what_is_no_map_over_the_rationals_or_no_vector_field_is_refused_in_words():
     refuses("expected a map over the rational numbers", km.find_integrals, kahan().at(1, km.GF(101)))
     symbolic = km.explicit_map(["x"], [km.parse_rational_function("x + a*eps", ["x", "a", "eps"])])

@@ -28,7 +28,10 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, evaluate, linear_combinations, primitive_part
+from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.work import count
+from kahanmaps.display_protocols import ResultPart
+from kahanmaps.errors import counted
 from kahanmaps.maps.kahan import KahanFamily, SystemLike
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver, as_system
@@ -40,15 +43,20 @@ _BUDGET = 20_000_000  # products of terms, for a determinant on a hyperplane
 
 
 @dataclass(frozen=True)
-class AffineDarboux:
+class AffineDarboux(ResultPart):
     """An affine function l with l' = l L along the flow: `function` is l, with coprime integers; `cofactor` is L."""
 
     function: fmpq_mpoly
     cofactor: fmpq_mpoly
 
+    @property
+    def text(self) -> str:
+        """The function and its cofactor."""
+        return f"{format_polynomial(self.function)} with cofactor {format_polynomial(self.cofactor)}"
+
 
 @dataclass(frozen=True)
-class AffineDarbouxList:
+class AffineDarbouxList(ResultPart):
     """Affine Darboux functions, each one exact. `complete`: there are no others over Q; else `reason` says why not.
 
     Constants and the affine integrals (cofactor 0) are left out. The list is complete unless a random line is parallel
@@ -59,6 +67,12 @@ class AffineDarbouxList:
     functions: tuple[AffineDarboux, ...]
     complete: bool
     reason: str
+
+    @property
+    def text(self) -> str:
+        """The number of functions, and whether there are others."""
+        more = "no others" if self.complete else self.reason
+        return f"{counted(len(self.functions), 'affine Darboux function')}, {more}"
 
 
 def affine_integrals(system: SystemLike) -> tuple[tuple[fmpz, ...], ...]:

@@ -17,10 +17,10 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import echelon
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.printing import attributes, format_polynomial, format_rational_function
-from kahanmaps.algebra.work import Budget
+from kahanmaps.algebra.work import UNFINISHED, Budget
 from kahanmaps.checks.claims import Certainty
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.display_protocols import ResultPart, latex
+from kahanmaps.display_protocols import LatexDisplay, ResultPart, latex
 from kahanmaps.documents.inline import as_file
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.laboratory import Laboratory, certified
@@ -50,7 +50,7 @@ Law = tuple[CofactorProduct, int]  # a product of cofactors and its numerical fa
 
 
 @dataclass(frozen=True)
-class DarbouxPolynomials(ResultPart):
+class DarbouxPolynomials(LatexDisplay, ResultPart):
     """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
 
     For a flow it is K in P' = K P. The verdict concerns the identity for all P: proved by expansion, or supported at
@@ -108,6 +108,7 @@ def darboux_polynomials(
     effort: int | Budget = 1,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
+    on_result: Callable[[DarbouxSearch], None] = lambda _: None,
 ) -> DarbouxSearch:
     """Search for the discrete Darboux polynomials of degree at most `max_degree` with a cofactor of the usual form.
 
@@ -125,6 +126,7 @@ def darboux_polynomials(
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with the cofactor that is tried.
+        on_result: called with the spaces so far after each, for searches that may be interrupted.
 
     Returns:
         A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). A space spanned by
@@ -195,6 +197,7 @@ def darboux_polynomials(
                     reason = result
                 else:
                     spaces.append(result)
+                    on_result(DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), UNFINISHED))
     except NoPoint as error:
         reason = str(error)
     return DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), reason, flow=flow)
