@@ -81,6 +81,35 @@ def test_on_a_level_of_period_5_the_rotation_number_is_a_multiple_of_a_fifth():
     assert not any((5 * nearby.number - k).contains(0) for k in (1, 2))
 
 
+@pytest.mark.parametrize("digits", [60, 200])
+def test_levels_that_are_almost_singular_have_the_rotation_numbers_of_the_limits(digits):
+    """At gamma = 0 the rotation number is 1/6, or 1/3 for the second iterate, up to 1/log; at gamma = 1 it is 0.
+
+    There it is proportional to the sixth root of delta, and at gamma = infinity it is 1/4.
+    """
+    tiny = fmpq(1, 10**digits)
+
+    def rho(gamma):
+        (rotation,) = rotations_of(gamma, fmpq(-27), fmpq(1), "t = 0")
+        assert float(rotation.number.rad()) < 1e-15
+        return float(rotation.number)
+
+    assert abs(rho(tiny) - 1 / 6) < 0.1 / digits
+    assert abs(rho(-tiny) - 1 / 3) < 0.3 / digits
+    assert rho(1 / tiny) == pytest.approx(1 / 4, abs=1e-15)
+    for sign in (1, -1):
+        assert rho(1 - sign * tiny) / rho(1 - sign * tiny / 10**6) == pytest.approx(10, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["nahm_tetrahedral", "paper_m3_irreducible"])
+def test_for_very_small_eps_the_rotation_number_is_that_of_the_flow(name):
+    start = [1, 2, 3, 4, 5, 6][: load(name).dim]
+    for plane in geometry(load(name), start, fmpq(1, 10**50)).planes:
+        for rotation in plane.rotations:
+            if rotation.flow is not None:
+                assert float((rotation.number / rotation.flow - 1).mid()) == pytest.approx(0, abs=1e-15)
+
+
 def test_at_complex_roots_the_orbit_returns_when_multiples_of_the_translation_are_small():
     system = random_member_with_chi(fmpq_poly([1, 0, 1]), seed=1).chosen.system
     start, eps = ["1/3", "1/2", "-1/5", "1/7"], "1/20"

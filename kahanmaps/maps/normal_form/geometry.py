@@ -16,7 +16,7 @@ from typing import Any
 
 from flint import acb, arb, fmpq
 
-from kahanmaps.algebra.elliptic_curves import canonical_height, negative_roots, rotation_number
+from kahanmaps.algebra.elliptic_curves import MAX_BITS, canonical_height, complex_roots, rotation_number
 from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display_protocols import PrintableResult
@@ -232,9 +232,9 @@ def rotations_of(gamma: Any, disc: Any, h: Any, name: str) -> tuple[Rotation, ..
         disc, h: the discriminant of the cubic of the plane, and its value at the point in the coordinates 2 eps (u, v).
         name: the name of the plane, for a plane over Q.
 
-    Raises PrecisionLost if 8192 bits do not suffice.
+    Raises PrecisionLost if 32768 bits do not suffice.
     """
-    for bits in (128, 512, 2048, 8192):
+    for bits in (128, 512, 2048, 8192, MAX_BITS):
         with RR(bits).working(), suppress(PrecisionLost):
             rotations = []
             if isinstance(gamma, fmpq):
@@ -251,7 +251,10 @@ def rotations_of(gamma: Any, disc: Any, h: Any, name: str) -> tuple[Rotation, ..
             balls = [x for rotation in rotations for x in (*rotation.numbers, rotation.flow) if x is not None]
             if all(x.is_finite() and float(x.rad()) < _ACCURACY for x in balls):
                 return tuple(rotations)
-    raise PrecisionLost("rotation numbers need more than 8192 bits: the level is almost singular")
+    raise PrecisionLost(
+        f"the rotation numbers need more than {MAX_BITS} bits, since the level is almost singular: choose an initial "
+        "point or eps with fewer digits"
+    )
 
 
 def _at(element: Any, root: Any) -> Any:
@@ -284,14 +287,15 @@ def _flow_rotation(disc: arb, h: arb) -> arb:
 
 def _complex_rotation(gamma: acb) -> tuple[arb, arb]:
     """Return the coordinates of T in a reduced basis of the periods."""
-    curve = Jacobian(gamma)
-    a, b, c = negative_roots([curve.a6, curve.a4, curve.a2, acb(1)])
+    a, b, c = sorted((-root for root in complex_roots(Jacobian(gamma))), key=lambda e: (e.real.mid(), e.imag.mid()))
     zero = acb(0)
     first, second = (2 * acb.elliptic_rf(zero, *pair) for pair in ((b - a, c - a), (a - b, c - b)))
     while True:  # Gauss
         if abs(first) > abs(second):
             first, second = second, first
         quotient = (second / first).real
+        if not quotient.is_finite():
+            raise PrecisionLost("the periods are too inaccurate")
         number = round(float(quotient.mid()))
         if not number:
             break
