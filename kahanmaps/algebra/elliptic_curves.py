@@ -5,10 +5,11 @@ Points are pairs (x, Y); None is the zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
-from flint import acb, acb_poly, arb, ctx, fmpq, fmpz
+from flint import acb, arb, fmpq, fmpz
 
 from kahanmaps.algebra.fields import RR
 from kahanmaps.errors import PrecisionLost
@@ -18,6 +19,7 @@ AffinePoint = tuple[Any, Any]
 MAX_BITS = 1 << 15  # of the balls in which heights and rotation numbers are computed
 _ACCURACY = 1e-15  # of rotation numbers and heights
 _HEIGHT_TERMS = 40  # of the series for a height, whose terms decrease like 4^-n
+_EXACT_TERMS = 4
 _MAX_TORSION = 12  # the largest order of a rational torsion point (mazur-1977)
 _SMOOTH_BITS = 20  # of primes that are found to reduce the coefficients of a model
 
@@ -89,10 +91,19 @@ class EllipticCurve:
         u = A.q.lcm(B.q)
         A, B, scale = A * u**4, B * u**6, fmpq(u)
         common = (A.p**3).gcd(B.p**2)
-        for factor, _ in common.factor_smooth(_SMOOTH_BITS) if common else ():
+        for factor in _candidates(common):
             while A.p % factor**4 == 0 and B.p % factor**6 == 0:
                 A, B, scale = A / factor**4, B / factor**6, scale / factor
         return EllipticCurve(fmpq(0), A, B), (x * scale**2, y * scale**3)
+
+
+def _candidates(number: fmpz) -> list[fmpz]:
+    """Return the small prime factors of a number, and a cofactor with its roots, each greater than 1."""
+    if number == 0:
+        return []
+    factors = [abs(factor) for factor, _ in number.factor_smooth(_SMOOTH_BITS)]
+    roots = [factor.root(k) for factor in factors for k in (12, 6, 4, 3, 2, 1)]
+    return [root for root in roots if root > 1]
 
 
 def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> Any:
@@ -117,11 +128,13 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
     >>> canonical_height(EllipticCurve(fmpq(0), fmpq(-1), fmpq(1)), (fmpq(1), fmpq(1))).str(10, radius=False)
     '0.02494610450'
     """
-    d = curve.a2.q.lcm(curve.a4.q).lcm(curve.a6.q)
+    d = fmpq(curve.a2.q.lcm(curve.a4.q).lcm(curve.a6.q))
+    for factor in _candidates((curve.a2 * d**2).p.gcd((curve.a4 * d**4).p).gcd((curve.a6 * d**6).p)):
+        while all((a * (d / factor) ** k).q == 1 for a, k in ((curve.a2, 2), (curve.a4, 4), (curve.a6, 6))):
+            d /= factor
     a2, a4, a6 = ((a * d**k).p for a, k in ((curve.a2, 2), (curve.a4, 4), (curve.a6, 6)))
     b2, b4, b6, b8 = 4 * a2, 2 * a4, 4 * a6, 4 * a2 * a6 - a4 * a4
     resultant = fmpz((256 * curve.discriminant**2 * d**24).p)
-    modulus = resultant ** (_HEIGHT_TERMS + 2)
     x = P[0] * d**2
 
     def doubled(X: Any, Z: Any) -> tuple[Any, Any]:
@@ -130,13 +143,24 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
             4 * X**3 * Z + b2 * (X * Z) ** 2 + 2 * b4 * X * Z**3 + b6 * Z**4,
         )
 
-    X, Z, left, commons = x.p, x.q, modulus, list[fmpz]()
-    for _ in range(_HEIGHT_TERMS):
-        X, Z = doubled(X, Z)
-        common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # of short numbers, as it divides R
-        left //= common
-        X, Z = X // common % left, Z // common % left
-        commons.append(common)
+    def factors(terms: int, modulus: fmpz | None) -> list[fmpz]:
+        """The common factors in the first doublings; fewer than `terms` if the modulus does not determine them."""
+        X, Z, commons = x.p, x.q, list[fmpz]()
+        while len(commons) < terms and (modulus is None or modulus % resultant == 0):
+            X, Z = doubled(X, Z)
+            common = (X % resultant).gcd(resultant).gcd(Z % resultant)  # of short numbers, as it divides R
+            X, Z = X // common, Z // common
+            if modulus is not None:
+                modulus //= common
+                X, Z = X % modulus, Z % modulus
+            commons.append(common)
+        return commons
+
+    # The factors are usually much smaller than R, and as large as the first ones, for which no modulus is needed.
+    usual = reduce(fmpz.lcm, factors(_EXACT_TERMS, None))
+    commons = factors(_HEIGHT_TERMS, resultant * usual**_HEIGHT_TERMS)
+    if len(commons) < _HEIGHT_TERMS:
+        commons = factors(_HEIGHT_TERMS, resultant ** (_HEIGHT_TERMS + 1))
     # log R <= log |forms| + log of the cofactors of R = f F + g G, minors of a matrix with eight rows: they bound the
     # terms from below. The sums of the coefficients bound them from above.
     largest = max(abs(c) for c in (fmpz(4), 2 * b4, 2 * b6, b8, b2, b6)) + 1
@@ -161,18 +185,38 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
     raise PrecisionLost(f"the height needs more than {MAX_BITS} bits: the curve is almost singular")
 
 
-def negative_roots(coefficients: Sequence[Any]) -> list[acb]:
-    """Return -e for the roots e of a cubic polynomial with arb or acb coefficients, constant term first.
+def real_roots(curve: EllipticCurve, has_oval: bool) -> list[acb]:
+    """Return the roots of the cubic polynomial with arb coefficients: the largest real one first.
 
-    The real ones come first, by increasing -e. Raises PrecisionLost if the roots cannot be separated.
+    With `has_oval`, a positive discriminant, they are real and in decreasing order; otherwise two are conjugate.
     """
-    try:
-        roots = acb_poly(coefficients).roots(arb(2) ** -(ctx.prec // 2))
-    except ValueError as error:
-        raise PrecisionLost("the roots of the cubic cannot be separated") from error
-    return sorted(
-        (-acb(e) for e in roots), key=lambda e: (not e.imag.contains(0), float(e.real.mid()), float(e.imag.mid()))
-    )
+    third, A, B = _depressed(curve)
+    s = B * B / 4 + A * A * A / 27
+    if has_oval:  # Viete's formula
+        size, angle = 2 * (-A / 3).sqrt(), arb.atan2((-s).sqrt(), -B / 2) / 3
+        return [acb(size * (angle - 2 * k * arb.pi() / 3).cos() - third) for k in range(3)]
+    # Cardano's formula, with the cube root that does not cancel.
+    cube = -B / 2 - s.sqrt() if B > 0 else -B / 2 + s.sqrt()
+    u = -((-cube).root(3)) if cube < 0 else cube.root(3)
+    v = -A / (3 * u)
+    real, imaginary = (u + v) / 2, (u - v) * arb(3).sqrt() / 2
+    return [acb(2 * real - third), acb(-real - third, imaginary), acb(-real - third, -imaginary)]
+
+
+def complex_roots(curve: EllipticCurve) -> list[acb]:
+    """Return the roots of the cubic polynomial with acb coefficients, by Cardano's formula."""
+    third, A, B = _depressed(curve)
+    root = (B * B / 4 + A * A * A / 27).sqrt()
+    cube = max((-B / 2 + root, -B / 2 - root), key=lambda z: abs(z).mid())
+    u, unit = cube.root(3), acb(arb(-1) / 2, arb(3).sqrt() / 2)
+    v = -A / (3 * u)
+    return [u - third + v, u * unit + v / unit - third, u / unit + v * unit - third]
+
+
+def _depressed(curve: EllipticCurve) -> tuple[Any, Any, Any]:
+    """Return c, A and B with x^3 + a2 x^2 + a4 x + a6 = z^3 + A z + B, z = x + c."""
+    third = curve.a2 / 3
+    return third, curve.a4 - curve.a2 * third, (2 * third * third - curve.a4) * third + curve.a6
 
 
 def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tuple[arb, int]:
@@ -184,8 +228,7 @@ def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tup
         curve, P: with coefficients and coordinates in arb.
         has_oval: whether the polynomial has three real roots: a positive discriminant.
     """
-    shifts = negative_roots([curve.a6, curve.a4, curve.a2, arb(1)])
-    a, b, c = shifts
+    a, b, c = (-root for root in real_roots(curve, has_oval))
     steps, x = 1, P[0]
     if has_oval and not x + a.real > 0:
         if not x + a.real < 0:

@@ -12,10 +12,13 @@ from planar_helpers import mean_turn
 
 from kahanmaps import FloatEnsemble, QuadraticSystem, geometry, load, orbit
 from kahanmaps.algebra.elliptic_curves import canonical_height as height_on
+from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.family.random_members import random_member_with_chi
 from kahanmaps.maps.normal_form.geometry import rotations_of
 from kahanmaps.maps.normal_form.level_curves import Jacobian
-from kahanmaps.maps.normal_form.periods import PeriodKind
+from kahanmaps.maps.normal_form.periods import PeriodKind, classify
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock
+from kahanmaps.maps.normal_form.plane_heights import plane_height
 
 
 def canonical_height(gamma):
@@ -81,6 +84,35 @@ def test_on_a_level_of_period_5_the_rotation_number_is_a_multiple_of_a_fifth():
     assert not any((5 * nearby.number - k).contains(0) for k in (1, 2))
 
 
+@pytest.mark.parametrize("digits", [60, 200])
+def test_levels_that_are_almost_singular_have_the_rotation_numbers_of_the_limits(digits):
+    """At gamma = 0 the rotation number is 1/6, or 1/3 for the second iterate, up to 1/log; at gamma = 1 it is 0.
+
+    There it is proportional to the sixth root of delta, and at gamma = infinity it is 1/4.
+    """
+    tiny = fmpq(1, 10**digits)
+
+    def rho(gamma):
+        (rotation,) = rotations_of(gamma, fmpq(-27), fmpq(1), "t = 0")
+        assert float(rotation.number.rad()) < 1e-15
+        return float(rotation.number)
+
+    assert abs(rho(tiny) - 1 / 6) < 0.1 / digits
+    assert abs(rho(-tiny) - 1 / 3) < 0.3 / digits
+    assert rho(1 / tiny) == pytest.approx(1 / 4, abs=1e-15)
+    for sign in (1, -1):
+        assert rho(1 - sign * tiny) / rho(1 - sign * tiny / 10**6) == pytest.approx(10, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["nahm_tetrahedral", "paper_m3_irreducible"])
+def test_for_very_small_eps_the_rotation_number_is_that_of_the_flow(name):
+    start = [1, 2, 3, 4, 5, 6][: load(name).dim]
+    for plane in geometry(load(name), start, fmpq(1, 10**50)).planes:
+        for rotation in plane.rotations:
+            if rotation.flow is not None:
+                assert float((rotation.number / rotation.flow - 1).mid()) == pytest.approx(0, abs=1e-15)
+
+
 def test_at_complex_roots_the_orbit_returns_when_multiples_of_the_translation_are_small():
     system = random_member_with_chi(fmpq_poly([1, 0, 1]), seed=1).chosen.system
     start, eps = ["1/3", "1/2", "-1/5", "1/7"], "1/20"
@@ -111,6 +143,55 @@ def test_heights_grow_as_the_canonical_heights_say(name, start, steps):
     denominator = math.lcm(*(int(x.q) for x in point))
     bits = max(abs(int(x.p) * denominator // int(x.q)).bit_length() for x in point)
     assert abs(bits / steps**2 / constant - 1) < 3 / steps * 2
+
+
+def exact_constant(system, start, eps, n):
+    """C of bits(n) = C n^2 + b n + O(1), from two points of an exact orbit."""
+    lengths = []
+    for step in orbit(system, start, eps, at=[n, 2 * n], max_digits=1_000_000):
+        denominator = math.lcm(*(int(x.q) for x in step.x))
+        lengths.append(max(abs(int(x.p) * denominator // int(x.q)).bit_length() for x in step.x))
+    return (lengths[1] - 2 * lengths[0]) / (2 * n * n)
+
+
+@pytest.mark.parametrize("chi", [None, [-2, 0, 1], [1, 0, 1], [1, -3, 0, 1]], ids=str)
+def test_heights_over_number_fields_agree_with_exact_orbits(chi):
+    """chi of degree 3 or 2: one with a complex pair, real ones, a complex pair."""
+    member = None if chi is None else random_member_with_chi(fmpq_poly(chi), seed=3).chosen.system
+    system = load("paper_m3_irreducible") if chi is None else member
+    start = [1, 2, 3, 4, 5, 6] if chi is None or len(chi) == 4 else [3, 1, "2/3", "3/2"]
+    result = geometry(system, start, "1/10")
+    (plane,) = result.planes
+    assert plane.degree == result.rank == len(start) // 2
+    assert plane.height_error <= 1e-3 * plane.height
+    assert abs(exact_constant(system, start, "1/10", 60) / result.height_constant - 1) < 1e-3
+
+
+def test_the_height_is_absolute():
+    """Over Q(sqrt 2) the height of a point over Q is the same, also where the model has to be reduced by sqrt 2."""
+    K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
+    for unit in (K.one, K.generator, K.generator + 1):
+        block = PlanarBlock(*(unit * c for c in (1, 2, 0, -3)))
+        height = plane_height(block, (K.convert(fmpq(1, 2)), K.convert(3), unit))
+        level = PlanarBlock(fmpq(1), fmpq(2), fmpq(0), fmpq(-3))
+        _, gamma = classify(level, (fmpq(1, 2), fmpq(3), fmpq(1)))
+        assert abs(float(height.mid()) - canonical_height(gamma)) < 1e-12
+    other = plane_height(block, (K.convert(fmpq(1, 2)), K.convert(3), 2 * unit))
+    assert not other.overlaps(height)
+
+
+@pytest.mark.parametrize("multiples", [24, 1])
+def test_a_height_without_a_good_multiple_has_a_proved_error(monkeypatch, multiples):
+    """One multiple is not enough for nonsingular reduction here; the wide ball contains the narrow one."""
+    K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
+    block = PlanarBlock(*(K.convert(c) for c in (1, 2, 0, -3)))
+    point = K.convert(fmpq(1, 2)), K.generator, K.one
+    narrow = plane_height(block, point)
+    monkeypatch.setattr("kahanmaps.maps.normal_form.plane_heights._MULTIPLES", multiples)
+    wide = plane_height(block, point)
+    assert wide.overlaps(narrow)
+    assert (float(wide.rad()) < 1e-12) is (multiples == 24)
+    assert float(wide.rad()) < 1e-2
 
 
 @pytest.mark.skipif(shutil.which("gp") is None, reason="PARI/GP (gp) is not installed")

@@ -147,6 +147,19 @@ def test_an_orbit_on_no_known_curve_is_undecided(name):
         orbit_curve(system.at("1/10"), [fmpq(k, k + 1) for k in range(1, system.dim + 1)])
 
 
+def test_for_very_small_eps_the_rotation_number_is_proportional_to_eps():
+    for name, start in (("harmonic", [1, 2]), ("weierstrass", START)):
+        first, second = (km.geometry(name, start, fmpq(1, 10**k)).rotation for k in (30, 31))
+        assert float(first / second) == pytest.approx(10, rel=1e-15)
+        assert first > 0
+
+
+def test_coefficients_that_are_too_long_are_undecided_with_a_hint(monkeypatch):
+    monkeypatch.setattr("kahanmaps.maps.orbits.relations.orbit_curve._BITS", 1000)
+    with pytest.raises(UnknownCurve, match=r"seems to lie on an elliptic curve.*fewer digits"):
+        km.geometry("euler_top", SPATIAL, "1/1000003")
+
+
 def test_a_finite_orbit_determines_no_curve():
     with pytest.raises(InputError, match="the orbit has period 5"):
         km.geometry(km.load("lyness").subs(a=1), ["1/3", "2/5"])

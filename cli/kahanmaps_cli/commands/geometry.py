@@ -30,11 +30,10 @@ def command(system: str | None, as_json: bool, quiet: bool, start: Any, **option
     For a member of the commuting family, and for systems that are recognized as such, the level set of the integrals is
     a product of elliptic curves, one in each plane of the normal form, and the map is a translation of it. The planes
     belong to the roots of chi, where chi(t)^2 = det(t I - A). For each irreducible factor of chi the command prints k^3
-    of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, the j-invariant, and the order of the translation (finite or
-    infinite, proved); at a rational root also the canonical height of the translation. For each real root it prints the
-    rotation number, in (0, 1/2] and up to sign, with an error bound, and that of the flow at the time step 2 eps. A
-    pair of complex roots has two numbers instead: the coordinates of the translation in a reduced basis of the lattice
-    of periods.
+    of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, the j-invariant, the order of the translation (finite or infinite,
+    proved), and its canonical height. For each real root it prints the rotation number, in (0, 1/2] and up to sign,
+    with an error bound, and that of the flow at the time step 2 eps. A pair of complex roots has two numbers instead:
+    the coordinates of the translation in a reduced basis of the lattice of periods.
 
     For any other map the command searches for a curve of genus 1 or 0 that contains the orbit, of any dimension, and
     proves what it finds. For genus 1 it prints a Weierstrass model, the j-invariant, the translation, its canonical

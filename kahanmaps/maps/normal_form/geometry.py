@@ -16,7 +16,7 @@ from typing import Any
 
 from flint import acb, arb, fmpq
 
-from kahanmaps.algebra.elliptic_curves import canonical_height, negative_roots, rotation_number
+from kahanmaps.algebra.elliptic_curves import MAX_BITS, canonical_height, complex_roots, rotation_number
 from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display_protocols import PrintableResult
@@ -27,10 +27,14 @@ from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
-from kahanmaps.maps.normal_form.splitting import Splitting
+from kahanmaps.maps.normal_form.planar_block import Triple
+from kahanmaps.maps.normal_form.plane_heights import plane_height
+from kahanmaps.maps.normal_form.splitting import Plane, Splitting
 from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve, orbit_curve
 
 _ACCURACY = 1e-15  # of rotation numbers
+_HEIGHT_ACCURACY = 1e-12  # of heights that are printed without an error
+_MAX_HEIGHT_DEGREE = 4  # of fields over which heights are computed
 _LONGEST_HEIGHT = 4000  # bits of gamma for which a height is computed
 
 
@@ -60,7 +64,8 @@ class PlaneGeometry:
 
     `delta` = disc(h) level^2 and `gamma` = 1 - delta lie in the field of the root, as the j-invariant does; they are
     None where the level is not smooth. `order` is that of the translation, None if it is infinite (proved). `height` is
-    the canonical height of the translation point, for rational roots (numerically, with an error of about 1e-12).
+    the canonical height of the translation point (absolute, if the root is not rational), with an error of at most
+    `height_error`. `degree` is that of the field.
     """
 
     name: str
@@ -72,6 +77,8 @@ class PlaneGeometry:
     reason: str = ""
     height: float | None = None
     rotations: tuple[Rotation, ...] = ()
+    height_error: float = _HEIGHT_ACCURACY
+    degree: int = 1
 
     def lines(self) -> list[str]:
         """Return the lines of the text output."""
@@ -82,7 +89,9 @@ class PlaneGeometry:
         order = "infinite order" if self.order is None else f"order {self.order}"
         lines.append(f"  translation\t{order} (proved: {self.reason})")
         if self.height is not None:
-            lines.append(f"  canonical height\t{self.height:.10g}")
+            is_accurate = self.height_error <= _HEIGHT_ACCURACY
+            error = f"{self.height:.10g}" if is_accurate else f"{self.height:.5g} +/- {self.height_error:.1g}"
+            lines.append(f"  canonical height\t{error}")
         for rotation in self.rotations:
             of_second = ", of the second iterate: the map exchanges two real components" if rotation.steps == 2 else ""
             numbers = ", ".join(x.str(12) for x in rotation.numbers)
@@ -104,29 +113,45 @@ class PlaneGeometry:
             for rotation in self.rotations
         ]
         plain = {"name": self.name, "kind": self.kind.name.lower(), "order": self.order, "reason": self.reason}
-        return {**plain, **exact, "height": self.height, "rotations": rotations}
+        return {**plain, **exact, "height": self.height, "height_error": self.height_error, "rotations": rotations}
 
 
 @dataclass(frozen=True)
 class LevelGeometry(PrintableResult):
     """The geometry of the level set of the integrals through a point, and of the map on it.
 
-    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all planes are rational and smooth.
+    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all planes are smooth.
     """
 
     planes: tuple[PlaneGeometry, ...]
     height_constant: float | None
 
     @property
+    def rank(self) -> int | None:
+        """The rank of the group of translations that the commuting maps generate; None if a level is singular.
+
+        It is the number of roots of chi at which the translation has infinite order.
+        """
+        if any(plane.kind not in (PeriodKind.SMOOTH, PeriodKind.FIXED) for plane in self.planes):
+            return None
+        return sum(plane.degree for plane in self.planes if plane.kind is PeriodKind.SMOOTH and plane.order is None)
+
+    @property
     def text(self) -> str:
         lines = [line for plane in self.planes for line in plane.lines()]
+        if self.rank is not None:
+            lines.append(f"commuting maps\tgenerate a group of translations of rank {self.rank} (proved)")
         if self.height_constant is not None:
             lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically")
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data; exact numbers are text."""
-        return {"planes": [plane.to_json() for plane in self.planes], "height_constant": self.height_constant}
+        return {
+            "planes": [plane.to_json() for plane in self.planes],
+            "rank": self.rank,
+            "height_constant": self.height_constant,
+        }
 
 
 def geometry(
@@ -174,23 +199,33 @@ def geometry(
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:
     """Return the geometry for a system whose normal form is known; otherwise like `geometry`."""
     planes = []
-    for name, kind, gamma, rotations in _levels(normal_form, eps, start):
+    for plane, triple, kind, gamma, rotations in _levels(normal_form, eps, start):
         if kind is not PeriodKind.SMOOTH:
-            planes.append(PlaneGeometry(name, kind))
+            planes.append(PlaneGeometry(plane.name, kind, degree=plane.degree))
             continue
         delta = 1 - gamma
         order, reason = torsion_order(gamma)
-        height = None
-        if isinstance(gamma, fmpq) and max(gamma.height_bits(), 1) <= _LONGEST_HEIGHT:
+        height: arb | None = None
+        is_rational = isinstance(gamma, fmpq)
+        bits = gamma.height_bits() if is_rational else max(x.height_bits() for x in gamma.coefficients)
+        if order is not None:
+            height = arb(0)
+        elif bits <= _LONGEST_HEIGHT and is_rational:
             curve = Jacobian(gamma)
-            height = 0.0 if order is not None else float(canonical_height(curve, curve.T).mid())
+            height = canonical_height(curve, curve.T)
+        elif bits <= _LONGEST_HEIGHT and plane.degree <= _MAX_HEIGHT_DEGREE:
+            height = plane_height(plane.block, triple)
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
-        planes.append(PlaneGeometry(name, kind, delta, gamma, j, order, reason, height, rotations))
-    heights = [plane.height for plane in planes if plane.kind is not PeriodKind.FIXED]
+        middle = None if height is None else float(height.mid())
+        error = _HEIGHT_ACCURACY if height is None else max(_HEIGHT_ACCURACY, float(height.rad()))
+        planes.append(
+            PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, middle, rotations, error, plane.degree)
+        )
     # A plane cubic is embedded by a divisor of degree 3, and heights of the planes add up: docs/mathematics.md.
+    moving = [plane for plane in planes if plane.kind is not PeriodKind.FIXED]
     constant = None
-    if heights and all(height is not None for height in heights):
-        constant = sum(3 * height for height in heights if height is not None) / math.log(2)
+    if moving and all(plane.height is not None for plane in moving):
+        constant = sum(3 * plane.degree * plane.height for plane in moving if plane.height is not None) / math.log(2)
     return LevelGeometry(tuple(planes), constant)
 
 
@@ -204,8 +239,8 @@ def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start
 
 def _levels(
     normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]
-) -> Iterator[tuple[str, PeriodKind, Any, tuple[Rotation, ...]]]:
-    """Return for each plane its name, the kind of the level curve, gamma, and the rotations on a smooth one."""
+) -> Iterator[tuple[Plane, Triple, PeriodKind, Any, tuple[Rotation, ...]]]:
+    """Return for each plane the point, the kind of the level curve, gamma, and the rotations on a smooth one."""
     form: Any = getattr(normal_form, "form", normal_form)
     exact = Splitting(form, QQ, eps, getattr(normal_form, "T", None))
     for plane, triple in zip(exact.planes, exact.triples([QQ.convert(x) for x in start]), strict=True):
@@ -213,7 +248,7 @@ def _levels(
         rotations: tuple[Rotation, ...] = ()
         if kind is PeriodKind.SMOOTH:
             rotations = rotations_of(gamma, plane.block.discriminant, plane.block.h(*triple[:2]), plane.name)
-        yield plane.name, kind, gamma, rotations
+        yield plane, triple, kind, gamma, rotations
 
 
 def _text(x: Any) -> str:
@@ -232,9 +267,9 @@ def rotations_of(gamma: Any, disc: Any, h: Any, name: str) -> tuple[Rotation, ..
         disc, h: the discriminant of the cubic of the plane, and its value at the point in the coordinates 2 eps (u, v).
         name: the name of the plane, for a plane over Q.
 
-    Raises PrecisionLost if 8192 bits do not suffice.
+    Raises PrecisionLost if 32768 bits do not suffice.
     """
-    for bits in (128, 512, 2048, 8192):
+    for bits in (128, 512, 2048, 8192, MAX_BITS):
         with RR(bits).working(), suppress(PrecisionLost):
             rotations = []
             if isinstance(gamma, fmpq):
@@ -251,7 +286,10 @@ def rotations_of(gamma: Any, disc: Any, h: Any, name: str) -> tuple[Rotation, ..
             balls = [x for rotation in rotations for x in (*rotation.numbers, rotation.flow) if x is not None]
             if all(x.is_finite() and float(x.rad()) < _ACCURACY for x in balls):
                 return tuple(rotations)
-    raise PrecisionLost("rotation numbers need more than 8192 bits: the level is almost singular")
+    raise PrecisionLost(
+        f"the rotation numbers need more than {MAX_BITS} bits, since the level is almost singular: choose an initial "
+        "point or eps with fewer digits"
+    )
 
 
 def _at(element: Any, root: Any) -> Any:
@@ -284,14 +322,15 @@ def _flow_rotation(disc: arb, h: arb) -> arb:
 
 def _complex_rotation(gamma: acb) -> tuple[arb, arb]:
     """Return the coordinates of T in a reduced basis of the periods."""
-    curve = Jacobian(gamma)
-    a, b, c = negative_roots([curve.a6, curve.a4, curve.a2, acb(1)])
+    a, b, c = sorted((-root for root in complex_roots(Jacobian(gamma))), key=lambda e: (e.real.mid(), e.imag.mid()))
     zero = acb(0)
     first, second = (2 * acb.elliptic_rf(zero, *pair) for pair in ((b - a, c - a), (a - b, c - b)))
     while True:  # Gauss
         if abs(first) > abs(second):
             first, second = second, first
         quotient = (second / first).real
+        if not quotient.is_finite():
+            raise PrecisionLost("the periods are too inaccurate")
         number = round(float(quotient.mid()))
         if not number:
             break

@@ -44,11 +44,13 @@ class TooLongRelation(Exception):
     """The orbit lies on elliptic curves, but the coefficients of its forms are longer than its points so far."""
 
 
-def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSteps | None:
+def elliptic_steps(
+    map_over: Map, start: IntegerPoint, bits: int, most_primes: int = _MAX_PRIMES
+) -> EllipticSteps | None:
     """Search for elliptic curves that contain the orbit of `start`, and return its steps; None if none is found.
 
     `bits` is the length of the points; only coefficients that are much shorter are of use. Raises TooLongRelation if
-    those of a curve are longer, but may be of use once the points have grown.
+    those of a curve are longer, but may be of use once the points have grown; not if `most_primes` are too few.
     """
     factors = map_over.factors
     period = next(  # the shortest initial sequence of factors of which all factors are a repetition
@@ -56,7 +58,7 @@ def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSte
         for k in range(1, len(factors) + 1)
         if len(factors) % k == 0 and all(factor is factors[i % k] for i, factor in enumerate(factors))
     )
-    max_primes = min(_MAX_PRIMES, bits // _BITS_PER_PRIME)
+    max_primes = min(most_primes, bits // _BITS_PER_PRIME)
     start_point: IntegerPoint | None = start
     for skipped in (0, _SKIPPED_STEPS) if len(period) <= _MAX_FACTORS else ():
         for _ in range(skipped):
@@ -75,7 +77,7 @@ def elliptic_steps(map_over: Map, start: IntegerPoint, bits: int) -> EllipticSte
             if exact_curves is not None and _is_proved(start_point, search, exact_curves.steps(map_over)):
                 return exact_curves.steps(map_over, skipped)
             if search.sections:  # there are curves, but their coefficients are too long
-                if max_primes < _MAX_PRIMES:
+                if max_primes < most_primes:
                     raise TooLongRelation
                 return None
         if not is_special:

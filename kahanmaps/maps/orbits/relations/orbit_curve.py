@@ -34,10 +34,10 @@ from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve
 from kahanmaps.maps.implicit import Map
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
-from kahanmaps.maps.orbits.relations.elliptic_orbit import elliptic_steps
+from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 from kahanmaps.maps.orbits.relations.elliptic_steps import EllipticSteps
 
-_BITS = 10_000  # of coefficients that are searched for
+_BITS = 100_000  # of coefficients that are searched for, and of points on rational curves
 _PERIODS = 24  # up to this period an orbit is recognized as periodic: twice the largest order of a torsion point
 _ACCURACY = 1e-15  # of rotation numbers
 
@@ -125,7 +125,13 @@ def orbit_curve(map_over: Map, start: Sequence[Any]) -> OrbitCurve:
     (1, -7323, 229622, '0.15215519')
     """
     point = IntegerPoint.from_rationals(map_over.point(start))
-    steps = elliptic_steps(map_over, point, _BITS)
+    try:
+        steps = elliptic_steps(map_over, point, _BITS, most_primes=_BITS)
+    except TooLongRelation:
+        raise UnknownCurve(
+            f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_BITS} "
+            "bits: choose an initial point, eps or parameters with fewer digits"
+        ) from None
     if steps is not None:
         return _on_elliptic_curve(map_over, steps)
     result = _on_rational_curve(map_over, point)
@@ -260,5 +266,5 @@ def _rational(iterate: int, trace: fmpq) -> OrbitCurve:
     rotation = None
     if abs(trace) < 2:
         with RR(128).working():
-            rotation = (arb(trace) / 2).acos() / (2 * arb.pi())
+            rotation = arb.atan2(arb(4 - trace * trace).sqrt(), arb(trace)) / (2 * arb.pi())
     return OrbitCurve(0, iterate, trace=trace, rotation=rotation)

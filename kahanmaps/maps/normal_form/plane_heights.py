@@ -1,0 +1,155 @@
+"""The canonical height of the translation of a plane, over Q or a number field Q[t]/g.
+
+With integral coefficients of h and integral coordinates (U : V : W) let u = W (W^2 + D) and G = u^2 - disc(h) h^2, so
+that gamma = G/u^2. With x = 4 u^2 X the Jacobian is the curve with b2 = 9 u^2 + 3 G, b4 = 6 G u^2, b6 = 4 G^2 u^2. It
+has an integral Weierstrass equation, since modulo 4 disc(h) is the square of s = ad + bc, and b2 = disc(h) h^2 there:
+a1 = s h, a3 = 0, a2 = (b2 - a1^2)/4, a4 = b4/2, a6 = b6/4. So at each prime the points with nonsingular reduction are
+a group. If m T is one of them at all primes, no doubling of it cancels a common factor, and only the archimedean
+parts of Tate's series remain. Whether this is so, is seen at the first doubling, one prime at a time. Factors that are
+cancelled at other primes divide a resultant R, which bounds the rest of the series.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import Any
+
+from flint import acb, arb, fmpq_poly, fmpz
+
+from kahanmaps.algebra.elliptic_curves import MAX_BITS, EllipticCurve
+from kahanmaps.algebra.fields import RR
+from kahanmaps.algebra.integers import split_by_primes
+from kahanmaps.errors import PrecisionLost
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
+
+_MULTIPLES = 24  # m, of which the reduction of m T is looked at
+_LARGE_MULTIPLE = 50  # if some primes are bad for all of them, a multiple from here on is taken
+_SMALL = 3  # coefficients of elements by which the model is reduced
+_TERMS = 40  # of the series, which decrease like 4^-n
+_ACCURACY = 1e-14
+
+
+def plane_height(block: PlanarBlock, point: Triple) -> arb:
+    """Return the canonical height of T, half of that of its x-coordinate, as a ball.
+
+    Args:
+        block: the cubic of the plane, with coefficients in Q[t]/g, g irreducible.
+        point: a point of a smooth level, on which T has infinite order.
+
+    The height is absolute: that over the field divided by the degree. The ball is wide if no small multiple of T has
+    nonsingular reduction at all primes. Raises PrecisionLost for balls of 32768 bits.
+    """
+    K = point[0].field
+    coefficients, (U, V, W) = [block.a, block.b, block.c, block.d], point
+    scale, multiple = _denominator(coefficients), _denominator(point)
+    # With scale h and scale W for h and W both delta and the orbit are the same.
+    a, b, c, d = (scale * x for x in coefficients)
+    block, U, V, W = PlanarBlock(a, b, c, d), multiple * U, multiple * V, multiple * scale * W
+    p, q, r = block.D
+    u, h = W * (W * W + p * U * U + q * U * V + r * V * V), block.h(U, V)
+    G = u * u - block.discriminant * h * h
+    (b2, b4, b6, b8), w = _reduced((9 * u * u + 3 * G, 6 * G * u * u, 4 * G * G * u * u, 3 * G**3 * u * u))
+    curve, T = EllipticCurve(b2 / 4, b4 / 2, b6 / 4), (K.zero, G * u / w**3)
+    resultant = (16 * curve.discriminant) ** 2
+    norm = abs(K.norm(resultant)).p
+
+    def uncertain(Q: Any) -> fmpz:
+        """The part of the norm of R at those primes at which the doubling of Q cancels factors; 1 if there are none."""
+        # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; norms of ideals are leading coefficients.
+        left = abs(K.norm(4 * Q[1] * Q[1])) * _leading(Q[0]) ** 4
+        cancelled = left / _leading(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
+        return split_by_primes(norm, cancelled.p)[1]
+
+    multiples, Q = list[tuple[fmpz, int, Any]](), T
+    while len(multiples) < _MULTIPLES and (not multiples or multiples[-1][0] > 1):
+        multiples.append((uncertain(Q), len(multiples) + 1, Q))
+        Q = curve.add(Q, T)  # type: ignore[assignment]
+    part, m, Q = min(multiples, key=lambda entry: float(arb(entry[0]).log()) / entry[1] ** 2)
+    while part > 1 and m < _LARGE_MULTIPLE:  # further multiples are uncertain at no other primes
+        m, Q = 2 * m, curve.add(Q, Q)  # type: ignore[assignment]
+    height = _archimedean(Q[0], (b2, b4, b6, b8), resultant)
+    with RR(128).working():  # the remaining cancelled factors divide R, and lower the height
+        sixth = arb(part).log() / (6 * K.degree)
+        return (height - sixth + arb(0, sixth.upper())) / (2 * m * m)
+
+
+def _reduced(b: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
+    """Return b2/w^2, b4/w^4, b6/w^6, b8/w^8 and a product w of small elements for which this is integral.
+
+    The curve still has an integral Weierstrass equation at each prime: for the primes over 2 it is searched for.
+    """
+    K, total = b[0].field, b[0].field.one
+    vectors = list(product(range(-_SMALL, _SMALL + 1), repeat=K.degree))
+    elements = [K.convert(fmpq_poly(list(vector))) * _denominator([K.generator]) for vector in vectors if any(vector)]
+    small = sorted((abs(K.norm(w)), k) for k, w in enumerate(elements))
+    residues = [K.convert(fmpq_poly(list(vector))) for vector in product((0, 1), repeat=K.degree)]
+
+    def has_equation(b2: Any, b4: Any, b6: Any) -> bool:
+        return any(
+            _is_integral((b2 - a1 * a1) / 4) and _is_integral((b4 - a1 * a3) / 2) and _is_integral((b6 - a3 * a3) / 4)
+            for a1 in residues
+            for a3 in residues
+        )
+
+    for norm, k in small:
+        w = elements[k]
+        while norm > 1:
+            divided = tuple(x / w**power for x, power in zip(b, (2, 4, 6, 8), strict=True))
+            if not all(map(_is_integral, divided)) or (norm.p % 2 == 0 and not has_equation(*divided[:3])):
+                break
+            b, total = divided, total * w
+    return b, total
+
+
+def _is_integral(element: Any) -> bool:
+    return bool(element.matrix.charpoly().denom() == 1)
+
+
+def _denominator(elements: Any) -> int:
+    """Return an integer that makes elements of Q[t]/g integral, if multiplied by it."""
+    common = fmpz(1)
+    for element in elements:
+        common = common.lcm(element.polynomial.denom())
+    field = elements[0].field
+    return int(common * field.chi.denom() ** (field.degree - 1))
+
+
+def _leading(element: Any) -> fmpz:
+    """Return the leading coefficient of the primitive polynomial over Z whose roots are the values of an element."""
+    return fmpq_poly(element.matrix.charpoly()).denom()
+
+
+def _archimedean(x: Any, b: Any, resultant: Any) -> arb:
+    """Return the height of x plus the archimedean parts of Tate's series."""
+    K = x.field
+    for bits in (1 << 9, 1 << 11, 1 << 13, MAX_BITS):
+        with RR(bits).working():
+            total = arb(_leading(x)).log()
+            for root, _ in K.chi.complex_roots():
+                values = [_at(element, acb(root)) for element in (x, *b, resultant)]
+                X, b2, b4, b6, b8, R = values
+                Z, scale = acb(1), arb(1)
+                largest = sum((abs(c) for c in (b2, 2 * b4, 2 * b6, b8)), arb(4))
+                bound = abs(abs(R).log()) + 8 * largest.log() + math.log(math.factorial(8))
+                for k in range(_TERMS + 1):
+                    size = abs(X).max(abs(Z))
+                    total += scale * size.log()
+                    X, Z = X / size, Z / size
+                    X, Z = (
+                        X**4 - b4 * (X * Z) ** 2 - 2 * b6 * X * Z**3 - b8 * Z**4,
+                        4 * X**3 * Z + b2 * (X * Z) ** 2 + 2 * b4 * X * Z**3 + b6 * Z**4,
+                    )
+                    scale /= 4 if k < _TERMS else 1
+                total += arb(0, (scale * bound).upper())
+            if total.is_finite() and float(total.rad()) < _ACCURACY:
+                return total / K.degree
+    raise PrecisionLost(f"the height needs more than {MAX_BITS} bits: the level is almost singular")
+
+
+def _at(element: Any, root: acb) -> acb:
+    """Return the value of an element of Q[t]/g at a root of g."""
+    total = acb(0)
+    for coefficient in reversed(element.polynomial.coeffs()):
+        total = total * root + arb(coefficient)
+    return total
