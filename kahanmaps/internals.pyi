@@ -136,6 +136,7 @@ from .laboratory.singular.singularities import steps_by_default as steps_by_defa
 from .laboratory.singular.singularities import symbolic_denominator as symbolic_denominator
 from .laboratory.symmetry.commuting import find_commuting as find_commuting
 from .laboratory.symmetry.symmetries import linear_symmetries as linear_symmetries
+from .laboratory.vector_field.modified import modified as modified
 from .languages.convert import convert as convert
 from .maps.algebraic import over_number_field as over_number_field
 from .maps.convention import CONVENTION as CONVENTION
