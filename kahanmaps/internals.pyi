@@ -55,6 +55,7 @@ from .documents.catalog import titles as titles
 from .documents.families import FAMILIES as FAMILIES
 from .documents.files import MAX_FILE_BYTES as MAX_FILE_BYTES
 from .documents.files import SystemFile as SystemFile
+from .documents.files import matched as matched
 from .documents.files import parse_system as parse_system
 from .documents.inline import inline_file as inline_file
 from .documents.iterates import iterates_in as iterates_in
@@ -146,6 +147,8 @@ from .maps.convention import eps_share as eps_share
 from .maps.convention import eps_suffix as eps_suffix
 from .maps.convention import time_step as time_step
 from .maps.floats.classical import METHODS as METHODS
+from .maps.floats.commutator import Commutator as Commutator
+from .maps.floats.commutator import commutator as commutator
 from .maps.floats.ensemble import starts_in_box as starts_in_box
 from .maps.floats.float_conversion import FloatArray as FloatArray
 from .maps.floats.float_conversion import to_float as to_float
