@@ -43,10 +43,7 @@ def print_json(data: Mapping[str, Any]) -> None:
 def print_report(
     report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False, measured: Any = None
 ) -> int:
-    """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed.
-
-    `measured` are numbers beside the exact report, with `lines` and `to_json`.
-    """
+    """Print a report, and numbers measured beside it; return the exit status that the verdict stands for."""
     if as_json:
         name = click.get_current_context().info_name or ""
         beside = {} if measured is None else {"measured": measured.to_json()}

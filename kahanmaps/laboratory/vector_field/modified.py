@@ -24,7 +24,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ, integer
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import degree, evaluate, gradient, is_homogeneous, monomials, primitive_part, ring
-from kahanmaps.algebra.printing import format_polynomial
+from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
@@ -86,24 +86,13 @@ class ModifiedField(PrintableResult):
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        orders = range(0, self.order + 1, 2)
+        even, names = range(0, self.order + 1, 2), ("integral", "verdict", "order", "degree", "corrections")
         return {
             "order": self.order,
             "variables": list(self.file.variables),
-            "field": [{"order": k, "rhs": [format_polynomial(p) for p in self.fields[k]]} for k in orders],
-            "hamiltonian": [
-                {"order": k, "term": format_polynomial(self.hamiltonian[k])} for k in orders if self.hamiltonian
-            ],
-            "flow_integrals": [
-                {
-                    "integral": format_polynomial(found.integral),
-                    "verdict": found.verdict,
-                    "order": found.order,
-                    "degree": found.degree,
-                    "corrections": [format_polynomial(p) for p in found.corrections],
-                }
-                for found in self.integrals
-            ],
+            "field": [{"order": k, "rhs": plain(self.fields[k])} for k in even],
+            "hamiltonian": [{"order": k, "term": plain(self.hamiltonian[k])} for k in even if self.hamiltonian],
+            "flow_integrals": [attributes(found, *names) for found in self.integrals],
         }
 
     def lines(self) -> list[str]:
@@ -173,13 +162,11 @@ def modified_fields(
     """
     context = ring(system.variables)
     f = tuple(p.project_to_context(context) for p in system.rhs)
-    jacobian = [gradient(p) for p in f]
-    power = f  # f'^{n-1} f
-    fields: list[Field] = [f]
+    power, fields = f, [f]
     # powers[j][p] is the coefficient of eps^p of D^j x, for j > 0.
     powers: list[list[Field]] = [[], [f]]
     for n in range(2, order + 2):
-        power = tuple(sum((a * b for a, b in zip(row, power, strict=True)), context.constant(0)) for row in jacobian)
+        power = _derivative(power, f)  # f'^{n-1} f
         progress(f"the modified field at eps^{n - 1}")
         rest = [2 * p for p in power]
         powers.append([])
@@ -201,13 +188,10 @@ def modified_hamiltonian(hamiltonian: CubicHamiltonian, order: int) -> tuple[fmp
     >>> modified_hamiltonian(load("harmonic").hamiltonian, 2)
     (1/2*x^2 + 1/2*y^2, 0, -2/3*x^2 - 2/3*y^2)
     """
-    f = hamiltonian.system.rhs
-    jacobian = [gradient(p) for p in f]
-    series, vector = [hamiltonian.H], f
+    series, vector = [hamiltonian.H], hamiltonian.system.rhs  # f'^k f
     for _ in range(order):
-        product = sum((a * b for a, b in zip(hamiltonian.gradient, vector, strict=True)), 0 * hamiltonian.H)
-        series.append(product * fmpq(2, 3))
-        vector = tuple(sum((a * b for a, b in zip(row, vector, strict=True)), 0 * hamiltonian.H) for row in jacobian)
+        series.append(fmpq(2, 3) * _derivative(vector, [hamiltonian.H])[0])
+        vector = _derivative(vector, hamiltonian.system.rhs)
     return tuple(series)
 
 

@@ -53,8 +53,8 @@ class Commutator:
         """Return plain data."""
         return {
             "by_step": [{"step": n, "size": json_float(size)} for n, size in self.by_step],
-            "largest": json_float(self.largest),
             "by_eps": [{"eps": format_number(eps), "size": json_float(size)} for eps, size in self.by_eps],
+            "largest": json_float(self.largest),
             "slope": self.slope,
             "message": self.message,
         }
