@@ -184,6 +184,8 @@ from .plots.curves.level_sets import levels_through as levels_through
 from .plots.curves.plot_invariant_curves import panels_of as panels_of
 from .plots.curves.plot_invariant_curves import plot_invariant_curves as plot_invariant_curves
 from .plots.curves.plot_invariant_curves import view_of as view_of
+from .plots.escape import plot_escape as plot_escape
+from .plots.escape import survey_escape as survey_escape
 from .plots.figures import format_of as format_of
 from .plots.figures import picture_bytes as picture_bytes
 from .plots.figures import require_matplotlib as require_matplotlib

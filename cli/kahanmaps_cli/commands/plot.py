@@ -1,4 +1,4 @@
-"""kahanmaps plot portrait | invariant-curves | compare | heights | degrees | scan | rotation | commute."""
+"""kahanmaps plot portrait | invariant-curves | compare | escape | heights | degrees | scan | rotation | commute."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import commute, compare, growth, invariant_curves, portrait, rotation, scan
+from kahanmaps_cli.pictures import commute, compare, escape, growth, invariant_curves, portrait, rotation, scan
 
 
 class PlotCommands(SuggestingGroup):
@@ -37,6 +37,7 @@ for _command in (
     portrait.command,
     invariant_curves.command,
     compare.command,
+    escape.command,
     growth.heights,
     growth.degrees,
     scan.command,
