@@ -110,6 +110,8 @@ from .laboratory.vector_field.equivalence import Equivalence as Equivalence
 from .laboratory.vector_field.equivalence import equivalent_system as equivalent_system
 from .laboratory.vector_field.fixed_points import FixedPointSearch as FixedPointSearch
 from .laboratory.vector_field.fixed_points import fixed_points as fixed_points
+from .laboratory.vector_field.modified import ModifiedField as ModifiedField
+from .laboratory.vector_field.modified import modified as modified
 from .languages.convert import convert as convert
 from .maps.bilinear import bilinear_map as bilinear_map
 from .maps.composed import composed_map as composed_map

@@ -37,7 +37,7 @@ HINTS = {
     **dict.fromkeys(("darboux", "darboux_polynomial", "find_darboux"), "km.darboux_polynomials(system, degree)"),
     **dict.fromkeys(("equilibria", "fixed_points", "critical_points", "steady_states"), "km.fixed_points(system)"),
     **dict.fromkeys(("certify", "prove", "proof", "verify_certificate"), 'km.certificate(system, "sympy")'),
-    **dict.fromkeys(("modified_hamiltonian", "modified_integrals"), "km.check_integrals(system), which includes it"),
+    **dict.fromkeys(("modified_hamiltonian", "modified_equation", "backward_error"), "km.modified(system)"),
     **dict.fromkeys(("lyapunov_exponent", "lyapunov_spectrum"), "km.lyapunov(system, x0, eps, steps)"),
     **dict.fromkeys(("drift", "energy_error", "plot_drift", "rk4"), "km.compare(system, x0, eps, steps)"),
     **dict.fromkeys(("plot_orbit", "phase_portrait", "plot_portrait"), "km.portrait(system), or km.orbit(...).plot()"),

@@ -55,6 +55,8 @@ from .documents.catalog import titles as titles
 from .documents.families import FAMILIES as FAMILIES
 from .documents.files import MAX_FILE_BYTES as MAX_FILE_BYTES
 from .documents.files import SystemFile as SystemFile
+from .documents.files import float_normal_form as float_normal_form
+from .documents.files import matched as matched
 from .documents.files import parse_system as parse_system
 from .documents.inline import inline_file as inline_file
 from .documents.iterates import iterates_in as iterates_in
@@ -101,7 +103,6 @@ from .family.recognition import why_not_member as why_not_member
 from .family.skew_hamiltonian import chi as chi
 from .family.skew_hamiltonian import diagnosis as diagnosis
 from .family.system_normal_form import NoNormalForm as NoNormalForm
-from .family.system_normal_form import SystemNormalForm as SystemNormalForm
 from .hard_stop import TimeLimit as TimeLimit
 from .hard_stop import time_limit as time_limit
 from .invariants.growth import Growth as Growth
@@ -136,6 +137,7 @@ from .laboratory.singular.singularities import steps_by_default as steps_by_defa
 from .laboratory.singular.singularities import symbolic_denominator as symbolic_denominator
 from .laboratory.symmetry.commuting import find_commuting as find_commuting
 from .laboratory.symmetry.symmetries import linear_symmetries as linear_symmetries
+from .laboratory.vector_field.modified import modified as modified
 from .languages.convert import convert as convert
 from .maps.algebraic import over_number_field as over_number_field
 from .maps.convention import CONVENTION as CONVENTION
@@ -145,6 +147,9 @@ from .maps.convention import eps_share as eps_share
 from .maps.convention import eps_suffix as eps_suffix
 from .maps.convention import time_step as time_step
 from .maps.floats.classical import METHODS as METHODS
+from .maps.floats.classical import MethodEnsemble as MethodEnsemble
+from .maps.floats.commutator import Commutator as Commutator
+from .maps.floats.commutator import commutator as commutator
 from .maps.floats.ensemble import starts_in_box as starts_in_box
 from .maps.floats.float_conversion import FloatArray as FloatArray
 from .maps.floats.float_conversion import to_float as to_float
@@ -181,6 +186,8 @@ from .plots.curves.level_sets import levels_through as levels_through
 from .plots.curves.plot_invariant_curves import panels_of as panels_of
 from .plots.curves.plot_invariant_curves import plot_invariant_curves as plot_invariant_curves
 from .plots.curves.plot_invariant_curves import view_of as view_of
+from .plots.escape import plot_escape as plot_escape
+from .plots.escape import survey_escape as survey_escape
 from .plots.figures import format_of as format_of
 from .plots.figures import picture_bytes as picture_bytes
 from .plots.figures import require_matplotlib as require_matplotlib
@@ -197,7 +204,6 @@ from .plots.portraits.flow import projected_solutions as projected_solutions
 from .plots.portraits.portrait import plot_portrait as plot_portrait
 from .plots.portraits.portrait import portrait_of as portrait_of
 from .plots.portraits.trajectories import ensemble_of_file as ensemble_of_file
-from .plots.portraits.trajectories import euler_orbits as euler_orbits
 from .plots.portraits.trajectories import field_of as field_of
 from .plots.portraits.trajectories import walked as walked
 from .plots.portraits.windows import Window as Window

@@ -53,6 +53,7 @@ SECTIONS = {
         "find-poisson": ("find_poisson", "Search for invariant Poisson tensors with polynomial entries."),
         "find-symmetry": ("find_symmetry", "Find the affine symmetries and reversing symmetries of a map."),
         "find-commuting": ("find_commuting", "Find all quadratic systems whose Kahan maps commute with this one."),
+        "modified": ("modified", "Compute the modified vector field of a Kahan map, as a series in eps."),
         "singularities": ("singularities", "Trace singularities: are they confined, and after how many steps?"),
         "cycles": ("cycles", "Count the cycles of a map over a finite field."),
         "lyapunov": ("lyapunov", "Estimate Lyapunov exponents of floating-point orbits."),

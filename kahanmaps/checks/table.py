@@ -80,6 +80,7 @@ _CHECKS = [
             "f.toml g.toml --eps 1/10 --eps2 1/7",
             "--vars x,y --rhs y --rhs=-x harmonic",
             "paper_m2 --json | jq .verdict",
+            "f.toml g.toml --start 1,1/2 --eps 1/10 --steps 1000 \\\n--arithmetic float",
         ),
         """
         Without --eps the maps are compared for every eps.
@@ -90,6 +91,9 @@ _CHECKS = [
         SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p
         sets a parameter of both systems, or of the one that has it. An inline system (--rhs) and a SYSTEM are f and g
         in the order in which they are typed.
+
+        --arithmetic float measures the size of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)) along a float orbit, and its order
+        in eps; the verdict and the exit status are those of the exact check beside it.
         """,
         "they commute",
         is_of_pair=True,

@@ -275,6 +275,14 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return hash((self.name, self.kind, self.variables))
 
 
+def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNormalForm | NoNormalForm:
+    """Return the normal form in which floats can step, or why there is none; none for the method "generic"."""
+    normal_form = NoNormalForm("generic, as requested") if method == "generic" else file.normal_form
+    if not isinstance(normal_form, NoNormalForm) and normal_form.T is not None:
+        return NoNormalForm("in floating point only J = [[0, I], [-I, 0]] has a normal form")
+    return normal_form
+
+
 def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
     """Read a system from a TOML file; `parameters` replace those of the file.
 

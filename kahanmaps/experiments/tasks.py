@@ -18,7 +18,7 @@ from kahanmaps.checks.claims import Certainty, Report
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.checks.table import CHECKS, Check
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.files import SystemFile, float_normal_form
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, SYSTEM, FullResult, Result, fields, task
 from kahanmaps.family.cubics import cubic_space
@@ -124,7 +124,7 @@ def orbit(
         raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
     normal_form: SystemNormalForm | NoNormalForm = NoNormalForm("as requested")
     if method != "generic" and system.is_quadratic:
-        normal_form = _float_normal_form(system, method) if parsed_arithmetic.kind == "float" else system.normal_form
+        normal_form = float_normal_form(system, method) if parsed_arithmetic.kind == "float" else system.normal_form
     trajectory = find_orbit(
         system.map,
         point,
@@ -176,7 +176,7 @@ def ensemble(
     from kahanmaps.maps.floats.float_orbit import to_floats
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
-    normal_form = _float_normal_form(system, method)
+    normal_form = float_normal_form(system, method)
     chosen = choose_method(method, "float", normal_form, None)
     form = normal_form.form if chosen.name == "normal-form" and isinstance(normal_form, SystemNormalForm) else None
     # Both kernels give the same numbers, but compiling one takes longer than a short task.
@@ -256,10 +256,3 @@ def _full_result(report: Report) -> FullResult:
         **({"m": report.context["m"]} if "m" in report.context else {}),
         **({"doubtful": doubtful} if doubtful else {}),
     }, report
-
-
-def _float_normal_form(system: SystemFile, method: str | None) -> SystemNormalForm | NoNormalForm:
-    normal_form = NoNormalForm("as requested") if method == "generic" else system.normal_form
-    if isinstance(normal_form, SystemNormalForm) and normal_form.T is not None:
-        return NoNormalForm("floating-point normal forms exist for J = [[0, I], [-I, 0]] only")
-    return normal_form

@@ -38,7 +38,8 @@ from kahanmaps.family.system_normal_form import NoNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.maps.orbits.methods import choose_method
-from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for
+from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for, orbit
+from kahanmaps.maps.orbits.writers import writer_to
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
@@ -353,3 +354,42 @@ def test_where_no_precision_is_enough_that_is_said():
         return Orbit(KahanMap(riccati, "1/2", RR(bits)), ["1/4"], 9)
 
     refuses("give 15 digits", bits_for, orbit_with, 15, error=NotAccurate)
+
+
+@pytest.mark.parametrize("form", ["text", "json", "jsonl", "csv", "npz", "parquet", "npy"])
+@pytest.mark.parametrize("kind", ["complete", "early"])
+def test_portions_of_a_float_orbit_give_the_same_file_as_its_points(tmp_path, monkeypatch, form, kind):
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    monkeypatch.setattr("kahanmaps.maps.floats.ensemble._RECORDED_NUMBERS", 12)  # so that there are many portions
+    system, start, eps = load("euler_top"), [1, "1/2", "1/3"], "1/10"
+    if kind == "early":
+        system, start, eps = QuadraticSystem.from_text(["x"], ["x"]), [1], "99/101"  # x~ = 100 x overflows at step 155
+
+    def made():
+        return orbit(system, start, eps, steps=200, every=3, exact=False)
+
+    made().write(tmp_path / f"a.{form}", form)
+    rows = [[point.step, *point.x] for point in made()]
+    assert len(rows) == (67 if kind == "complete" else 52)
+    if form in ("npz", "npy"):
+        held = np.load(tmp_path / f"a.{form}")
+        x = held if form == "npy" else held["x"]
+        assert x.tolist() == [row[1:] for row in rows]
+        assert form == "npy" or held["step"].tolist() == [row[0] for row in rows]
+        return
+    if form == "parquet":
+        import pyarrow.parquet
+
+        table = pyarrow.parquet.read_table(tmp_path / "a.parquet")
+        assert [list(row.values()) for row in table.to_pylist()] == rows
+        assert json.loads(table.schema.metadata[b"kahanmaps"])["end"]["status"] == made().end.status
+        return
+    # Point by point, as an orbit with kept points or in another arithmetic is written.
+    trajectory = made()
+    with writer_to(tmp_path / f"b.{form}", form, trajectory.variables, []) as writer:
+        writer.header(trajectory.header())
+        for point in trajectory:
+            writer.point(point.step, point.text, [])
+        writer.end(*trajectory._ended(trajectory.end))
+    assert (tmp_path / f"a.{form}").read_bytes() == (tmp_path / f"b.{form}").read_bytes()

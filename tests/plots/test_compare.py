@@ -180,7 +180,7 @@ def test_newton_counts_repeated_steps_and_failures():
     result = compare(SQUARE, [[10], ["1/10"]], "1/2", 3, methods=["midpoint", "gauss4"], integrals=[("", "x")])
     midpoint, gauss4 = result.runs
     assert (midpoint.failures, [end.status for end in midpoint.ends]) == (1, ["singular", "completed"])
-    assert midpoint.evaluations == 3 * 3 + 8 * midpoint.repeated
+    assert midpoint.evaluations == 3 * 3 + 9 * midpoint.repeated
     assert gauss4.ends[1].is_complete
     assert "Newton's method failed in 1 orbit" in result.text
 

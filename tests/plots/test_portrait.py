@@ -8,12 +8,12 @@ from helpers import together
 from matplotlib.collections import PathCollection
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.maps.floats.classical import VectorField
+from kahanmaps.maps.floats.classical import MethodEnsemble, VectorField
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portraits.flow import COUNT, automatic_starts, equilibria, plane_flow, solution
 from kahanmaps.plots.portraits.portrait import neighbours, plot_portrait, portrait_of
-from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, euler_orbits, walked
+from kahanmaps.plots.portraits.trajectories import Trajectories, ensemble_for, walked
 from kahanmaps.plots.portraits.windows import fullest_axes, outside, window_of
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -57,7 +57,7 @@ def test_orbits_that_ended_are_not_called_undefined():
 
 def test_explicit_euler_is_what_its_formula_says_and_spirals_outward_where_kahans_orbit_does_not():
     start, (x, y) = np.array([[1.0, 2.0]]), (1.0, 2.0)
-    euler = euler_orbits(LOTKA_VOLTERRA, "1/20", start, 100).points
+    euler = walked(MethodEnsemble(LOTKA_VOLTERRA, "1/20", start, "euler"), 100).points
     np.testing.assert_allclose(euler[1, 0], [x + 0.1 * x * (1 - y), y + 0.1 * y * (x - 1)])
     kahan = walked(ensemble_for(LOTKA_VOLTERRA, "1/20", start, 2000), 2000).points
     spiral, closed = (points.sum(axis=2) - np.log(points).sum(axis=2) for points in (euler, kahan))

@@ -29,7 +29,7 @@ def command(name: str) -> click.Command:
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
-        is_swapped, proof = False, dict[str, Any]()
+        is_swapped, proof, measured = False, dict[str, Any](), None
         require_every_eps(options)
         if check.is_of_pair:
             system, other = opt.in_order(system, other, options)
@@ -37,10 +37,13 @@ def command(name: str) -> click.Command:
         with Progress(options["quiet"]) as progress:
             if check.is_of_pair:
                 pair, start = opt.load_with_start(options, partial(opt.load_pair, system, other), system, other)
-                settings = opt.settings_from(options, progress, start)
                 file, second = pair
                 if is_swapped and second is not None:
                     file, second = second, file
+                if options["arithmetic"] == "float":
+                    measured = _measured_commutator(file, second, start, eps2, options)
+                    options |= {"start": None, "steps": None}  # which are those of the float orbit
+                settings = opt.settings_from(options, progress, options["start"] and start)
                 report = check(file, second, settings, eps2)
                 proof["commute"] = "associates" if second is None else second
             else:
@@ -55,7 +58,7 @@ def command(name: str) -> click.Command:
                 report = check(file, settings, claim, **extra)
                 if option is not None and claim is not None:
                     proof[_CLAIM_OF_CERTIFICATE[name]] = claim
-        status = print_report(report, options["as_json"], options["verbose"], options["quiet"])
+        status = print_report(report, options["as_json"], options["verbose"], options["quiet"], measured)
 
         def write(checker: str) -> str:
             known: dict[str, Any] = {} if proof else {"claims": lib.known_claims(file, name.removeprefix("check-"))}
@@ -70,6 +73,14 @@ def command(name: str) -> click.Command:
             type=ExactNumber(),
             metavar="E",
             help="Half the time step of the second map (needs --eps; default: the same).",
+        )(run)
+        run = click.option(
+            "--arithmetic",
+            type=click.Choice(("exact", "float")),
+            default="exact",
+            show_default=True,
+            help="float: also measure the commutator along the float orbit of --start, for --steps steps (default "
+            "1000), and for smaller eps.",
         )(run)
         run = opt.inline_options(run)
         run = click.argument("other", required=False, shell_complete=complete_system)(run)
@@ -88,6 +99,20 @@ def command(name: str) -> click.Command:
     help_text = "\n\n".join([check.headline, examples, cleandoc(check.text), _STATUS.format(check.outcome)])
     click_command: click.Command = click.command(name, cls=kind, help=help_text)(run)
     return click_command
+
+
+def _measured_commutator(
+    file: lib.SystemFile, second: lib.SystemFile | None, start: Any, eps2: Any, options: dict[str, Any]
+) -> lib.Commutator:
+    """Measure the commutator of two maps along a float orbit."""
+    eps = opt.requested_eps(options["eps"], options["time_step"], required=False)
+    if second is None or start is None or eps is None:
+        raise click.UsageError("--arithmetic float needs OTHER, --start X and --eps E (or --time-step H)")
+    if isinstance(start, lib.AlgebraicPoint):
+        start = start.real_approximation()
+    first, other = file.real_approximation, second.real_approximation
+    steps, ratio = options["steps"], 1 if eps2 is None else eps2 / eps
+    return lib.commutator(first.map, lib.matched(first, other)[0], eps, start, 1000 if steps is None else steps, ratio)
 
 
 class _PairCommand(click.Command):

@@ -59,8 +59,8 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
         if not quiet:
             print_stderr(f"{output}: {counted(len(result.rows()), 'row')}")
     if as_json:
-        record = lib.eps_record(result.eps)
-        print_json(record_of("compare", result.file, "float", **record, seed=options["seed"], **result.to_json()))
+        more = {**lib.eps_record(result.eps), "seed": options["seed"], **result.to_json()}
+        print_json(record_of("compare", result.file, "float", **more))
     else:
         print_stdout(result.text.partition("\n")[0])
         for table in result.tables():
@@ -68,7 +68,6 @@ def command(as_json: bool, quiet: bool, timings: bool, output: str | None, **opt
         for sentence in result.remarks():
             print_stdout(sentence)
     early = early_messages(result)
-    if not quiet:
-        for sentence in early:
-            print_stderr(sentence)
+    for sentence in () if quiet else early:
+        print_stderr(sentence)
     return 3 if early else 0

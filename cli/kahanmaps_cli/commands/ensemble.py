@@ -12,7 +12,7 @@ from kahanmaps import internals as lib
 from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import Whole
-from kahanmaps_cli.runs.ensemble_starts import normal_form_for, requested_starts, starts_record
+from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import Progress, print_stderr
 from kahanmaps_cli.screen.render import json_number, print_json, record_of, short_float
@@ -67,7 +67,9 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     eps_value = lib.rational(1) if eps is None else eps
     file.map.at(eps_value)  # raises the same errors for eps as the command orbit
     starts = requested_starts(file, options)
-    normal_form = normal_form_for(file, options["method"])
+    normal_form = lib.float_normal_form(file, options["method"])
+    if isinstance(normal_form, lib.NoNormalForm) and options["method"] == "normal-form":
+        raise lib.InputError(f"the method normal-form needs a normal form, and there is none: {normal_form.reason}")
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
     value = lib.to_float(eps_value)  # backward too: the inverse has the same integrals
 

@@ -1,4 +1,4 @@
-"""kahanmaps plot portrait | invariant-curves | compare | heights | degrees | scan | rotation | section | commute."""
+"""The command `plot`: portrait, invariant-curves, compare, escape, heights, degrees, scan, rotation, section, commute."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from typing import ClassVar
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import commute, compare, growth, invariant_curves, portrait, rotation, scan, section
+from kahanmaps_cli.pictures import (
+    commute,
+    compare,
+    escape,
+    growth,
+    invariant_curves,
+    portrait,
+    rotation,
+    scan,
+    section,
+)
 
 
 class PlotCommands(SuggestingGroup):
@@ -37,6 +47,7 @@ for _command in (
     portrait.command,
     invariant_curves.command,
     compare.command,
+    escape.command,
     growth.heights,
     growth.degrees,
     scan.command,

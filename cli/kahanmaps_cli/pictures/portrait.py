@@ -116,7 +116,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     euler = None
     if options["euler"]:
         # Without a quadratic field `file.system` raises the error.
-        euler = lib.euler_orbits(field or file.system, -eps if options["backward"] else eps, starts, steps)
+        by_euler = (field or file.system, -eps if options["backward"] else eps, starts, "euler")
+        euler = lib.walked(lib.MethodEnsemble(*by_euler, kernel="numpy"), steps)
         notes += [f"explicit Euler: {counted(count, 'orbit')} {reason}" for reason, count in euler.ended.items()]
     window = window_from(options, len(axes))
     shown = lib.portrait_of(orbits, axes, color=color, window=window, euler=euler, join=options["lines"])

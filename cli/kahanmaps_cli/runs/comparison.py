@@ -49,12 +49,10 @@ def requested_comparison(options: dict[str, Any], progress: Callable[[str], None
         raise click.UsageError("give either --start X or --starts FILE")
     file = opt.load_system(options["system"], options)
     _ = file.real_approximation.system  # a map of another kind is refused first
-    starts: Any = options["start"] or None
-    if options["starts"] is not None:
-        starts = read_starts(options["starts"], file.variables)
+    of_file = None if options["starts"] is None else read_starts(options["starts"], file.variables)
     return lib.compare(
         file,
-        starts,
+        options["start"] or of_file,
         opt.requested_eps(options["eps"], options["time_step"]),
         options["steps"],
         progress=progress,

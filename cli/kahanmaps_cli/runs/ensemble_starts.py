@@ -48,18 +48,6 @@ def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
     return {"initial_points": {"random": orbits, "box": box}, "seed": options["seed"] or 0}
 
 
-def normal_form_for(file: lib.SystemFile, method: str | None) -> lib.SystemNormalForm | lib.NoNormalForm:
-    """Return the normal form in which steps are computed, or why there is none."""
-    if method == "generic":
-        return lib.NoNormalForm("generic, as requested")
-    normal_form = file.normal_form
-    if not isinstance(normal_form, lib.NoNormalForm) and normal_form.T is not None:
-        normal_form = lib.NoNormalForm("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
-    if isinstance(normal_form, lib.NoNormalForm) and method == "normal-form":
-        raise InputError(f"the method normal-form needs a normal form, and there is none: {normal_form.reason}")
-    return normal_form
-
-
 def read_starts(path: str, variables: Sequence[str]) -> lib.FloatArray:
     """Read initial points from a file, or standard input for "-", as an array (n, dim) of doubles.
 

@@ -40,15 +40,20 @@ def print_json(data: Mapping[str, Any]) -> None:
     click.echo(json.dumps(data))
 
 
-def print_report(report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False) -> int:
-    """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed."""
+def print_report(
+    report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False, measured: Any = None
+) -> int:
+    """Print a report, and numbers measured beside it; return the exit status that the verdict stands for."""
     if as_json:
         name = click.get_current_context().info_name or ""
-        print_json({**envelope(name), **report.to_json()})
+        beside = {} if measured is None else {"measured": measured.to_json()}
+        print_json({**envelope(name), **report.to_json(), **beside})
     elif on_terminal():
         _print_terminal(report, verbose)
     else:
         print_stdout(str(report))
+    for line in () if as_json or measured is None else measured.lines():
+        print_stdout(line, 9)
     status = exit_status(report)
     if status == 3 and report.ended_early and not quiet:
         orbit = report.context["orbit"]

@@ -21,7 +21,7 @@ from flint import fmpq, fmpz
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
-from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
 from kahanmaps.maps.floats.steps import SINGULAR, FloatStep, map_step
 from kahanmaps.maps.floats.straight_line_program import StepChecks, extreme, is_zero, solve
 from kahanmaps.maps.kahan import KahanFamily
@@ -31,7 +31,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 _ROUNDING = 2.0**-52  # relative size of a residual, below which the equations are solved
 _STALLED = 1e-10  # relative size below which the last correction of a careful step is round-off
-_CAREFUL_ITERATIONS = 8
+_ITERATIONS, _CAREFUL_ITERATIONS = 2, 8
 
 
 class Method(NamedTuple):
@@ -60,7 +60,6 @@ METHODS = {
     "suzuki4": Method("Kahan, Suzuki 4", 4, 5, 5),
     "yoshida6": Method("Kahan, Yoshida 6", 6, 7, 7),
 }
-IMPLICIT = {"midpoint", "gauss4"}
 SEPARABLE = {"symplectic-euler", "stormer-verlet"}
 
 _TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Runge-Kutta methods
@@ -68,8 +67,12 @@ _TABLEAUS: dict[str, tuple[list[list[float]], list[float]]] = {  # explicit Rung
     "rk4": ([[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
 }
 _ROOT3 = sqrt(3.0)
-_GAUSS = [[0.25, 0.25 - _ROOT3 / 6], [0.25 + _ROOT3 / 6, 0.25]]
-_NODES = [0.5 - _ROOT3 / 6, 0.5 + _ROOT3 / 6]
+# Implicit ones: the matrix A, and the weights of the increments in the step, b^T A^-1.
+_IMPLICIT: dict[str, tuple[list[list[float]], list[float]]] = {
+    "midpoint": ([[0.5]], [2.0]),
+    "gauss4": ([[0.25, 0.25 - _ROOT3 / 6], [0.25 + _ROOT3 / 6, 0.25]], [-_ROOT3, _ROOT3]),
+}
+IMPLICIT = set(_IMPLICIT)
 # Solution A of order 6, to 26 digits (hairer-lubich-wanner-2006, V.3.2).
 _YOSHIDA6 = ["-1.17767998417887100694641568", "0.23557321335935813368479318", "0.78451361047755726381949763"]
 
@@ -95,11 +98,11 @@ def work(method: str, steps: int, repeated: int = 0) -> tuple[float, int]:
     """Return the numbers of evaluations of f and of linear systems in steps, some of them with more iterations.
 
     >>> work("midpoint", 100), work("midpoint", 100, 1)
-    ((300, 300), (308, 308))
+    ((300, 300), (309, 309))
     """
-    what, stages = METHODS[method], 2 if method == "gauss4" else 1
-    more = repeated * _CAREFUL_ITERATIONS
-    return what.evaluations * steps + stages * more, what.systems * steps + more
+    what, stages = METHODS[method], len(_IMPLICIT[method][1]) if repeated else 0
+    evaluations = what.evaluations * steps + repeated * (1 + stages * _CAREFUL_ITERATIONS)
+    return evaluations, what.systems * steps + repeated * (1 + _CAREFUL_ITERATIONS)
 
 
 class MethodEnsemble(FloatEnsemble):
@@ -124,13 +127,12 @@ class MethodEnsemble(FloatEnsemble):
         method: str,
         *,
         halves: tuple[frozenset[int], frozenset[int]] | None = None,
-        kernel: str | None = None,
-        threads: int | None = None,
+        **options: Any,
     ) -> None:
         if method not in METHODS or method == "normal-form" or (method in SEPARABLE and halves is None):
             raise InputError(f"found the method {str(method)[:40]!r}, expected one of {', '.join(METHODS)}")
         self._made_of = system, rational(eps), method, halves
-        super().__init__(system, eps, starts, kernel=kernel, threads=threads)
+        super().__init__(system, eps, starts, **options)
 
     def _build_step(self) -> None:
         self._step = method_step(*self._made_of)
@@ -159,7 +161,7 @@ def method_step(
     elif method in _TABLEAUS:
         write = _explicit(field, h, *_TABLEAUS[method])
     else:
-        write = _midpoint(field, h / 2) if method == "midpoint" else _gauss(field, h)
+        write = _implicit(field, h, *_IMPLICIT[method])
     return FloatStep(system.dim, write)
 
 
@@ -177,12 +179,12 @@ class FieldProgram:
                 indices = tuple(k for k, power in enumerate(monomial) for _ in range(int(power)))
                 self.terms[-1].append((to_float(coefficient), indices))
 
-    def __call__(self, x: Sequence[Any], degrees: tuple[int, ...] = (0, 1, 2)) -> list[Any]:
+    def __call__(self, x: Sequence[Any], degrees: tuple[int, ...] = (0, 1, 2)) -> Any:
         """Return f(x), or the sum of its terms of these degrees."""
         kept = [[(c, indices) for c, indices in row if len(indices) in degrees] for row in self.terms]
         return [_sum(c * reduce(lambda a, k: a * x[k], indices, 1.0) for c, indices in row) for row in kept]
 
-    def jacobian(self, x: Sequence[Any]) -> list[list[Any]]:
+    def jacobian(self, x: Sequence[Any]) -> Any:
         """Return the rows of f'(x)."""
         rows = []
         for terms in self.terms:
@@ -231,68 +233,44 @@ def _separable(field: FieldProgram, h: float, halves: tuple[frozenset[int], froz
     return write
 
 
-def _midpoint(field: FieldProgram, eps: float) -> Write:
-    """y = x + z with z = eps f(x + z), x~ = x + 2 z; the first iteration from z = 0 is Kahan's step."""
+def _implicit(field: FieldProgram, h: float, A: list[list[float]], weights: list[float]) -> Write:
+    """z_i = h sum_j a_ij f(x + z_j), x~ = x + sum_i w_i z_i; from the parabola through a step of Kahan's method."""
 
     def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
-        z: list[Any] = [0.0] * len(x)
+        n, stages = len(x), range(len(A))
+        nodes = [sum(row) for row in A]
+
+        def matrix(shares: list[list[float]], slopes: Sequence[Any]) -> list[list[Any]]:
+            at = [(r, i) for r in range(len(shares)) for i in range(n)]
+            return [[float((r, i) == (s, j)) - h * shares[r][s] * slopes[s][i][j] for s, j in at] for r, i in at]
 
         def equations(y: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], list[Any]]:
-            rows = [[float(i == j) - eps * a for j, a in enumerate(row)] for i, row in enumerate(field.jacobian(y[0]))]
-            return rows, [eps * f - w for f, w in zip(field(y[0]), z, strict=True)]
+            values, rows = [field(part) for part in y], matrix(A, [field.jacobian(part) for part in y])
+            sums = [_sum(h * A[r][s] * values[s][i] for s in stages) for r in stages for i in range(n)]
+            return rows, [a - b for a, b in zip(sums, z, strict=True)]
 
         def left(d: Sequence[Any]) -> list[Any]:
-            return [eps * q for q in field(d, (2,))]
+            second = [field(d[s * n : s * n + n], (2,)) for s in stages]
+            return [_sum(h * A[r][s] * second[s][i] for s in stages) for r in stages for i in range(n)]
 
-        _newton(x, z, equations, left, 3, checks)
-        return [a + 2.0 * w for a, w in zip(x, z, strict=True)]
-
-    return write
-
-
-def _gauss(field: FieldProgram, h: float) -> Write:
-    """z_i = h sum_j a_ij f(x + z_j), x~ = x + sqrt(3) (z_2 - z_1); from the parabola through a step of Kahan's."""
-
-    def write(x: Sequence[Any], checks: StepChecks) -> list[Any]:
-        n = len(x)
-        slopes = field(x)
-        rows = [
-            [*(float(i == j) - h / 2 * a for j, a in enumerate(row)), h * slopes[i]]
-            for i, row in enumerate(field.jacobian(x))
-        ]
+        slopes = [h * entry for entry in field(x)]
+        rows = [[*row, b] for row, b in zip(matrix([[0.5]], [field.jacobian(x)]), slopes, strict=True)]
         step = solve(rows, lambda: 1.0, StepChecks(False))
-        z = [c * h * slopes[i] + c * c * (step[i] - h * slopes[i]) for c in _NODES for i in range(n)]
-
-        def equations(y: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], list[Any]]:
-            values, jacobians = [field(part) for part in y], [field.jacobian(part) for part in y]
-            rows, residuals = [], []
-            for r, weights in enumerate(_GAUSS):
-                for i in range(n):
-                    row = [
-                        float((r, i) == (s, j)) - h * weights[s] * jacobians[s][i][j] for s in (0, 1) for j in range(n)
-                    ]
-                    rows.append(row)
-                    residuals.append(_sum(h * weights[s] * values[s][i] for s in (0, 1)) - z[r * n + i])
-            return rows, residuals
-
-        def left(d: Sequence[Any]) -> list[Any]:
-            second = [field(d[:n], (2,)), field(d[n:], (2,))]
-            return [h * (w[0] * a + w[1] * b) for w in _GAUSS for a, b in zip(*second, strict=True)]
-
-        _newton(x, z, equations, left, 2, checks)
-        return [a + _ROOT3 * (z[n + i] - z[i]) for i, a in enumerate(x)]
+        z = [c * a + c * c * (b - a) for c in nodes for a, b in zip(slopes, step, strict=True)]
+        _newton(x, z, equations, left, checks)
+        return [a + _sum(w * z[s * n + i] for s, w in enumerate(weights)) for i, a in enumerate(x)]
 
     return write
 
 
-def _newton(x: Sequence[Any], z: list[Any], equations: Any, left: Any, iterations: int, checks: StepChecks) -> None:
+def _newton(x: Sequence[Any], z: list[Any], equations: Any, left: Any, checks: StepChecks) -> None:
     """Improve the increments z of the stages x + z in place, and check that they have converged.
 
     `equations` returns the rows of the matrix and the residuals at the stages, `left` the residual that a correction
     leaves. Pivots are not checked for their own sake: a bad elimination only slows Newton's method down.
     """
     n = len(x)
-    for _ in range(_CAREFUL_ITERATIONS if checks.careful else iterations):
+    for _ in range(_CAREFUL_ITERATIONS if checks.careful else _ITERATIONS):
         stages = [[a + w for a, w in zip(x, z[k : k + n], strict=True)] for k in range(0, len(z), n)]
         rows, residuals = equations(stages)
         inner = StepChecks(False)
@@ -347,34 +325,18 @@ def separated(
     return frozenset(i for i in color if color[i] == 0), frozenset(i for i in color if color[i] == 1)
 
 
-class VectorField:
-    """A quadratic vector field f and f' in doubles: f_i(x) = z^T S_i z with z = (x, 1) and S_i symmetric.
+class VectorField(FieldProgram):
+    """A quadratic vector field and its Jacobian in doubles, at points (..., dim) and at one point.
 
     >>> f = VectorField(QuadraticSystem.from_text(["x", "y"], ["x*y + 1", "3*x"]))
     >>> f(np.array([2.0, 5.0])).tolist(), f.jacobian(np.array([2.0, 5.0])).tolist()
     ([11.0, 6.0], [[5.0, 2.0], [3.0, 0.0]])
     """
 
-    def __init__(self, system: QuadraticSystem) -> None:
-        n = system.dim
-        self._S = np.zeros((n, n + 1, n + 1))
-        for i in range(n):
-            self._S[i, :n, :n] = to_floats(system.Q[i].entries()).reshape(n, n)
-            self._S[i, :n, n] = self._S[i, n, :n] = to_floats([system.B[i, j] / 2 for j in range(n)])
-        self._S[:, n, n] = to_floats(system.c)
-
-    def __call__(self, x: FloatArray) -> FloatArray:
-        """Return the values at points (..., dim)."""
+    def __call__(self, x: Any, degrees: tuple[int, ...] = (0, 1, 2)) -> FloatArray:
         with np.errstate(all="ignore"):
-            z, half = self._half(x)
-            value: FloatArray = (half @ z[..., None])[..., 0]
-        return value
+            rows = super().__call__(np.moveaxis(x, -1, 0), degrees)
+        return np.stack(np.broadcast_arrays(*rows, x[..., 0])[:-1], axis=-1)
 
-    def jacobian(self, x: FloatArray) -> FloatArray:
-        """Return f'(x) at one point."""
-        with np.errstate(all="ignore"):
-            return 2.0 * self._half(x)[1][:, :-1]
-
-    def _half(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        z = np.concatenate([x, np.ones_like(x[..., :1])], axis=-1)
-        return z, np.moveaxis(self._S @ z.T, -1, 0) if z.ndim > 1 else self._S @ z
+    def jacobian(self, x: Any) -> FloatArray:
+        return np.array(super().jacobian(x), dtype=np.float64)

@@ -421,16 +421,28 @@ class Trajectory(HtmlDisplay):
         with nullcontext(to) if isinstance(to, Writer) else writer_to(to, form, *columns) as writer:
             writer.header(self.header(name))
             try:
-                for point in self._all_points():
-                    on_step(point.step)
-                    if self._request.is_requested(point.step):
-                        writer.point(point.step, point.text, self.values(point))
+                for step in self._written_to(writer):
+                    on_step(step)
                 end = self.end
             except OutputFull as full:
                 end = OrbitEnd("budget", full.steps, str(full))
             end, float_data = self._ended(end)
             writer.end(end, float_data)
         return end
+
+    def _written_to(self, writer: Writer) -> Iterator[int]:
+        """Write the points, those of a float orbit in portions; yield the number of each step that was computed."""
+        if self.arithmetic.kind == "float" and self._request.at is None and not self.integrals:
+            count, every = 0, self._request.every
+            for step, points in self.orbit.portions():
+                writer.portion(count * every, every, points)
+                count += len(points)
+                yield step
+            return
+        for point in self._all_points():
+            yield point.step
+            if self._request.is_requested(point.step):
+                writer.point(point.step, point.text, self.values(point))
 
     def header(self, name: str = "") -> dict[str, Any]:
         """Return the data from which the orbit can be reproduced; `name` is the name of the system."""

@@ -1,7 +1,8 @@
 """Writers of orbit files, one class for each format: text, json, jsonl, csv, npz and parquet.
 
 Files of text, jsonl and csv are valid after every record, so that a file remains readable however the orbit ends. npz
-and parquet files are written at the end.
+and parquet files are written at the end, but float orbits pass through them in portions: the rows of an npz file are
+kept in a temporary file, and each portion is a row group of a parquet file.
 """
 
 from __future__ import annotations
@@ -12,9 +13,12 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import IO, Any
+from zipfile import ZipFile
 
 from kahanmaps.algebra.printing import csv_line, spreadsheet_safe
 from kahanmaps.atomic_files import atomic_write, open_append, write_atomically
@@ -25,6 +29,7 @@ from kahanmaps.version import __version__
 
 # An npz file of exact numbers pads each of them to the longest one; larger orbits need jsonl.
 MAX_PADDED_BYTES = 512_000_000
+_CHUNK = 1 << 18  # numbers that are copied at once
 _FLUSH_AFTER = 4_000  # characters; a longer line is flushed at once, since the next step may take minutes
 _COMMAND = {"command": "orbit", "version": __version__}  # the beginning of the JSON object of every command
 _TEXT_SUFFIXES = ("", ".txt", ".tsv", ".out", ".dat", ".log")
@@ -54,6 +59,11 @@ class Writer(ABC):
     @abstractmethod
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         """Write a point: its coordinates and the values of the integrals (None at a pole)."""
+
+    def portion(self, first: int, every: int, x: Any) -> None:
+        """Write the points (count, dim) of a float orbit at the steps first, first + every, ..., without integrals."""
+        for step, row in enumerate(x.tolist()):
+            self.point(first + step * every, list(map(repr, row)), ())
 
     @abstractmethod
     def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
@@ -133,6 +143,13 @@ class Csv(Writer):
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
 
+    def portion(self, first: int, every: int, x: Any) -> None:
+        steps = range(first, first + len(x) * every, every)
+        # json writes the same digits as repr, several times as fast.
+        table = json.dumps(list(zip(steps, *x.T.tolist(), strict=True)), separators=(",", ":"))
+        if len(x):
+            self._line(table[2:-2].replace("],[", "\n"))
+
     def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
         self.stream.flush()
         self._write_metadata({**end.to_json(), **extra})
@@ -146,11 +163,14 @@ class Csv(Writer):
 class Npz(Writer):
     """Arrays `step`, `x` and `integrals` (if any), and header and end as JSON text; written at the end.
 
-    Floats and residues below 2^63 are stored as float64 and int64; exact numbers and balls are stored as text.
+    Floats and residues below 2^63 are stored as float64 and int64; exact numbers and balls are stored as text. The rows
+    of a float orbit without integrals are kept in a temporary file, and are not compressed.
     """
 
     def header(self, header: dict[str, Any]) -> None:
         self._header = header
+        self._rows: IO[bytes] | None = None
+        self._count, self._every = 0, 1
         kind, _, number = header["arithmetic"].partition(":")
         is_short = kind == "mod" and int(number) < 2**63
         self._convert: Any = float if kind == "float" else int if is_short else str.encode
@@ -174,11 +194,37 @@ class Npz(Writer):
         self._x.append(list(map(self._convert, x)))
         self._values.append([undefined if value is None else self._convert(value) for value in values])
 
+    def portion(self, first: int, every: int, x: Any) -> None:
+        if self._rows is None:
+            name = getattr(self.stream, "name", "")  # beside the file, where there is room for it
+            folder = os.path.dirname(name) if isinstance(name, str) and name.startswith(os.sep) else None
+            self._rows = TemporaryFile(dir=folder)  # noqa: SIM115 (closed by `end`)
+        self._rows.write(x.astype("<f8").tobytes())
+        self._count, self._every = self._count + len(x), every
+
     def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
         import numpy as np
 
         end_record = {**end.to_json(), **extra}
         meta = {"header": self._header, "columns": self.variables, "integrals": self.integrals, "end": end_record}
+        if self._rows is not None:
+            self._rows.seek(0)
+            n, read = self._count, partial(self._rows.read, 8 * _CHUNK)
+            numbers = (np.arange(k, min(k + _CHUNK, n), dtype="<i8") * self._every for k in range(0, n, _CHUNK))
+            with ZipFile(self.stream, "w") as members:
+                with members.open("meta.npy", "w") as member:
+                    np.lib.format.write_array(member, np.array(json.dumps(meta)))
+                columns = (
+                    ("step", "<i8", (n,), map(bytes, numbers)),
+                    ("x", "<f8", (n, len(self.variables)), iter(read, b"")),
+                )
+                for name, kind, shape, chunks in columns:
+                    with members.open(f"{name}.npy", "w", force_zip64=True) as member:
+                        what = {"descr": kind, "fortran_order": False, "shape": shape}
+                        np.lib.format.write_array_header_1_0(member, what)
+                        member.writelines(chunks)
+            self._rows.close()
+            return
         # The numbers of iterates computed directly may exceed 64 bits.
         are_short = max(self._steps, default=0) < 2**63
         steps: list[Any] = self._steps if are_short else [str(step).encode() for step in self._steps]
@@ -203,6 +249,7 @@ class Parquet(Npz):
 
     def header(self, header: dict[str, Any]) -> None:
         super().header(header)
+        self._file: Any = None
         if self._convert is str.encode:
             self._convert = str
         try:
@@ -210,8 +257,22 @@ class Parquet(Npz):
         except ImportError as error:
             raise InputError(f"parquet needs pyarrow ({error}): pip install pyarrow, or write .csv or .npz") from error
 
+    def portion(self, first: int, every: int, x: Any) -> None:
+        arrow, parquet = self._arrow
+        steps = arrow.array(range(first, first + len(x) * every, every), arrow.int64())
+        table = arrow.table([steps, *map(arrow.array, x.T.copy())], names=["step", *self.variables])
+        if self._file is None:
+            # pyarrow would not show metadata that are added at the end beside a schema of its own.
+            self._file = parquet.ParquetWriter(self.stream, table.schema, store_schema=False)
+        self._file.write_table(table)
+
     def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
         arrow, parquet = self._arrow
+        if self._file is not None:
+            record = {**_COMMAND, "header": self._header, "end": {**end.to_json(), **extra}}
+            self._file.add_key_value_metadata({"kahanmaps": json.dumps(record)})
+            self._file.close()
+            return
         steps: list[Any] = self._steps if max(self._steps, default=0) < 2**63 else list(map(str, self._steps))
         rows = [(*x, *values) for x, values in zip(self._x, self._values, strict=True)]
         names = (*self.variables, *self.integrals)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from math import log2, sqrt
 from pathlib import Path
 from typing import Any
@@ -19,12 +18,13 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.algebra.printing import csv_line, format_number, json_float
-from kahanmaps.atomic_files import atomic_write, write_atomically
-from kahanmaps.display_protocols import PrintableResult
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.algebra.printing import all_fields, attributes, csv_line, format_number, json_float
+from kahanmaps.atomic_files import write_atomically
+from kahanmaps.display_protocols import PrintableResult, data_frame
+from kahanmaps.documents.files import SystemFile, float_normal_form
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
+from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.convention import either, eps_suffix, resolve_eps
 from kahanmaps.maps.floats.classical import IMPLICIT, METHODS, SEPARABLE, MethodEnsemble, separated, work
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
@@ -32,7 +32,6 @@ from kahanmaps.maps.floats.float_conversion import FloatArray, exact, to_floats
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.plots.comparison.functions import WatchedFunction, requested_functions, watched_functions
-from kahanmaps.plots.portraits.trajectories import float_normal_form
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.systems.taylor import solution
 
@@ -40,7 +39,6 @@ DEFAULT_METHODS = ("kahan", "midpoint", "rk4", "gauss4", "suzuki4", "yoshida6")
 BINS = 200
 MAX_STEPS = 10**9
 MAX_FUNCTIONS = 12
-MAX_STARTS = 100_000
 _RANDOM_STARTS = 40
 _OF_ONE_SIZE = 5  # of them; the next ones are half as large
 _PROBE_STEPS = 1000
@@ -159,64 +157,38 @@ class Comparison(PrintableResult):
         return [dict(zip(_COLUMNS, row, strict=True)) for row in rows]
 
     def write(self, path: str | Path) -> None:
-        """Write `rows` to a file, whose suffix is .csv or .parquet (which needs pyarrow)."""
+        """Write `rows` to a file, whose suffix is .csv or .parquet (which needs pandas and pyarrow)."""
         rows, suffix = self.rows(), Path(path).suffix
         if suffix not in (".csv", ".parquet"):
             raise InputError(f"found {path}, expected a name that ends with .csv or .parquet")
-        columns = {name: [row[name] for row in rows] for name in _COLUMNS}
         if suffix == ".csv":
-            lines = zip(*([("" if x is None else str(x)) for x in column] for column in columns.values()), strict=True)
+            lines = [["" if x is None else str(x) for x in row.values()] for row in rows]
             write_atomically(path, "".join(map(csv_line, [_COLUMNS, *lines])).encode())
-            return
-        try:
-            arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
-        except ImportError as error:
-            raise InputError(f"parquet needs pyarrow ({error}): pip install pyarrow, or write .csv") from error
-        with atomic_write(path) as stream:
-            parquet.write_table(arrow.table(columns), stream)
+        else:
+            write_atomically(path, data_frame(rows).to_parquet(index=False))
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, without the curves of the drift, which `rows` has."""
         methods = []
         for run in self.runs:
-            curves = [curve for curve in self.curves if curve.method == run.method]
-            methods.append(
-                {
-                    "method": run.method,
-                    "title": METHODS[run.method].title,
-                    "order": METHODS[run.method].order,
-                    "measured_order": run.order,
-                    "errors": [
-                        {
-                            "eps": format_number(at.eps),
-                            "steps": at.steps,
-                            "error": at.error,
-                            "evaluations": at.evaluations,
-                        }
-                        for at in run.errors
-                    ],
-                    "drift": {
-                        c.function: {"largest": json_float(c.largest), "last": json_float(c.last)} for c in curves
-                    },
-                    "evaluations": run.evaluations,
-                    "systems": run.systems,
-                    "repeated": run.repeated,
-                    "newton_failures": run.failures,
-                    "completed": len(run.ends) - len(run.early),
-                    "ended": [{"orbit": k, **end.to_json()} for k, end in enumerate(run.ends) if not end.is_complete][
-                        :20
-                    ],
-                    **({} if run.seconds is None else {"seconds": run.seconds}),
-                }
-            )
+            drift = {c.function: attributes(c, "largest", "last") for c in self.curves if c.method == run.method}
+            ended = [{"orbit": k, **end.to_json()} for k, end in enumerate(run.ends) if not end.is_complete]
+            record = {
+                **attributes(run, "method", "evaluations", "systems", "repeated", measured_order="order"),
+                **attributes(METHODS[run.method], "title", "order"),
+                "newton_failures": run.failures,
+                "completed": len(run.ends) - len(run.early),
+                "ended": ended[:20],
+                "errors": [all_fields(at) for at in run.errors],
+                "drift": {name: {key: json_float(x) for key, x in sizes.items()} for name, sizes in drift.items()},
+            }
+            methods.append(record | ({} if run.seconds is None else {"seconds": run.seconds}))
         return {
             "starts": [[format_number(entry) for entry in start] for start in self.starts[:20]],
             "orbits": len(self.starts),
             "steps": self.steps,
             "time": None if self.time is None else format_number(self.time),
-            "functions": [
-                {"name": name, "origin": self.origins[name], "relative": self.relative[name]} for name in self.labels
-            ],
+            "functions": [{"name": f, "origin": self.origins[f], "relative": self.relative[f]} for f in self.labels],
             "methods": methods,
             "reasons": dict(self.skipped),
             "notes": list(self.notes),
@@ -258,18 +230,12 @@ class Comparison(PrintableResult):
         """Return sentences on what the numbers mean and on what is missing."""
         sentences = []
         if self.time is not None:
-            number = format_number(self.time)
-            sentences.append(
-                f"error: at time {number}, against Taylor solutions in balls, from the first initial points"
-            )
-        absolute = [name for name in self.labels if not self.relative[name]]
-        if absolute:
+            sentences.append(f"error: at time {format_number(self.time)}, against Taylor solutions in balls")
+        if absolute := [name for name in self.labels if not self.relative[name]]:
             sentences.append(f"absolute drift: {', '.join(absolute)}, for it is 0 at an initial point")
-        for run in self.runs:
-            if run.failures:
-                sentences.append(
-                    f"{METHODS[run.method].title}: Newton's method failed in {counted(run.failures, 'orbit')}"
-                )
+        for run in (run for run in self.runs if run.failures):
+            number = counted(run.failures, "orbit")
+            sentences.append(f"{METHODS[run.method].title}: Newton's method failed in {number}")
         return [*sentences, *(f"{METHODS[m].title} left out: {why}" for m, why in self.skipped.items()), *self.notes]
 
 
@@ -360,11 +326,14 @@ def compare(
         watched = [_Bins(edges) for _ in functions]
         began = None if clock is None else clock()
         ensemble = ensemble_of(name, value, len(starts), count)
-        for first, points in _portions(ensemble, count, bool(functions)):
+        for k, points in enumerate(ensemble.records(count, 1 if functions else count)):
             with np.errstate(all="ignore"):
                 for function, bins, (origin, scale) in zip(functions, watched, initial, strict=True):
-                    bins.add(first, np.abs(function(points) - origin) / scale)
+                    if k:  # at step 0 errors are 0 by definition
+                        bins.add(ensemble.step - len(points) + 1, np.abs(function(points) - origin) / scale)
             progress(f"{METHODS[name].title}: step {ensemble.step} of {count}")
+            if (ensemble.failed_at >= 0).all():
+                break
         seconds = None if clock is None or began is None else clock() - began
         ends = tuple(ensemble.end(k) for k in range(len(starts)))
         for function, bins in zip(functions, watched, strict=True):
@@ -410,8 +379,6 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
         return (small_start(system, eps, seed),)
     rows = given.tolist() if isinstance(given, np.ndarray) else given
     rows = rows if len(rows) and isinstance(rows[0], list | tuple | np.ndarray) else [rows]
-    if len(rows) > MAX_STARTS:
-        raise InputError(f"found {len(rows)} initial points, expected at most {MAX_STARTS}")
     starts = tuple(tuple(exact(float(x)) if isinstance(x, float) else rational(x) for x in row) for row in rows)
     for start in starts:
         if len(start) != system.dim:
@@ -434,9 +401,10 @@ def _methods(
     halves = separated(file.system, file.hamiltonian)
     if isinstance(halves, str):
         skipped = {name: halves for name in names if name in SEPARABLE}
-    form, why = float_normal_form(file) if "normal-form" in names else (None, "")
-    if why:
-        skipped["normal-form"] = why
+    found = float_normal_form(file, None if "normal-form" in names else "generic")
+    form = None if isinstance(found, NoNormalForm) else found.form
+    if isinstance(found, NoNormalForm) and "normal-form" in names:
+        skipped["normal-form"] = found.reason
     if len(skipped) == len(names):
         raise InputError("; ".join(f"the method {name} is not available: {why}" for name, why in skipped.items()))
     points = np.array([to_floats(start) for start in starts])
@@ -461,25 +429,12 @@ def _initial(
     for function in functions:
         values, numbers = function(points), [function.at(start) for start in starts]
         if None in numbers or not np.isfinite(values).all():
-            raise InputError(
-                f"{function.name} is not defined in floating point at the initial point: choose another one"
-            )
+            where = "is not defined in floating point at the initial point: choose another one"
+            raise InputError(f"{function.name} {where}")
         # Whether I(x_0) is 0 is decided exactly; the value in doubles may be round-off then.
         relative[function.name] = all(number != 0 for number in numbers) and bool((values != 0.0).all())
         initial.append((values, np.abs(values) if relative[function.name] else np.ones_like(values)))
     return initial, relative
-
-
-def _portions(ensemble: FloatEnsemble, steps: int, watched: bool) -> Iterator[tuple[int, FloatArray]]:
-    """Advance an ensemble; yield the first step of each portion, and its points (count, n, dim)."""
-    if not watched:
-        ensemble.advance(steps)
-        return
-    for k, points in enumerate(ensemble.records(steps, 1)):
-        if k:  # at step 0 errors are 0 by definition
-            yield ensemble.step - len(points) + 1, points
-        if (ensemble.failed_at >= 0).all():
-            return
 
 
 def _references(
@@ -489,16 +444,12 @@ def _references(
 
     The direction of time is the sign of eps.
     """
-    times = []
-    for start in starts:
-        speed = max(abs(entry) for entry in system.over(QQ).value(start))
-        if speed != 0:
-            times.append(max(abs(entry) for entry in start) / speed)
-    ratio = min(times, default=fmpq(0)) / abs(2 * eps)
+    speeds = [max(abs(entry) for entry in system.over(QQ).value(start)) for start in starts]
+    times = [max(abs(entry) for entry in x) / v for x, v in zip(starts, speeds, strict=True) if v != 0]
     if not times:
         return None, None
-    whole = int(ratio.p) // int(ratio.q)
-    time = 2 * eps * (1 << max(0, whole.bit_length() - 1))
+    ratio = min(times) / abs(2 * eps)
+    time = 2 * eps * (1 << max(0, (int(ratio.p) // int(ratio.q)).bit_length() - 1))
     for _ in range(_SHORTER_TIMES):
         progress(f"the solution at time {format_number(time)}")
         ends = [solution(system, start, time) for start in starts]

@@ -106,7 +106,7 @@ def watched_functions(
     >>> watched_functions(load("euler_top"), fmpq(1, 10))[1]
     {'(-F1 + 1)/eps^2': 'declared', 'x2^2 + 2*x3^2': 'flow', '(-F2/2 + 1/2)/eps^2': 'declared', 'x1^2 - x3^2': 'flow'}
     """
-    found: list[WatchedFunction] = []
+    found: list[WatchedFunction]
     if file.hamiltonian is None and not measured_integrals(file):
         progress("searching for integrals")
         search = find_integrals(file, effort=_EFFORT)

@@ -10,14 +10,12 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
-from kahanmaps.algebra.fields import rational
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.files import SystemFile, float_normal_form
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import NoNormalForm
-from kahanmaps.maps.floats.classical import VectorField
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
-from kahanmaps.maps.floats.float_conversion import FloatArray, to_float
+from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.maps.orbits.iteration import require_steps
@@ -68,21 +66,12 @@ def field_of(file: SystemFile) -> QuadraticSystem | None:
     return map_.system if isinstance(map_, KahanFamily) and not map_.system.symbols else None
 
 
-def float_normal_form(file: SystemFile) -> tuple[NormalForm | None, str]:
-    """The normal form in which floats can step, or None and why there is none."""
-    form = file.normal_form
-    if isinstance(form, NoNormalForm):
-        return None, form.reason
-    if form.T is not None:
-        return None, "in floating point only J = [[0, I], [-I, 0]] has one"
-    return form.form, ""
-
-
 def ensemble_of_file(
     file: SystemFile, eps: fmpq | None, starts: FloatArray, steps: int, *, backward: bool = False
 ) -> FloatEnsemble:
     """The ensemble for the map of a file, in its normal form where it has one; `eps` is None for a map without it."""
-    form, _ = float_normal_form(file)
+    found = float_normal_form(file)
+    form = None if isinstance(found, NoNormalForm) else found.form
     return ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
 
 
@@ -107,24 +96,3 @@ def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] 
         np.arange(len(points)),
         {text: count for text, count in ended.items() if count},
     )
-
-
-def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: int) -> Trajectories:
-    """Compute orbits of the explicit Euler method, x~ = x + 2 eps f(x), in doubles; NaN after leaving their range.
-
-    `starts` (n, dim) are doubles, eps is exact, half the time step; a negative one steps backward.
-
-    >>> euler_orbits(QuadraticSystem.from_text(["x"], ["x"]), "1/2", np.array([[1.0]]), 2).points[:, 0, 0].tolist()
-    [1.0, 2.0, 4.0]
-    """
-    require_steps(steps)
-    f, h = VectorField(system), to_float(2 * rational(eps))
-    points = [np.array(starts, dtype=np.float64)]
-    with np.errstate(all="ignore"):
-        for _ in range(steps):
-            points.append(points[-1] + h * f(points[-1]))
-    orbits = np.array(points)
-    orbits[~np.isfinite(orbits).all(axis=2)] = np.nan
-    gone = int(np.isnan(orbits[-1]).any(axis=1).sum())
-    ended = {"left the range of floating-point numbers": gone} if gone else {}
-    return Trajectories(system.variables, orbits, np.arange(steps + 1), ended)

@@ -1,0 +1,266 @@
+"""Backward error analysis: the vector field whose flow is the Kahan map, as a series in eps, exactly over Q.
+
+The map x + 2 eps (I - eps f')^{-1} f = x + sum_n 2 eps^n f'^{n-1} f is the flow at time 2 eps of the formal vector
+field F = f + eps^2 F_2 + eps^4 F_4 + ..., with the derivation D = sum_k eps^k F_k . grad:
+
+    sum_{j=1}^n 2^j/j! [eps^{n-j}] D^j x = 2 f'^{n-1} f,
+
+which gives F_{n-1} from the earlier ones; Kahan's method is symmetric, so odd ones are 0. In elementary differentials
+F_2 = f'f'f/3 - 2 f''(f,f)/3. An integral of the map, as a series in eps, is one of F. An integral I of the flow of f
+survives to eps^k if it can be continued: the equations f . grad I_2j = -sum_{i>0} F_2i . grad I_2(j-i) are linear, and
+are solved in polynomials.
+Sources: hairer-lubich-wanner-2006, chapter IX; cmoq-2013, where Kahan's method is a Runge-Kutta method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from math import factorial
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ, integer
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.polynomials import degree, evaluate, gradient, is_homogeneous, monomials, primitive_part, ring
+from kahanmaps.algebra.printing import attributes, format_polynomial, plain
+from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import as_file
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.integrals_and_densities import measured_integrals, normalized
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.maps.kahan import SystemLike
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+LARGEST_ORDER = 12
+_MAX_UNKNOWNS = 1000  # coefficients of all corrections of an integral together
+_EFFORT = -2  # of the search for integrals of the flow
+_SHOWN_TERMS = 60
+
+Field = tuple[fmpq_mpoly, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SurvivingIntegral:
+    """An integral I of the flow of f, and its continuation I + eps^2 I_2 + ... as an integral of the modified field.
+
+    `corrections` are I_2, I_4, ... up to `order`. `verdict` is "survives", up to the requested order, "lost", if there
+    is no polynomial correction of degree at most `degree` at eps^(order + 2), for any choice of the earlier ones, or
+    "not examined", if the linear equations for the next one are too large. All are exact.
+    """
+
+    integral: fmpq_mpoly
+    corrections: tuple[fmpq_mpoly, ...]
+    order: int
+    verdict: str
+    degree: int
+
+    @property
+    def sentence(self) -> str:
+        """What was proved, in words."""
+        if self.verdict == "survives":
+            return f"survives to eps^{self.order}"
+        after = f"survives to eps^{self.order}, " if self.order else ""
+        if self.verdict == "lost":
+            return f"{after}lost at eps^{self.order + 2}: no polynomial correction of degree <= {self.degree}"
+        return f"{after}not examined at eps^{self.order + 2}: more than {_MAX_UNKNOWNS} unknown coefficients"
+
+
+@dataclass(frozen=True, eq=False)
+class ModifiedField(PrintableResult):
+    """The result of `modified`: series in eps up to `order`, exact.
+
+    `fields[k]` is the coefficient of eps^k of the modified vector field, 0 for odd k. `hamiltonian[k]` is that of the
+    modified Hamiltonian, which the map and the modified field conserve (empty without a Hamiltonian). `integrals` are
+    the polynomial integrals of the flow that were known or found.
+    """
+
+    file: SystemFile = field(repr=False)
+    order: int
+    fields: tuple[Field, ...]
+    hamiltonian: tuple[fmpq_mpoly, ...]
+    integrals: tuple[SurvivingIntegral, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        even, names = range(0, self.order + 1, 2), ("integral", "verdict", "order", "degree", "corrections")
+        return {
+            "order": self.order,
+            "variables": list(self.file.variables),
+            "field": [{"order": k, "rhs": plain(self.fields[k])} for k in even],
+            "hamiltonian": [{"order": k, "term": plain(self.hamiltonian[k])} for k in even if self.hamiltonian],
+            "flow_integrals": [attributes(found, *names) for found in self.integrals],
+        }
+
+    def lines(self) -> list[str]:
+        """Return the series and sentences as lines of cells, separated by tabs; long polynomials are counted only."""
+        lines = []
+        for k in range(2, self.order + 1, 2):
+            for name, component in zip(self.file.variables, self.fields[k], strict=True):
+                lines.append(f"eps^{k}\t{name}'\t{_short(component)}")
+        for k in range(0, self.order + 1 if self.hamiltonian else 0, 2):
+            lines.append(f"eps^{k}\tmodified H\t{_short(self.hamiltonian[k])}")
+        lines += [f"proved\t{_short(found.integral)}\t{found.sentence}" for found in self.integrals]
+        nothing = [] if self.integrals else ["no polynomial integral of the flow is known, or found by a search"]
+        return lines + nothing
+
+    def __str__(self) -> str:
+        title = f"# {self.file.name}: the Kahan map is the flow of f + eps^2 f_2 + eps^4 f_4 + ... at time 2 eps"
+        return "\n".join([title, *self.lines()])
+
+
+def _short(polynomial: fmpq_mpoly) -> str:
+    count = len(polynomial)
+    return format_polynomial(polynomial) if count <= _SHOWN_TERMS else f"a polynomial of {count} terms (--json has it)"
+
+
+def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], None] = lambda _: None) -> ModifiedField:
+    """Compute the modified vector field of Kahan's method up to eps^order, and which integrals of the flow survive.
+
+    Args:
+        system: a quadratic system over Q.
+        order: the order of the series in eps, an even number up to 12; the time step is 2 eps.
+        progress: called with a sentence at each stage.
+
+    Returns:
+        A `ModifiedField`, exact.
+
+    Raises:
+        InputError: for other orders, and for systems that are not quadratic.
+
+    >>> result = modified("weierstrass", 2)
+    >>> result.fields[2], result.hamiltonian[2]
+    ((4*x*y, 24*x^3 - 8*y^2 - 8*x), -24*x^4 + 8*x*y^2 + 16*x^2 - 8/3)
+    >>> [(integral.integral, integral.sentence) for integral in result.integrals]
+    [(4*x^3 - y^2 - 4*x, 'survives to eps^2')]
+    """
+    if integer(order, "the order") % 2 or not 2 <= order <= LARGEST_ORDER:
+        raise InputError(f"found the order {order}, expected an even number from 2 to {LARGEST_ORDER}")
+    file = as_file(system)
+    if file.map.root is not None:
+        raise InputError(f"found the algebraic number {file.map.root}, expected a system over the rational numbers")
+    quadratic, hamiltonian = file.system, file.hamiltonian
+    fields = modified_fields(quadratic, order, progress)
+    series = () if hamiltonian is None else modified_hamiltonian(hamiltonian, order)
+    survivors = []
+    for integral in _integrals_of_flow(file, progress):
+        progress(f"corrections of {_short(integral)}")
+        survivors.append(_continued(integral, fields, order))
+    return ModifiedField(file, order, fields, series, tuple(survivors))
+
+
+def modified_fields(
+    system: QuadraticSystem, order: int, progress: Callable[[str], None] = lambda _: None
+) -> tuple[Field, ...]:
+    """Return the coefficients of eps^0, ..., eps^order of the modified vector field.
+
+    >>> modified_fields(QuadraticSystem.from_text(["x"], ["x"]), 4)  # artanh(eps)/eps x
+    ((x,), (0,), (1/3*x,), (0,), (1/5*x,))
+    """
+    context = ring(system.variables)
+    f = tuple(p.project_to_context(context) for p in system.rhs)
+    power, fields = f, [f]
+    # powers[j][p] is the coefficient of eps^p of D^j x, for j > 0.
+    powers: list[list[Field]] = [[], [f]]
+    for n in range(2, order + 2):
+        power = _derivative(power, f)  # f'^{n-1} f
+        progress(f"the modified field at eps^{n - 1}")
+        rest = [2 * p for p in power]
+        powers.append([])
+        for j in range(2, n + 1):
+            at = n - j  # sum over k of F_k . grad [eps^{n-j-k}] D^{j-1} x
+            terms = [_derivative(fields[k], powers[j - 1][at - k]) for k in range(at + 1)]
+            total = tuple(sum(parts, context.constant(0)) for parts in zip(*terms, strict=True))
+            powers[j].append(total)
+            rest = [r - fmpq(2**j, factorial(j)) * t for r, t in zip(rest, total, strict=True)]
+        fields.append(tuple(r / 2 for r in rest))
+        powers[1].append(fields[-1])
+    return tuple(fields)
+
+
+def modified_hamiltonian(hamiltonian: CubicHamiltonian, order: int) -> tuple[fmpq_mpoly, ...]:
+    """Return the coefficients of eps^0, ..., eps^order of H + (2 eps/3) grad H^T (I - eps f')^{-1} f.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> modified_hamiltonian(load("harmonic").hamiltonian, 2)
+    (1/2*x^2 + 1/2*y^2, 0, -2/3*x^2 - 2/3*y^2)
+    """
+    series, vector = [hamiltonian.H], hamiltonian.system.rhs  # f'^k f
+    for _ in range(order):
+        series.append(fmpq(2, 3) * _derivative(vector, [hamiltonian.H])[0])
+        vector = _derivative(vector, hamiltonian.system.rhs)
+    return tuple(series)
+
+
+def _derivative(vector: Field, functions: Sequence[fmpq_mpoly]) -> Field:
+    """Return the derivatives of functions along a vector field."""
+    return tuple(
+        sum((v * d for v, d in zip(vector, gradient(function), strict=True)), 0 * function) for function in functions
+    )
+
+
+def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> list[fmpq_mpoly]:
+    """Return independent polynomial integrals of the flow: H, limits of declared integrals, and those of a search."""
+    context, candidates = ring(file.variables), []
+    if file.hamiltonian is not None:
+        candidates.append(file.hamiltonian.H)
+    functions = [normalized(function, file.dim).leading for function in measured_integrals(file).values()]
+    progress("searching for integrals of the flow")
+    functions += [found.function for found in find_integrals(file, flow=True, effort=_EFFORT).integrals]
+    for function in functions:
+        if function is not None and function.denominator.is_constant():
+            candidates.append(function.numerator.project_to_context(context))
+    f, integrals, gradients = file.system.rhs, list[fmpq_mpoly](), list[list[fmpq]]()
+    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # generic enough: dependent gradients only leave one out
+    for candidate in candidates:
+        primitive = primitive_part(candidate - candidate[(0,) * file.dim])[1]
+        slope = [evaluate(p, QQ, point) for p in gradient(primitive)]
+        is_new = rank(QQ, fmpq_mat([*gradients, slope])) > len(gradients)
+        if is_new and _derivative(f, [primitive])[0].is_zero():
+            integrals.append(primitive)
+            gradients.append(slope)
+    return integrals
+
+
+def _continued(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:
+    """Return how far an integral of the flow can be continued by polynomials.
+
+    All corrections up to an order are unknowns of one linear system: that at a higher order may require another choice
+    of the earlier ones, which are determined up to integrals of the flow.
+    """
+    names = fields[0][0].context().names()
+    context, top = ring(names), degree(integral)
+    even = [tuple(p.project_to_context(context) for p in one) for one in fields[::2]]
+    integral = integral.project_to_context(context)
+    # For homogeneous f and I so is each correction, since eps x is the only quantity of degree 0.
+    is_graded = all(is_homogeneous(p, 2) for p in even[0]) and is_homogeneous(integral, top)
+    columns: list[tuple[int, fmpq_mpoly]] = []
+    corrections: tuple[fmpq_mpoly, ...] = ()
+    for m in range(1, order // 2 + 1):
+        largest = top + 2 * m
+        for d in range(largest if is_graded else 1, largest + 1):
+            columns += [(m, context.from_dict({e: fmpq(1)})) for e in monomials(len(names), d)]
+        if len(columns) > _MAX_UNKNOWNS:
+            return SurvivingIntegral(integral, corrections, 2 * m - 2, "not examined", largest)
+        equations: dict[tuple[int, Any], dict[int, fmpq]] = {}
+        for c, (level, monomial) in enumerate([*columns, (0, integral)]):
+            for j in range(max(level, 1), m + 1):
+                for exponent, value in _derivative(even[j - level], [monomial])[0].terms():
+                    equations.setdefault((j, exponent), {})[c] = value
+        matrix = fmpq_mat(max(1, len(equations)), len(columns) + 1)
+        for r, row in enumerate(equations.values()):
+            for c, value in row.items():
+                matrix[r, c] = value
+        reduced, pivots = matrix.rref()
+        solved = [context.constant(0)] * m
+        for r in range(pivots):
+            pivot = next(c for c in range(len(columns) + 1) if reduced[r, c] != 0)
+            if pivot == len(columns):  # 0 = 1
+                return SurvivingIntegral(integral, corrections, 2 * m - 2, "lost", largest)
+            level, monomial = columns[pivot]
+            solved[level - 1] -= reduced[r, len(columns)] * monomial
+        corrections = tuple(solved)
+    return SurvivingIntegral(integral, corrections, order, "survives", top + order)

@@ -1,0 +1,107 @@
+"""The commutator of two maps along a float orbit: measured numbers beside the exact check."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log2
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.printing import format_number, json_float
+from kahanmaps.errors import InputError, counted
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.floats.float_conversion import to_floats
+from kahanmaps.maps.floats.steps import images_of
+from kahanmaps.maps.implicit import MapFamily
+
+_HALVINGS = 6
+_ROUNDING = 1e-13  # a commutator below this, relative to the size of the points, is rounding
+
+
+@dataclass(frozen=True)
+class Commutator:
+    """Measured sizes of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)), relative to the largest coordinate (at least 1).
+
+    `by_step` are pairs (n, size) for n = 1, 2, 4, ... and the last step, `largest` is the largest of all steps.
+    `by_eps` are pairs (eps, size) at n = 1 for eps and its halves; `slope` is that of the last two above rounding, None
+    where there are none. `message` says why the orbit ended early; it is empty for a complete one.
+    """
+
+    by_step: tuple[tuple[int, float], ...]
+    largest: float
+    by_eps: tuple[tuple[fmpq, float], ...]
+    slope: float | None
+    message: str
+
+    def lines(self) -> list[str]:
+        """Return sentences, which say that the numbers are measured."""
+        sizes = ", ".join(f"{size:.2g} at n = {n}" for n, size in self.by_step)
+        lines = [f"measured\t|Phi_g Phi_f^n x - Phi_f^n Phi_g x|: {sizes}; largest {self.largest:.2g}"]
+        if self.by_eps and self.slope is None:
+            lines.append("measured\tat n = 1 it is rounding for all eps")
+        elif self.slope is not None:
+            first, last = self.by_eps[0], self.by_eps[-1]
+            text = f"{first[1]:.2g} at eps = {format_number(first[0])} to {last[1]:.2g} at {format_number(last[0])}"
+            lines.append(f"measured\tat n = 1 it is of order eps^{self.slope:.2f}: {text}")
+        return lines + [f"measured\t{self.message}"] * bool(self.message)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {
+            "by_step": [{"step": n, "size": json_float(size)} for n, size in self.by_step],
+            "by_eps": [{"eps": format_number(eps), "size": json_float(size)} for eps, size in self.by_eps],
+            "largest": json_float(self.largest),
+            "slope": self.slope,
+            "message": self.message,
+        }
+
+
+def commutator(f: MapFamily, g: MapFamily, eps: Any, start: Sequence[Any], steps: int, ratio: Any = 1) -> Commutator:
+    """Measure the commutator of two maps along the float orbit of a point, and for smaller and smaller eps.
+
+    Args:
+        f, g: the maps, over Q.
+        eps: an exact number, half the time step where there is one.
+        start: the initial point, exact numbers.
+        steps: the number of steps, at least 1.
+        ratio: the eps of g in that of f.
+
+    >>> from kahanmaps.maps.kahan import as_map
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> f, g = (as_map(QuadraticSystem.from_text(["x", "y"], rhs)) for rhs in (["y", "-x"], ["y", "-2*x"]))
+    >>> commutator(f, f, "1/10", [1, 0], 100).largest < 1e-13, round(commutator(f, g, "1/10", [1, 0], 9).slope, 2)
+    (True, 2.0)
+    """
+    if steps < 1:
+        raise InputError(f"found {steps} steps, expected at least 1")
+    if len(start) != f.dim:
+        raise InputError(f"found a start with {counted(len(start), 'coordinate')}, expected {f.dim}")
+    value, x = rational(eps), to_floats(start)
+
+    def sizes(at: fmpq, count: int) -> tuple[list[float], str]:
+        other = g.at(at * rational(ratio))
+        image = images_of(other, x)
+        if not np.isfinite(image).all():
+            return [], "the map of g is not defined at the initial point"
+        ensemble, found = FloatEnsemble(f, at, np.array([x, image]), threads=1), list[float]()
+        for k, points in enumerate(ensemble.records(count, 1)):
+            if k:
+                both = images_of(other, points[:, 0]), points[:, 1]
+                size = np.maximum(1.0, np.abs(points).max(axis=(1, 2)))
+                found += (np.abs(both[0] - both[1]).max(axis=1) / size).tolist()
+        ended = [ensemble.end(k).message for k in range(2) if ensemble.failed_at[k] >= 0]
+        return [size for size in found if np.isfinite(size)], ended[0] if ended else ""
+
+    along, message = sizes(value, steps)
+    chosen = sorted({1 << k for k in range(len(along).bit_length())} | {len(along)}) if along else []
+    by_eps: list[tuple[fmpq, float]] = []
+    for k in range(_HALVINGS if f.has_eps and g.has_eps else 0):
+        by_eps += [(value / (1 << k), size) for size in sizes(value / (1 << k), 1)[0]]
+    kept = [size for _, size in by_eps if size > _ROUNDING]
+    slope = log2(kept[-2] / kept[-1]) if len(kept) > 1 else None
+    largest = max(along, default=float("nan"))
+    return Commutator(tuple((n, along[n - 1]) for n in chosen if n), largest, tuple(by_eps), slope, message)

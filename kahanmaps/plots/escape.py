@@ -1,0 +1,122 @@
+"""Escape times and basins: when and in which direction the orbits of a plane of initial points leave a ball."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.floats.float_conversion import to_floats
+from kahanmaps.maps.implicit import MapFamily
+from kahanmaps.plots.figures import drawing, label_of, legend_above, legend_height, new_figure
+from kahanmaps.plots.portraits.trajectories import ensemble_for
+from kahanmaps.plots.portraits.windows import Window
+from kahanmaps.plots.style import COLOR_MAP, COLORS, Style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MAX_CELLS, MAX_STEPS = 2000, 1_000_000
+STAYS, ENDS = -1, -2  # instead of a direction: |x| <= radius up to the last step; a pole or an overflow before
+
+
+@dataclass(frozen=True, eq=False)
+class Escape:
+    """Arrays (rows, columns) over a window: the first step at which max |x_i| > radius, and the direction.
+
+    The step is -1 for orbits that stay inside up to the last one. The direction is 2 i for the coordinate x_i as the
+    largest one, 2 i + 1 for -x_i, `STAYS`, or `ENDS` for an orbit that ended at a pole without being seen outside.
+    """
+
+    variables: tuple[str, ...]
+    axes: tuple[int, int]
+    window: Window
+    radius: float
+    steps: int
+    times: NDArray[np.int64]
+    directions: NDArray[np.int64]
+
+
+def survey_escape(
+    map_: MapFamily,
+    eps: Any,
+    window: Window,
+    axes: tuple[int, int] = (0, 1),
+    at: Sequence[Any] | None = None,
+    *,
+    cells: int = 300,
+    steps: int = 200,
+    radius: float = 1000.0,
+    progress: Callable[[int], None] | None = None,
+) -> Escape:
+    """Follow the float orbits of the centers of `cells` x `cells` cells of a window.
+
+    `at` are the other coordinates (default 0). Kahan maps have poles, past which orbits return: an orbit that leaves
+    the ball need not go to infinity.
+
+    >>> from kahanmaps.maps.kahan import as_map
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> saddle = as_map(QuadraticSystem.from_text(["x", "y"], ["x", "-y"]))
+    >>> found = survey_escape(saddle, "1/2", ((-1.0, 1.0), (-1.0, 1.0)), cells=2, steps=9)
+    >>> found.times.tolist(), found.directions.tolist()  # x~ = 3 x leaves 1000 from 1/2 at step 7
+    ([[7, 7], [7, 7]], [[1, 0], [1, 0]])
+    """
+    if not (1 <= steps <= MAX_STEPS and 1 <= cells <= MAX_CELLS and radius > 0):
+        sizes = f"{steps} steps, {cells} x {cells} cells, radius {radius:g}"
+        raise InputError(f"found {sizes}, expected 1 to {MAX_STEPS} steps, 1 to {MAX_CELLS} cells, radius > 0")
+    if len(set(axes)) != 2 or map_.dim < 2 or (at is not None and len(at) != map_.dim):
+        raise InputError(f"found axes {axes} and a point {at}, expected two axes and {map_.dim} coordinates")
+    centers = [low + (np.arange(cells) + 0.5) * (high - low) / cells for low, high in window]
+    starts = np.tile(np.zeros(map_.dim) if at is None else to_floats(at), (cells * cells, 1))
+    starts[:, axes[0]], starts[:, axes[1]] = np.tile(centers[0], cells), np.repeat(centers[1], cells)
+    ensemble = ensemble_for(map_, eps, starts, steps)
+    times, directions = np.full(len(starts), -1), np.full(len(starts), STAYS)
+    step = 0
+    for portion in ensemble.records(steps, 1, progress=progress):
+        for points in portion:
+            with np.errstate(invalid="ignore"):
+                left = np.flatnonzero((times < 0) & ~(np.abs(points).max(axis=1) <= radius))
+            seen = np.nan_to_num(points[left])
+            largest = np.abs(seen).argmax(axis=1)
+            sides = 2 * largest + (seen[np.arange(len(left)), largest] < 0)
+            times[left], directions[left] = step, np.where(np.isnan(points[left, 0]), ENDS, sides)
+            step += 1
+    shape = cells, cells
+    return Escape(map_.variables, axes, window, radius, steps, times.reshape(shape), directions.reshape(shape))
+
+
+def plot_escape(result: Escape, style: Style | None = None, *, show: str = "time") -> Figure:
+    """Plot the escape times ("time") or the directions ("basin"); orbits that stay are white."""
+    style, (x, y) = style or Style(), result.window
+    names = [side + label_of(name) for name in result.variables for side in ("+", "\N{MINUS SIGN}")]
+    kinds, counts = np.unique(result.directions[result.directions != STAYS], return_counts=True)
+    kinds = kinds[np.argsort(-counts, kind="stable")][: len(COLORS)]  # of more directions the rare ones are white, too
+    labels = ["ends at a pole" if kind == ENDS else names[int(kind)] for kind in kinds]
+    with drawing(style):
+        from matplotlib.colors import ListedColormap, LogNorm
+        from matplotlib.patches import Patch
+
+        is_basin = show == "basin"
+        figure = new_figure(style, 0.8 + (legend_height(labels, style, title=True) if is_basin else 0))
+        axes = figure.subplots()
+        place: Any = {"extent": (*x, *y), "origin": "lower", "aspect": "auto", "interpolation": "nearest"}
+        if is_basin:
+            image = np.full(result.times.shape, np.nan)
+            for number, kind in enumerate(kinds):
+                image[result.directions == kind] = number
+            colors = COLORS[: max(1, len(kinds))]
+            axes.imshow(image, cmap=ListedColormap(colors), vmin=-0.5, vmax=len(colors) - 0.5, **place)
+            handles = [Patch(color=color) for color in colors[: len(kinds)]]
+            legend_above(figure, handles, labels, style, f"direction in which |x| > {result.radius:g}")
+        else:
+            image = np.where(result.times >= 0, np.maximum(result.times, 1.0), np.nan)
+            norm = LogNorm(np.nanmin(image, initial=2), np.nanmax(image, initial=3))
+            drawn = axes.imshow(image, cmap=COLOR_MAP, norm=norm, **place)
+            figure.colorbar(drawn, ax=axes, label=f"steps until |x| > {result.radius:g}")
+        axes.set_xlabel(label_of(result.variables[result.axes[0]]))
+        axes.set_ylabel(label_of(result.variables[result.axes[1]]))
+    return figure
