@@ -4,9 +4,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from flint import fmpq
 from helpers import quick
 
-from kahanmaps import KahanMap
+from kahanmaps import KahanMap, load
 
 BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
 STEPS = 4
@@ -17,7 +18,7 @@ def _scripts(monkeypatch):
     """The scripts import each other by name, as they do when they are run."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     yield
-    for name in [entry for entry in sys.modules if entry in ("work", "run") or entry.startswith("bench_")]:
+    for name in [entry for entry in sys.modules if entry in ("work", "run", "peers") or entry.startswith("bench_")]:
         sys.modules.pop(name, None)
 
 
@@ -58,3 +59,27 @@ def test_a_contestant_with_another_result_stops_the_run():
 
     with pytest.raises(work.Disagreement, match="the wrong one"):
         bench_exact.contest(work.work(2), STEPS, [(name, run), ("the wrong one", wrong)])
+
+
+def test_other_programs_get_the_map_and_the_inverse_that_kahanmaps_has():
+    import peers
+
+    for name in peers.INPUTS:
+        entry, file = peers.described(name, 1), load(name)
+        point = [fmpq(int(p), int(q)) for p, q in (text.split("/") for text in entry["start"])]
+        for sign in (1, -1):
+            *images, last = (form(*point, fmpq(1)) for form in peers.forms(file.system.scaled(sign)))
+            assert [image / last for image in images] == list(KahanMap(file.system, fmpq(sign, 10)).step(point))
+
+
+def test_other_answers_of_other_programs_are_noticed():
+    import peers
+
+    assert peers.compared("SageMath", "degrees", [2, 4, 8], [2, 4, 8]) == ""
+    assert peers.compared("Macaulay2", "degrees", "{2, 4, 9}", [2, 4, 8]) == "**2, 4, 9**"
+    assert peers.compared("PARI", "orbit", "[[1/2, 1/3]~, [3, 4]~]", [["1/2", "1/3"], ["3", "4"]]) == ""
+    assert peers.compared("PARI", "orbit", "[[1/2, 1/3]~, [3, 5]~]", [["1/2", "1/3"], ["3", "4"]]) != ""
+    # At infinity kahanmaps lists no fixed points.
+    assert peers.compared("SageMath", "fixed points", [["0", "0", "1"], ["1", "0", "0"]], [["0", "0"]]) == ""
+    assert peers.compared("SageMath", "fixed points", [["1", "0", "1"]], [["0", "0"]]) == "**another list of 1 point**"
+    assert peers.compared("PARI", "integrals", "0", "1") == "**0**"
