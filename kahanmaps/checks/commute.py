@@ -69,9 +69,9 @@ def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamil
 
     properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
     if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **properties), seed).verdict is Certainty.SUPPORTED:
-        at = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
+        at_eps = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
         raise InputError(
-            f"found {file.labelled(letter)}, whose map is the identity{at}, expected another: "
+            f"found {file.labelled(letter)}, whose map is the identity{at_eps}, expected another: "
             "the identity commutes with every map"
         )
 

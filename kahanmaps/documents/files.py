@@ -113,8 +113,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     def with_parameters(self, values: Mapping[Any, Any] | None = None, **named: Any) -> SystemFile:
         """Return the system with other values of its parameters, exact numbers by name. Raises InputError."""
-        given = {str(name): value for name, value in {**(values or {}), **named}.items()}
-        return parse_system(self.to_toml(), self.name, given)
+        values_by_name = {str(name): value for name, value in {**(values or {}), **named}.items()}
+        return parse_system(self.to_toml(), self.name, values_by_name)
 
     subs = with_parameters
 
@@ -144,10 +144,10 @@ class SystemFile(HtmlDisplay, LatexDisplay):
             return self.map.system
         if self.map.unsupported_reason:
             raise InputError(self.map.unsupported_reason)
-        what = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
+        reason = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, KahanFamily):
-            what = f"stands for a {self.map.title}"
-        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps")
+            reason = f"stands for a {self.map.title}"
+        raise InputError(f"{self.name} {reason}, expected a quadratic vector field without eps")
 
     @property
     def rhs(self) -> tuple[fmpq_mpoly, ...]:

@@ -75,11 +75,13 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     if options["integrals"]:
         functions = lib.requested_functions(real_approximation, eps, options["integrals"])
     else:
-        known = lib.known_functions(real_approximation, eps)
-        own = [function for function in known if function.name != "H"]
-        if len(own) > _MAX_INTEGRALS:
-            messages.append(f"shown: {_MAX_INTEGRALS} of {len(own)} known integrals; --integral NAME shows others")
-        functions = own[:_MAX_INTEGRALS] + [function for function in known if function.name == "H"]
+        known_integrals = lib.known_functions(real_approximation, eps)
+        map_integrals = [function for function in known_integrals if function.name != "H"]
+        if len(map_integrals) > _MAX_INTEGRALS:
+            messages.append(
+                f"shown: {_MAX_INTEGRALS} of {len(map_integrals)} known integrals; --integral NAME shows others"
+            )
+        functions = map_integrals[:_MAX_INTEGRALS] + [function for function in known_integrals if function.name == "H"]
     form, reason = lib.float_normal_form(real_approximation)
     methods = options["methods"] or [name for name in lib.METHODS if name != "normal-form" or form is not None]
     if "normal-form" in methods and form is None:
@@ -107,8 +109,8 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
             missing = lib.counted(curve.undefined, "step")
             messages.append(f"{curve.function} along {lib.METHODS[curve.method]}: no value at {missing}, left out")
         if (curve.errors > (limit := lib.clipped_from(survey, curve.function))).any():
-            what = f"{curve.function} along {lib.METHODS[curve.method]}"
-            messages.append(f"{what}: errors above {limit:.0e} are an arrow at the top")
+            curve_name = f"{curve.function} along {lib.METHODS[curve.method]}"
+            messages.append(f"{curve_name}: errors above {limit:.0e} are an arrow at the top")
     for method, end in survey.ends.items():
         if not end.is_complete:
             messages.append(f"{lib.METHODS[method]} ended early: {end.message}")
