@@ -277,9 +277,9 @@ HOW = """\
 
 All programs get the same work on the same machine, one after the other, on one core unless stated otherwise. Exact
 results are compared, and a disagreement stops the run. Short runs are repeated, and the best processor time counts. The
-tables show ratios because they depend less on the machine than times do. PARI/GP reports its own time, without start-up
-and output. No result includes the search for the normal form (a fraction of a second, once per system). Each other
-program is used with the best formulation that we know, and also with slower ones that are more natural.
+tables show ratios because they depend less on the machine than times do. PARI/GP measures its own time, without
+start-up and output. No result includes the search for the normal form (a fraction of a second, once per system). Each
+other program is used with the best formulation that we know, and also with slower ones that are more natural.
 
 The exact system is a member of the commuting family with integer coefficients, in coordinates changed by a symplectic
 integer matrix; eps = 1/10.
@@ -289,9 +289,10 @@ GROUPS = {
     bench_exact.GROUP: (
         "Time relative to kahanmaps with reduced rationals in x: more is slower. All other libraries solve the\n"
         "linear system of each step. Their rationals are reduced as well, and their integers are over one\n"
-        "denominator in lowest terms. Variants of kahanmaps that do less work have lines of their own: one common\n"
-        "denominator that may share a factor of a few bits with all numerators, and normal coordinates without x.\n"
-        "`fractions.Fraction` is too slow for N = 80 and is compared for N = 40."
+        "denominator in lowest terms. Two lines are for variants of kahanmaps that do less work: the first computes x\n"
+        "over one common denominator, which may have a factor of a few bits in common with all numerators; the second\n"
+        "computes normal coordinates, and not x. `fractions.Fraction` is too slow for N = 80 and is compared for\n"
+        "N = 40."
     ),
     bench_exact.FIELDS: (
         "Time relative to the member of the same dimension whose chi splits and whose numbers are about as long.\n"
@@ -299,7 +300,8 @@ GROUPS = {
         "multiplications of integers."
     ),
     bench_exact.GROWTH: (
-        "The exponent e in time ~ N^e. The N-th iterate has about N^2 digits, so the complete orbit has about\nN^3."
+        "The table gives the exponent e in time ~ N^e. The N-th iterate has about N^2 digits, so the complete\n"
+        "orbit has about N^3."
     ),
     bench_catalogue.GROUP: (
         "Time relative to kahanmaps, which uses integers over one common denominator, or fractions, and reduces\n"
@@ -310,9 +312,9 @@ GROUPS = {
         "stay short are omitted, because their times would only measure calls of Python functions."
     ),
     bench_catalogue.LONG: (
-        "The same up to 400,000 bits or 2000 steps, for orbits with relations and for members of the family in\n"
-        "normal form. Searches, which take a fixed time, have less weight here. PARI uses the formulation that\n"
-        "was the fastest in the section before."
+        "The same comparison for orbits of up to 400,000 bits or 2000 steps: those with bilinear forms or Somos\n"
+        "sequences, and those of members of the family in normal form. Searches, which take a fixed time, have\n"
+        "less weight here. PARI uses the formulation that was the fastest in the section before."
     ),
     bench_iterate.OVER_Q: (
         "Time relative to the doublings of kahanmaps: more is slower. `ellmul` does only the main part of the\n"
@@ -327,7 +329,9 @@ GROUPS = {
         "Time relative to the doublings of kahanmaps. `ellmul`, compiled from C, is faster here than kahanmaps,\n"
         "which calls single operations of FLINT from Python, some twelve for each binary digit of n."
     ),
-    bench_iterate.BALLS: "No other program. The balls were checked to contain the exact iterate n = 80.",
+    bench_iterate.BALLS: (
+        "There is no other program to compare with. The balls were checked to contain the exact iterate n = 80."
+    ),
     FLOAT: (
         "Speed relative to the first line of each block: **more is faster**. Integrators solve a different\n"
         "problem, the flow; they are what one would use instead."
@@ -340,13 +344,15 @@ GROUPS = {
         "power series."
     ),
     bench_analysis.PROCESSES: (
-        "No other program; `kahanmaps analyze NAME`, including the start of Python, on two processors. The speed\n"
-        "of the machine may change by the hour; the product of long numbers in the first line measures it."
+        "There is no other program to compare with. Each line is the time of `kahanmaps analyze NAME`, including the\n"
+        "start of Python, on two processors. The speed of the machine may change by the hour; the first line, the\n"
+        "time of a product of long numbers, measures it."
     ),
     bench_memory.GROUP: (
-        "No other program; peak memory relative to the first line of each block. Orbits and results are written\n"
-        "as they are computed. An orbit keeps the terms of its sequences between n/2 and n. Up to 128 MB of the\n"
-        "memory of a batch are SQLite's cache of database pages (a batch of a million tasks took 191 MB)."
+        "There is no other program to compare with. The numbers are peak memory relative to the first line of each\n"
+        "block. Orbits and results are written as they are computed. An orbit keeps the terms of its sequences\n"
+        "between n/2 and n. Up to 128 MB of the memory of a batch are SQLite's cache of database pages (a batch\n"
+        "of a million tasks took 191 MB)."
     ),
     bench_analysis.GROUP: (
         "Time relative to the first part of `analyze`, which counts integrals by the number of polynomials of\n"

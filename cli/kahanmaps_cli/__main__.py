@@ -39,9 +39,11 @@ class _MemoryCheck:
 
 def main() -> int:
     """Run the command line and return its exit status."""
-    usual = {_signal.SIGINT: _signal.default_int_handler, _signal.SIGTERM: _signal.SIG_DFL}
-    ours = [number for number, action in usual.items() if _signal.getsignal(number) == action]  # not ignored
-    for number in ours:
+    default_handlers = {_signal.SIGINT: _signal.default_int_handler, _signal.SIGTERM: _signal.SIG_DFL}
+    handled = [
+        number for number, action in default_handlers.items() if _signal.getsignal(number) == action
+    ]  # not ignored
+    for number in handled:
         _signal.signal(number, _end)
     import atexit
     import resource
@@ -52,10 +54,10 @@ def main() -> int:
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:  # ulimit -v
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         sys.meta_path.insert(0, _MemoryCheck())
-    for number in ours:  # at exit Python removes handlers, and the status is already known
+    for number in handled:  # at exit Python removes handlers, and the status is already known
         atexit.register(_signal.signal, number, _signal.SIG_IGN)
     try:
-        for number in ours:
+        for number in handled:
             handle(number, raise_interrupt)
         status = run()
         if status == _INTERRUPTED:
@@ -66,7 +68,7 @@ def main() -> int:
         raise
     finally:
         end_interrupts()
-        for number in ours:
+        for number in handled:
             _signal.signal(number, _end)
 
 

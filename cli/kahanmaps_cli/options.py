@@ -259,8 +259,8 @@ def load_pair(
     """Load one or two systems; -p sets a parameter in each system that has it."""
     given = dict(options.get("parameters", ()))
     if other is None or not given:
-        alone = {"quiet": options.get("quiet")}
-        return load_system(reference, options), None if other is None else load_system(other, alone)
+        without_parameters = {"quiet": options.get("quiet")}
+        return load_system(reference, options), None if other is None else load_system(other, without_parameters)
     if other == "-":  # which can be read once
         raise click.UsageError("-p with OTHER on standard input is ambiguous: write OTHER to a file")
     named = [
@@ -271,9 +271,9 @@ def load_pair(
     if len(named) == 1:  # the first system is inline or on standard input: its parameters are unknown
         of_first = options["parameters"]
     of_second = [pair for pair in options["parameters"] if pair[0] in named[0]]
-    both = [name for name, _ in of_second if (name, given[name]) in of_first]
-    if both and not options.get("quiet"):
-        print_stderr(f"-p {', '.join(both)}: set in both systems")
+    shared = [name for name, _ in of_second if (name, given[name]) in of_first]
+    if shared and not options.get("quiet"):
+        print_stderr(f"-p {', '.join(shared)}: set in both systems")
     second = {"parameters": of_second, "quiet": options.get("quiet")}
     return load_system(reference, {**options, "parameters": of_first}), load_system(other, second)
 
@@ -298,8 +298,8 @@ def _loaded(reference: str | None, options: Mapping[str, Any]) -> lib.SystemFile
     if are_equations(reference) and not (variables or rhs or image or inverse):
         reference, rhs = None, (str(reference),)
     if len(given) < len(parameters):
-        twice = next(name for k, (name, _) in enumerate(parameters) if name in dict(parameters[:k]))
-        raise click.UsageError(f"found -p {twice}=... twice, expected one value for each parameter")
+        repeated = next(name for k, (name, _) in enumerate(parameters) if name in dict(parameters[:k]))
+        raise click.UsageError(f"found -p {repeated}=... twice, expected one value for each parameter")
     if image or inverse:
         if reference is not None or rhs:
             other = "--rhs" if rhs else f"a SYSTEM ({reference})"
@@ -346,14 +346,14 @@ def load_with_start(
         return load(options), text
     words = set(re.findall(r"[A-Za-z_]\w*", text))
     roots = {name: lib.parse_root(value) for name, value in options["parameters"] if name in words}
-    known = set[str]()
+    parameter_names = set[str]()
     for other_system in references:
         if other_system is not None and other_system != "-" and not are_equations(other_system):
-            known |= set(_loaded(other_system, {}).document.get("parameters", ()))
+            parameter_names |= set(_loaded(other_system, {}).document.get("parameters", ()))
     inline = " ".join([*map(str, filter(are_equations, references)), *options["rhs"], *options["image"]])
     # The parameters of a system on standard input are not known yet.
-    known |= {name for name in roots if "-" in references or re.search(rf"\b{name}\b", inline)}
-    of_start = {name: root for name, root in roots.items() if root is not None and name not in known}
+    parameter_names |= {name for name in roots if "-" in references or re.search(rf"\b{name}\b", inline)}
+    of_start = {name: root for name, root in roots.items() if root is not None and name not in parameter_names}
     loaded = load({**options, "parameters": [pair for pair in options["parameters"] if pair[0] not in of_start]})
     constants = dict[str, Any]()
     for file in loaded if isinstance(loaded, tuple) else (loaded,):
@@ -373,8 +373,10 @@ def load_reference(reference: str, parameters: Mapping[str, str]) -> lib.SystemF
             raise
         folder, name = os.path.split(reference)
         try:
-            here = sorted(other.removesuffix(".toml") for other in os.listdir(folder or ".") if other.endswith(".toml"))
-            close = close_to(name.removesuffix(".toml"), here)
+            toml_files = sorted(
+                other.removesuffix(".toml") for other in os.listdir(folder or ".") if other.endswith(".toml")
+            )
+            close = close_to(name.removesuffix(".toml"), toml_files)
             hint = f", did you mean {' or '.join(os.path.join(folder, f'{like}.toml') for like in close)}?"
         except OSError:
             close, hint = [folder], f" (there is no folder {folder})"

@@ -69,9 +69,9 @@ def _require_another_than_identity(file: SystemFile, letter: str, map_: MapFamil
 
     properties: dict[str, Any] = {"has_eps": map_.has_eps, "root": map_.root, "subject": (map_.subject, "identity")}
     if decide(Identity(map_.dim, sides, eps, "Phi(x)", "x", **properties), seed).verdict is Certainty.SUPPORTED:
-        at = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
+        at_eps = "" if eps is None or file.is_quadratic or not map_.has_eps else f" at eps = {format_number(eps)}"
         raise InputError(
-            f"found {file.labelled(letter)}, whose map is the identity{at}, expected another: "
+            f"found {file.labelled(letter)}, whose map is the identity{at_eps}, expected another: "
             "the identity commutes with every map"
         )
 
@@ -188,18 +188,18 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
 
     findings = []
     pairs = list(combinations(associates, 2))
-    is_tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION
+    tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION
     for k, (first, second) in enumerate(pairs):
-        if k < is_tried:
-            settings.progress(f"pair {k + 1} of {len(pairs)}, the first {is_tried} along an orbit as well")
+        if k < tried:
+            settings.progress(f"pair {k + 1} of {len(pairs)}, the first {tried} along an orbit as well")
         proof = theorems.evidence(
             "Theorem 9 of Petrera and Suris", [*base, *verified[first.label], *verified[second.label]]
         )
         names = (f"f_{first.label}", f"f_{second.label}")
         claim = f"the Kahan maps of {names[0]} and {names[1]} commute"
-        findings.append(certified(claim, (first.system, second.system), names, proof, k < is_tried, source=SOURCE))
-    if len(pairs) > is_tried:
-        notes.append(f"the first {is_tried} pairs were also tried along an orbit; the hypotheses were verified for all")
+        findings.append(certified(claim, (first.system, second.system), names, proof, k < tried, source=SOURCE))
+    if len(pairs) > tried:
+        notes.append(f"the first {tried} pairs were also tried along an orbit; the hypotheses were verified for all")
     if len(associates) == 1:
         # Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse.
         only, inverse = associates[0].system, associates[0].system.scaled(-1)

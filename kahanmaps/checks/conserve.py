@@ -212,9 +212,9 @@ def check_integrals(
         claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
         details: dict[str, Any] = {"formula": integral.formula, "source": source}
         if _is_constant(integral, settings):
-            at = "" if settings.eps is None else f" at eps = {settings.eps}"
+            at_eps = "" if settings.eps is None else f" at eps = {settings.eps}"
             reason = Evidence(
-                "constant", f"it is a constant{at}: every map conserves constants, so this is no integral"
+                "constant", f"it is a constant{at_eps}: every map conserves constants, so this is no integral"
             )
             is_claimed = isinstance(integral, ClaimedIntegral)  # others do not count
             finding = Finding(claim, Certainty.UNDECIDED, reason, **details, applies=is_claimed)

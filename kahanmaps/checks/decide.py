@@ -287,8 +287,8 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
         witness = witness_of(identity, ground, point, at_eps, sides) if sides is not None else None
         if witness is not None:
             height = max(max(abs(int(entry.p)), int(entry.q)) for entry in candidate)
-            where = f"fails at a rational point of height at most {height}, exactly"
-            return Decision(Certainty.REFUTED, Evidence("exact rational point", where, {}), witness)
+            summary = f"fails at a rational point of height at most {height}, exactly"
+            return Decision(Certainty.REFUTED, Evidence("exact rational point", summary, {}), witness)
     return None
 
 

@@ -239,9 +239,9 @@ def check_poisson(
             "expected a file of kind [hamiltonian] or [family], or a tensor: --tensor FILE, in Python its rows"
         )
     orbit = run_orbit(file.map, settings, tensor.subject, file.member is not None)
-    name, where = tensor.name, f", {condition}" if condition else ""
+    name, scope = tensor.name, f", {condition}" if condition else ""
     law = certify(
-        f"the {'Kahan ' * isinstance(file.map, KahanFamily)}map is Poisson for {name}{where}",
+        f"the {'Kahan ' * isinstance(file.map, KahanFamily)}map is Poisson for {name}{scope}",
         transformation_identity(file.map, tensor, settings.eps),
         settings,
         proof,
@@ -250,7 +250,7 @@ def check_poisson(
         source=source,
     )
     jacobi = certify(
-        f"{name} is a Poisson tensor{where}",
+        f"{name} is a Poisson tensor{scope}",
         jacobi_identity(tensor, settings.eps),  # contains only x, so an orbit would add nothing
         settings,
         proof,

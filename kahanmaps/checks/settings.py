@@ -178,10 +178,10 @@ def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
         if witness is not None:
             text = f"fails at step {tried + undefined - 1} of an exact orbit"
             return Evidence("exact orbit", text, _orbit_data(run, tried, undefined)), witness
-    at = f", eps = {format_number(run.eps)}" if identity.has_eps else ""
-    text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit{at}"
+    at_eps = f", eps = {format_number(run.eps)}" if identity.has_eps else ""
+    text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit{at_eps}"
     if not tried:
-        text = f"could not be tried at any point of an orbit{at}"
+        text = f"could not be tried at any point of an orbit{at_eps}"
     if undefined:
         text += f", undefined at {undefined}"
     if not run.end.is_complete:

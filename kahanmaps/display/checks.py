@@ -63,8 +63,8 @@ def evidence_rows(finding: Finding, limits: DisplayLimits = _NOTEBOOK) -> list[t
         rows.append(("also", f"… and {len(finding.also) - limits.entries} more"))
     if finding.witness is not None:
         rows.append(("witness", _witness(finding.witness, limits)))
-    last = {**{word: finding.place.get(word) for word in ("misprint", "violation")}, "source": finding.source}
-    return rows + [(word, _text(str(what), limits.text)) for word, what in last.items() if what]
+    origin = {**{word: finding.place.get(word) for word in ("misprint", "violation")}, "source": finding.source}
+    return rows + [(word, _text(str(what), limits.text)) for word, what in origin.items() if what]
 
 
 def because(evidence: Evidence, limits: DisplayLimits = _NOTEBOOK) -> str:

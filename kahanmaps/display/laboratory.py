@@ -71,8 +71,8 @@ def _polynomial(polynomial: fmpq_mpoly, name: str = "") -> HtmlCell:
 
 
 @latex_form.register
-def _found_function(found: FoundFunction) -> str:
-    return latex_rational_function(found.function)
+def _found_function(result: FoundFunction) -> str:
+    return latex_rational_function(result.function)
 
 
 @latex_form.register
@@ -81,8 +81,8 @@ def _darboux_polynomials(space: DarbouxPolynomials) -> str:
 
 
 @latex_form.register
-def _found_tensor(found: FoundTensor | IntegralInIterates) -> str:
-    return found.latex()
+def _found_tensor(result: FoundTensor | IntegralInIterates) -> str:
+    return result.latex()
 
 
 def eps_sentence(eps: fmpq | None, *maps: MapFamily) -> str:
@@ -161,8 +161,8 @@ def analysis_html(analysis: Analysis) -> str:
         f"<p><strong>{_text(final.kind)}</strong>: {_text(final.sentence, 800)}</p>",
         markup.folded(rows, ["", "known how", ""]) + more,
     ]
-    beside = ", ".join(filter(None, (f"dimension {analysis.dim}", eps_sentence(analysis.eps, analysis.file.map))))
-    return markup.titled(markup.shortened(analysis.file.name), "\n".join(inside), beside)
+    subtitle = ", ".join(filter(None, (f"dimension {analysis.dim}", eps_sentence(analysis.eps, analysis.file.map))))
+    return markup.titled(markup.shortened(analysis.file.name), "\n".join(inside), subtitle)
 
 
 # -- preserved structures
@@ -188,10 +188,10 @@ def _tensors(search: PoissonSearch) -> Iterator[Line]:
 
 
 def _formulas(named: Sequence[tuple[str, Any, str]], notes: Sequence[str]) -> Iterator[Line]:
-    for name, result, what in named:
+    for name, result, properties in named:
         is_tensor = hasattr(result, "tensor")
         yield name, result.verdict, _brackets(result) if is_tensor else _formula(result.text, result.function, name)
-        yield "", f"{what}{result.evidence.summary}"
+        yield "", f"{properties}{result.evidence.summary}"
     yield from (("note", text) for text in notes if text)
 
 
@@ -263,11 +263,11 @@ def _census(census: Census) -> Iterator[Line]:
     yield "periodic", census.periodic
     if census.cycles:
         yield "cycles", f"{census.cycles}, longest {census.longest}"
-    shown = list(census.lengths.items())[-_LENGTHS_SHOWN:]
-    if shown:
-        what = "length x cycles" if census.complete else "length x points"
-        more = "... " if len(census.lengths) > len(shown) else ""
-        yield what, more + " ".join(f"{length}x{n}" for length, n in shown)
+    longest = list(census.lengths.items())[-_LENGTHS_SHOWN:]
+    if longest:
+        label = "length x cycles" if census.complete else "length x points"
+        more = "... " if len(census.lengths) > len(longest) else ""
+        yield label, more + " ".join(f"{length}x{n}" for length, n in longest)
 
 
 @lines_of.register
@@ -350,8 +350,8 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
         yield ("# complete: every g commutes",)
     elif systems.complete:
         has_others = bool(listed or systems.families or systems.irrational)
-        which = "these, 0, f and -f" if has_others else "0, f and -f"
-        yield (f"# complete: among the {systems.kind_text} only {which} commute with f",)
+        exceptions = "these, 0, f and -f" if has_others else "0, f and -f"
+        yield (f"# complete: among the {systems.kind_text} only {exceptions} commute with f",)
     else:
         yield (f"# undecided: there may be more; {systems.undecided[0]}",)
 
@@ -373,8 +373,8 @@ def _as_options(g: CommutingField, root: str) -> HtmlCell:
 
 def _about(what: str, result: Any, *subtitle: str) -> tuple[str, str]:
     """A title with the name of the system, and a subtitle that ends with eps."""
-    words = (*subtitle, eps_sentence(result.eps, result.file.map))
-    return f"{what} of {markup.shortened(result.file.name)}", "; ".join(filter(None, words))
+    parts = (*subtitle, eps_sentence(result.eps, result.file.map))
+    return f"{what} of {markup.shortened(result.file.name)}", "; ".join(filter(None, parts))
 
 
 # Titles and subtitles of the results that are displayed by their lines.

@@ -151,5 +151,5 @@ def verdict(word: object) -> str:
 
 def titled(title: str, inside: str, more: str = "") -> str:
     """Return a block of HTML with a title and an optional remark, both text."""
-    beside = f" — {escape(more)}" if more else ""
-    return f"<div><p><strong>{escape(title)}</strong>{beside}</p>\n{inside}\n</div>"
+    remark = f" — {escape(more)}" if more else ""
+    return f"<div><p><strong>{escape(title)}</strong>{remark}</p>\n{inside}\n</div>"

@@ -163,11 +163,11 @@ def map_latex(kahan: KahanMap) -> str:
         rows.append((r"\vdots", rf"\text{{({system.dim} equations)}}"))
     with field.working():
         eps, step = (markup.shortened(field.format(value)) for value in (kahan.eps, kahan.eps + kahan.eps))
-    where = "" if str(field) == "QQ" else rf"\text{{ over {_plain(field)}}}"
+    over_field = "" if str(field) == "QQ" else rf"\text{{ over {_plain(field)}}}"
     rows.append(
         (
             r"\varepsilon",
-            rf"\text{{{_plain(eps)}}},\quad \text{{time step }} 2 \varepsilon = \text{{{_plain(step)}}}{where}",
+            rf"\text{{{_plain(eps)}}},\quad \text{{time step }} 2 \varepsilon = \text{{{_plain(step)}}}{over_field}",
         )
     )
     return latex_aligned(rows, _EQUATIONS + 2)
@@ -187,21 +187,21 @@ def birational_latex(map_: MapFamily) -> str:
     if isinstance(map_, ComposedMap) and not map_.is_small:
         return latex_aligned([(r"\widetilde{x}", rf"\text{{{len(map_.parts)} maps one after the other}}")])
     assert isinstance(map_, ImplicitMap | ComposedMap)
-    shown = map_.equations[: _EQUATIONS + 1]
-    return latex_aligned([(latex_cut(equation, CHARACTERS), "0") for equation in shown], _EQUATIONS)
+    equations_shown = map_.equations[: _EQUATIONS + 1]
+    return latex_aligned([(latex_cut(equation, CHARACTERS), "0") for equation in equations_shown], _EQUATIONS)
 
 
 def _polarised(polynomial: fmpq_mpoly, variables: Sequence[str]) -> str:
     """Return the component Q(x, x~) + B (x + x~)/2 + c of the polarization, 2 f((x + x~)/2) - f(x)/2 - f(x~)/2."""
-    shown = first_terms(polynomial, CHARACTERS // 2)
+    terms_shown = first_terms(polynomial, CHARACTERS // 2)
     context = ring((*variables, *(f"{name}~" for name in variables)))
     x, y = context.gens()[: len(variables)], context.gens()[len(variables) :]
     middle = [(a + b) / 2 for a, b in zip(x, y, strict=True)]
-    at_middle, at_x, at_y = (shown.compose(*point, ctx=context) for point in (middle, x, y))
+    at_middle, at_x, at_y = (terms_shown.compose(*point, ctx=context) for point in (middle, x, y))
     terms = counted(len(polynomial), "term")
-    if not len(shown) and len(polynomial):
+    if not len(terms_shown) and len(polynomial):
         return rf"\text{{({terms}, not shown)}}"
-    more = rf" + \cdots\ \text{{({terms})}}" if len(shown) < len(polynomial) else ""
+    more = rf" + \cdots\ \text{{({terms})}}" if len(terms_shown) < len(polynomial) else ""
     return latex_polynomial(2 * at_middle - (at_x + at_y) / 2) + more
 
 
@@ -214,11 +214,11 @@ def _plain(text: object) -> str:
 def orbit_html(orbit: Orbit) -> str:
     """Return the first points, the last computed point, and how the orbit ended."""
     variables = orbit.map.variables
-    shown, last = list(orbit.first), orbit.last
+    first_points, last = list(orbit.first), orbit.last
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
-    rows = [_cells(point, len(variables)) for point in shown]
-    if last is not None and last.step > shown[-1].step:
-        if last.step > shown[-1].step + 1:
+    rows = [_cells(point, len(variables)) for point in first_points]
+    if last is not None and last.step > first_points[-1].step:
+        if last.step > first_points[-1].step + 1:
             rows.append(["…"] * len(head))
         rows.append(_cells(last, len(variables)))
     if orbit.end is not None:
@@ -231,23 +231,23 @@ def orbit_html(orbit: Orbit) -> str:
     field = orbit.map.field
     direction = " backward" if orbit.backward else ""
     eps, flow = orbit.map.eps, orbit.map.flow  # None where maps at several eps, of several fields were composed
-    at = "" if eps is None else f" eps = {markup.shortened(field.format(eps))},"
-    at += "" if flow is None else f" time step {markup.shortened(field.format(flow[1]))},"
-    title = f"orbit{direction},{at} over {field}"
+    at_eps = "" if eps is None else f" eps = {markup.shortened(field.format(eps))},"
+    at_eps += "" if flow is None else f" time step {markup.shortened(field.format(flow[1]))},"
+    title = f"orbit{direction},{at_eps} over {field}"
     return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
 
 
 @html_form.register
 def trajectory_html(orbit: Trajectory) -> str:
     """Return the first points, and the last one if all points are known."""
-    known = vars(orbit).get("points")
-    shown = orbit.preview(_POINTS) if known is None else [*known[:_POINTS], *known[_POINTS:][-1:]]
+    computed = vars(orbit).get("points")
+    points_shown = orbit.preview(_POINTS) if computed is None else [*computed[:_POINTS], *computed[_POINTS:][-1:]]
     variables = orbit.variables
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
-    rows = [_cells(point, len(variables)) for point in shown]
-    if known is not None and len(known) > _POINTS + 1:
+    rows = [_cells(point, len(variables)) for point in points_shown]
+    if computed is not None and len(computed) > _POINTS + 1:
         rows.insert(_POINTS, ["…"] * len(head))
-    if known is None:
+    if computed is None:
         status = "the first points; len(orbit), orbit.x and orbit[-1] compute all"
     else:
         status = f"{markup.verdict(orbit.end.status)}: {markup.escape(orbit.end.message)}"

@@ -113,8 +113,8 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     def with_parameters(self, values: Mapping[Any, Any] | None = None, **named: Any) -> SystemFile:
         """Return the system with other values of its parameters, exact numbers by name. Raises InputError."""
-        given = {str(name): value for name, value in {**(values or {}), **named}.items()}
-        return parse_system(self.to_toml(), self.name, given)
+        values_by_name = {str(name): value for name, value in {**(values or {}), **named}.items()}
+        return parse_system(self.to_toml(), self.name, values_by_name)
 
     subs = with_parameters
 
@@ -144,11 +144,11 @@ class SystemFile(HtmlDisplay, LatexDisplay):
             return self.map.system
         if self.map.unsupported_reason:
             raise InputError(self.map.unsupported_reason)
-        what = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
+        reason = "has eps in its coefficients" if isinstance(self.map, KahanFamily) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, KahanFamily):
-            what = f"stands for a {self.map.title}"
+            reason = f"stands for a {self.map.title}"
         hint = "; of a Kahan map give the system x' = f(x)" if self.kind in ("bilinear", "map", "composition") else ""
-        raise InputError(f"{self.name} {what}, expected a quadratic vector field without eps{hint}")
+        raise InputError(f"{self.name} {reason}, expected a quadratic vector field without eps{hint}")
 
     @property
     def rhs(self) -> tuple[fmpq_mpoly, ...]:

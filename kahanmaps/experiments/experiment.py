@@ -210,8 +210,8 @@ class Experiment:
         if system_spec is not None and "family" in system_spec:
             system_spec = family_spec(values)
         elif system_spec is not None:
-            given = {n.removeprefix(PARAMETERS): value for n, value in values.items() if n.startswith(PARAMETERS)}
-            system_spec = {**system_spec, "parameters": {**system_spec["parameters"], **given}}
+            parameters = {n.removeprefix(PARAMETERS): value for n, value in values.items() if n.startswith(PARAMETERS)}
+            system_spec = {**system_spec, "parameters": {**system_spec["parameters"], **parameters}}
         options = {name: values.get(name, self.kind.defaults.get(name)) for name in self.kind.options}
         return Task(self.kind.name, system_spec, options)
 
@@ -324,9 +324,9 @@ class ExperimentReader:
             key = name.removeprefix(PARAMETERS)
             for file in self.files:
                 if key not in file.parameters:
-                    known = ", ".join(file.parameters) or "none"
+                    parameter_names = ", ".join(file.parameters) or "none"
                     hint = suggestion(key, list(file.parameters))
-                    raise InputError(f"{file.name} has no such parameter, its parameters are: {known}{hint}")
+                    raise InputError(f"{file.name} has no such parameter, its parameters are: {parameter_names}{hint}")
             return exact(name, "a parameter of the system")
         options = dict(kind.options)
         if self.is_family or (self.has_parameters and not self.files):  # a member of the family may have been intended
@@ -334,8 +334,10 @@ class ExperimentReader:
         if name in options:
             return options[name]
         if name == "seconds":  # its name up to 0.2, when results depended on the clock
-            instead = f"{EFFORT} = 1 (one more doubles the work)" if EFFORT in options else 'limits = {time = "60 s"}'
-            raise InputError(f"{kind.name} no longer has this option, expected {instead}")
+            replacement = (
+                f"{EFFORT} = 1 (one more doubles the work)" if EFFORT in options else 'limits = {time = "60 s"}'
+            )
+            raise InputError(f"{kind.name} no longer has this option, expected {replacement}")
         names = [*options, *([TIME_STEP] if "eps" in options else [])]
         expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
         raise InputError(f"{kind.name} has no such option, expected one of {expected}{suggestion(written, names)}")
@@ -369,14 +371,14 @@ class ExperimentReader:
     def _read_zips(self, axes: Mapping[str, AxisValues]) -> list[tuple[str, ...]]:
         zips: list[tuple[str, ...]] = []
         used: set[str] = set()
-        given = {name for name, _, _ in self.entries("axes")}
+        given_axes = {name for name, _, _ in self.entries("axes")}
         for number, names in enumerate(self._written_zips(), start=1):
             key = f"zip[{number}]"
             if names is None:
                 continue
             unknown = [name for name in names if name not in axes]
             for name in unknown:
-                if name not in given:  # otherwise another mistake was reported
+                if name not in given_axes:  # otherwise another mistake was reported
                     self.mistake(key, f"{name} is not an axis{suggestion(name, list(axes))}")
             repeated = [name for k, name in enumerate(names) if name in names[:k] or name in used]
             if len(names) < 2:
@@ -493,8 +495,8 @@ class ExperimentReader:
                             self.mistake(item_key, f"{error}{suggestion(name, [_FAMILY_WORD])}")
                         continue
                     if system_spec["document"] in system_specs:
-                        same = f"{name} says the same as {names[system_spec['document']]}"
-                        sentence = f"found {file.name} twice, expected every system once: {same}"
+                        same_document = f"{name} says the same as {names[system_spec['document']]}"
+                        sentence = f"found {file.name} twice, expected every system once: {same_document}"
                         if self._skips and key == "system":
                             self.skipped.append((name, sentence))
                             continue
@@ -532,5 +534,5 @@ class ExperimentReader:
             return
         if self.kind.needs == MEMBER_OR_OTHER and OTHER in self.given():
             return
-        also = ", or a second system as the option other" if self.kind.needs == MEMBER_OR_OTHER else ""
-        raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]{also}")
+        alternative = ", or a second system as the option other" if self.kind.needs == MEMBER_OR_OTHER else ""
+        raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]{alternative}")

@@ -81,8 +81,8 @@ class AxisValues(Sequence[Any]):
         if isinstance(index, slice):
             return [self[k] for k in range(len(self))[index]]
         index = range(len(self))[index]
-        which = bisect_right(self._ends, index)
-        value = self.pieces[which][index - (self._ends[which - 1] if which else 0)]
+        piece_index = bisect_right(self._ends, index)
+        value = self.pieces[piece_index][index - (self._ends[piece_index - 1] if piece_index else 0)]
         return self.option.read(value) if isinstance(value, fmpq) else value
 
 

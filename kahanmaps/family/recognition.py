@@ -83,11 +83,13 @@ class FamilyStructure(ResultPart):
         if self.member.m == 1:
             sentence = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
         else:
-            how = "H splits: A"
+            beginning = "H splits: A"
             if len(factors) == 1:
-                split = factors[0].degree > 1
-                how = "H splits over the splitting field of chi: A" if split else "H does not split: A, not scalar,"
-            sentence = f"{how} with A Hess(H) = Hess(H) A^T has chi = {chi}"
+                splits = factors[0].degree > 1
+                beginning = (
+                    "H splits over the splitting field of chi: A" if splits else "H does not split: A, not scalar,"
+                )
+            sentence = f"{beginning} with A Hess(H) = Hess(H) A^T has chi = {chi}"
         return sentence if self.is_standard else f"{sentence}, in coordinates y with x = T y and standard J"
 
 
@@ -317,8 +319,8 @@ def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
     if len(factors) == 1:
         return [E]
     projections = []
-    for which in range(len(factors)):
-        signs = [2 * (i == which) - 1 for i in range(len(factors))]
+    for index in range(len(factors)):
+        signs = [2 * (i == index) - 1 for i in range(len(factors))]
         projections.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
     return projections
 
@@ -377,9 +379,9 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
     """A reduced basis of all integer matrices in the span; empty for zeros."""
     lattice = fmpz_mat([primitive_integers(tuple(matrix.entries())) for matrix in matrices])
     rows = lattice.tolist()
-    alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
+    is_alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
     # Where every row has an entry 1 or -1 that is alone in its column, the rows generate all integer points.
-    if not all(any(single and abs(entry) == 1 for entry, single in zip(row, alone, strict=True)) for row in rows):
+    if not all(any(single and abs(entry) == 1 for entry, single in zip(row, is_alone, strict=True)) for row in rows):
         reduced = lattice.lll()
         d = lattice.rank()
         lattice = fmpz_mat(

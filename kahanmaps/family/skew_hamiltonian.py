@@ -116,12 +116,12 @@ def diagnosis(A: fmpq_mat) -> str:
     )
     if not repeated:
         if all(factor.degree == 1 for factor in factors):
-            how = "all roots rational"
+            splitting = "all roots rational"
         elif len(factors) == 1:
-            how = "irreducible over Q"
+            splitting = "irreducible over Q"
         else:
-            how = f"{len(factors)} irreducible factors over Q"
-        return f"A is generic: chi = {product}, without repeated roots, {how}"
+            splitting = f"{len(factors)} irreducible factors over Q"
+        return f"A is generic: chi = {product}, without repeated roots, {splitting}"
     names = ", ".join(f"({factor}) {factor.multiplicity} times" for factor in repeated)
     head = f"A is not generic: chi = {product} has repeated roots, {names}"
     degree = minimal_degree(A)

@@ -117,7 +117,7 @@ class TensorStructure(ResultPart):
     @property
     def text(self) -> str:
         """A sentence that describes the system over K."""
-        what = {1: "a system in one variable", 2: "a planar system"}.get(
+        kind = {1: "a system in one variable", 2: "a planar system"}.get(
             self.rank, f"a system in {self.rank} variables"
         )
         _, factors = self.chi.factor()
@@ -126,7 +126,7 @@ class TensorStructure(ResultPart):
             note = f", a product of {len(factors)} systems"
         elif factors[0][1] > 1:
             note = ", which has nilpotent elements"
-        return f"{what} over K = Q[t]/({self.chi_text}){note}"
+        return f"{kind} over K = Q[t]/({self.chi_text}){note}"
 
 
 def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:

@@ -184,16 +184,18 @@ class _Writer:
         if part == "system":
             self._function("vector_field", "x' = f(x)", "vector", self._vector(formulas.rhs), point, eps=False)
         elif part == "map":
-            words = ["M", "r", "The map x -> x~, where M x~ = r"]
+            comments = ["M", "r", "The map x -> x~, where M x~ = r"]
             if is_kahan:
-                words = ["M = I - eps f'(x)", "r = M x + 2 eps f(x)"]
-                words.append("The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r")
+                comments = ["M = I - eps f'(x)", "r = M x + 2 eps f(x)"]
+                comments.append("The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r")
             rows = [self._listed("row", list(map(self._expression, row[:-1]))) for row in formulas.equation]
             matrix = self._listed("matrix", rows, self.language["between_rows"])
-            self._function("kahan_matrix", words[0], "matrix", matrix, point)
+            self._function("kahan_matrix", comments[0], "matrix", matrix, point)
             right = self._vector([row[-1] for row in formulas.equation])
-            self._function("kahan_vector", words[1], "vector", right, point)
-            self._function("kahan_map", words[2], "vector", self._solved("solve", self._call("kahan_vector", "point")))
+            self._function("kahan_vector", comments[1], "vector", right, point)
+            self._function(
+                "kahan_map", comments[2], "vector", self._solved("solve", self._call("kahan_vector", "point"))
+            )
         elif part == "inverse" and not is_kahan:
             inverse = self._vector(formulas.inverse_form())
             self._function("kahan_inverse", "The inverse of the map", "vector", inverse, point)
@@ -208,10 +210,10 @@ class _Writer:
             solve = "solve_matrix" if self.language["solve_matrix"] else "solve"
             self._function("kahan_jacobian", comment, "matrix", self._solved(solve, right))
         elif part == "map-formulas":
-            what, of = "Kahan map" if is_kahan else "map", "x and eps" if self.eps else "x"
+            map_name, arguments = "Kahan map" if is_kahan else "map", "x and eps" if self.eps else "x"
             components = self._vector(formulas.closed_form())
             self._function(
-                "kahan_map_formula", f"The {what} as rational functions of {of}", "vector", components, point
+                "kahan_map_formula", f"The {map_name} as rational functions of {arguments}", "vector", components, point
             )
         elif part == "density" and formulas.density is not None:
             comment = "phi; the file says that dx/phi is invariant under the map"
@@ -235,7 +237,7 @@ class _Writer:
     def _function(
         self,
         key: str,
-        words: str,
+        comment: str,
         kind: str,
         value: str,
         points: Mapping[str, Sequence[str]] | None = None,
@@ -272,7 +274,7 @@ class _Writer:
             joined = text.replace("\n        ", " ").splitlines()
             wrapped = [textwrap.wrap(line, 110, break_long_words=False) for line in joined]
             text = "\n".join(f"{self.language['continued']}\n        ".join(line) for line in wrapped)
-        self.written[self.names[key]] = f"{self._comment(words)}\n{text}"
+        self.written[self.names[key]] = f"{self._comment(comment)}\n{text}"
 
     def _expression(self, function: RationalFunction | fmpq_mpoly) -> str:
         """Return a polynomial or a quotient of polynomials as an exact expression, on several lines if it is long."""

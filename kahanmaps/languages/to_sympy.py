@@ -56,15 +56,15 @@ def _rational(function: RationalFunction) -> Any:
 
 
 @sympy_form.register
-def _found(found: FoundFunction) -> Any:
-    return _rational(found.function)
+def _found(result: FoundFunction) -> Any:
+    return _rational(result.function)
 
 
 @sympy_form.register
-def _in_iterates(found: IntegralInIterates) -> Any:
-    ratio, letters = found.ratio.formula
+def _in_iterates(integral: IntegralInIterates) -> Any:
+    ratio, letters = integral.ratio.formula
     if letters:
-        raise InputError(f"found {found.name}, whose formula has abbreviations: read .text or .latex()")
+        raise InputError(f"found {integral.name}, whose formula has abbreviations: read .text or .latex()")
     return _rational(ratio)
 
 
@@ -74,8 +74,8 @@ def _darboux(space: DarbouxPolynomials) -> Any:
 
 
 @sympy_form.register
-def _tensor(found: FoundTensor) -> Any:
-    return _sympy().Matrix([[sympy_form(entry) for entry in row] for row in found.tensor.rows])
+def _tensor(result: FoundTensor) -> Any:
+    return _sympy().Matrix([[sympy_form(entry) for entry in row] for row in result.tensor.rows])
 
 
 @sympy_form.register

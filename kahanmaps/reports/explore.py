@@ -41,14 +41,14 @@ def explore_sections(analysis: Analysis) -> list[Section]:
         largest = max(_LARGEST_EPS, 2 * abs(eps))
         sliders.insert(0, ("eps", "eps", -largest if eps < 0 else 0, largest, eps, "any"))
     sliders.append(("steps", "steps", 10, _MAX_STEPS, _DEFAULT_STEPS, "10"))
-    where = "for every eps" if analysis.eps is None else f"at eps = {format_number(analysis.eps)} only"
+    scope = "for every eps" if analysis.eps is None else f"at eps = {format_number(analysis.eps)} only"
     integrals = analysis.integrals.integrals if analysis.integrals is not None else ()
     explore = {
         "axes": [*names, "step"],
         "chosen": (1, 0) if len(names) == 1 else (0, 1),
         "sliders": sliders,
         "eps_moves": data["eps_moves"],
-        "verdict": f"The verdict{f', {where}' if analysis.file.map.has_eps else ''}",
+        "verdict": f"The verdict{f', {scope}' if analysis.file.map.has_eps else ''}",
         "conclusion": (final.kind, final.sentence),
         "integrals": [
             (

@@ -77,56 +77,60 @@ class Pictures:
                         artist.set_rasterized(True)
             svg = svg_text(figure, name, _STYLE, alt)
         except KahanmapsError as error:
-            what = markup.escape(caption.removesuffix("."))
-            return f'<p class="soft">{what}: not drawn, for {markup.escape(error)}</p>'
-        words = "<br/>".join(map(markup.escape, (caption, *remarks)))
-        return f'<figure id="{name}">\n{svg}\n<figcaption>{words}</figcaption>\n</figure>'
+            title = markup.escape(caption.removesuffix("."))
+            return f'<p class="soft">{title}: not drawn, for {markup.escape(error)}</p>'
+        caption_html = "<br/>".join(map(markup.escape, (caption, *remarks)))
+        return f'<figure id="{name}">\n{svg}\n<figcaption>{caption_html}</figcaption>\n</figure>'
 
     def portrait(self, file: SystemFile, eps: Any) -> str:
         """Draw sixteen orbits in the plane of the first two variables (in dimension 1 against the step).
 
         The initial points lie around the fixed points of a vector field, or are random if there is no vector field.
         """
-        at = DEFAULT_EPS if eps is None else rational(eps)
+        eps_value = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
         axes = file.variables[:2] if file.dim > 1 else ("step", file.variables[0])
 
         def drawing(style: Style) -> Figure:
             real_approximation = file.real_approximation
             if is_field := real_approximation.is_quadratic:
-                starts = automatic_starts(real_approximation.system, at)
+                starts = automatic_starts(real_approximation.system, eps_value)
             else:
                 starts = starts_in_box(_INITIAL_POINTS, file.dim, 2.0, 0)
-            orbits = walked(ensemble_for(real_approximation.map, at, starts, _STEPS), _STEPS)
+            orbits = walked(ensemble_for(real_approximation.map, eps_value, starts, _STEPS), _STEPS)
             functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
-            shown = portrait_of(orbits, functions)
+            drawn_portrait = portrait_of(orbits, functions)
             if is_field:
-                shown = replace(shown, flow=plane_flow(real_approximation.system, range(file.dim), shown.window))
+                drawn_portrait = replace(
+                    drawn_portrait, flow=plane_flow(real_approximation.system, range(file.dim), drawn_portrait.window)
+                )
             for reason, count in orbits.ended.items():
                 remarks.append(f"{count} of {counted(orbits.orbits, 'orbit')} ended early: {reason}.")
-            if shown.left_out:
-                remarks.append(f"{shown.left_out} of {orbits.points[..., 0].size} points lie outside the window.")
-            return plot_portrait(shown, style)
+            if drawn_portrait.left_out:
+                remarks.append(
+                    f"{drawn_portrait.left_out} of {orbits.points[..., 0].size} points lie outside the window."
+                )
+            return plot_portrait(drawn_portrait, style)
 
-        where = " and ".join(axes)
-        sentence = f"{eps_suffix(at, file.map)}, {_STEPS} steps in floating point".removeprefix(", ")
-        caption = f"Orbits of {'the Kahan map' if file.is_quadratic else 'the map'} in {where}: {sentence}."
-        return self.draw("portrait", caption, f"Portrait of orbits in {where}, {sentence}", drawing, remarks)
+        axis_names = " and ".join(axes)
+        sentence = f"{eps_suffix(eps_value, file.map)}, {_STEPS} steps in floating point".removeprefix(", ")
+        caption = f"Orbits of {'the Kahan map' if file.is_quadratic else 'the map'} in {axis_names}: {sentence}."
+        return self.draw("portrait", caption, f"Portrait of orbits in {axis_names}, {sentence}", drawing, remarks)
 
     def invariant_curves(self, file: SystemFile, eps: Any) -> str:
         """Draw three orbits of a member of the family on their invariant cubics, plane by plane."""
-        at = DEFAULT_EPS if eps is None else rational(eps)
+        eps_value = DEFAULT_EPS if eps is None else rational(eps)
         remarks: list[str] = []
 
         def drawing(style: Style) -> Figure:
             starts = list(islice(random_starts(file.system.dim, 0), _CURVES))
-            curves = find_invariant_curves(file, starts, at, _CURVE_STEPS)
+            curves = find_invariant_curves(file, starts, eps_value, _CURVE_STEPS)
             for k, pole in enumerate(curves.poles, 1):
                 if pole is not None:
                     remarks.append(f"Orbit {k} ends before step {pole}: a pole, or closer to one than 2^-96.")
             return plot_invariant_curves(curves, style)
 
-        sentence = f"{eps_suffix(at)}, {_CURVE_STEPS} steps".removeprefix(", ")
+        sentence = f"{eps_suffix(eps_value)}, {_CURVE_STEPS} steps".removeprefix(", ")
         caption = f"{_CURVES} orbits in the planes of the normal form, and the invariant curves through them: "
         alt = f"Invariant plane cubics with orbits on them, {sentence}"
         return self.draw("invariant-curves", f"{caption}{sentence}.", alt, drawing, remarks)

@@ -83,19 +83,19 @@ def report_html(
     ('<!DOCTYPE html>', 3)
     """
     page_template()  # raises the error for a missing package before pictures are drawn
-    drawn = Pictures(pictures and not explore)
+    page_pictures = Pictures(pictures and not explore)
     script, seed = "", None
     if isinstance(results, Analysis):
         file, seed = results.file, results.seed
-        about = (file.name, f"dimension {results.dim}", eps_sentence(results.eps, file.map))
-        lead = ", ".join(filter(None, about))
+        lead_parts = (file.name, f"dimension {results.dim}", eps_sentence(results.eps, file.map))
+        lead = ", ".join(filter(None, lead_parts))
         default_title = _title(file)
         if explore:
             sections = explore_sections(results)
             script = (resources.files("kahanmaps.reports") / "explore.js").read_text(encoding="utf-8")
         else:
             lead += f"; formulas for every {', '.join(results.symbols)}" if results.symbols else ""
-            sections = [*_analysis_sections(results, drawn), Section("notes", "Notes", items=left_out)]
+            sections = [*_analysis_sections(results, page_pictures), Section("notes", "Notes", items=left_out)]
     elif explore:
         raise InputError(f"found {type(results).__name__}, expected an Analysis: it is what can be explored")
     else:
@@ -106,11 +106,11 @@ def report_html(
         first = reports[0]
         lead = ", ".join(filter(None, (checks.systems_sentence(first), checks.eps_sentence(first))))
         name = str(first.context.get("system", "")) if file is None else _title(file)
-        what = "The paper, statement by statement" if first.check == "verify" else "Checks"
-        default_title, seed = f"{what}: {name}", first.context.get("seed")
-        sections = _claims_sections(reports, file, left_out, drawn)
-    if drawn.note:
-        sections.append(Section("pictures", "Pictures", paragraphs=[drawn.note]))
+        heading = "The paper, statement by statement" if first.check == "verify" else "Checks"
+        default_title, seed = f"{heading}: {name}", first.context.get("seed")
+        sections = _claims_sections(reports, file, left_out, page_pictures)
+    if page_pictures.note:
+        sections.append(Section("pictures", "Pictures", paragraphs=[page_pictures.note]))
     if certificate:
         link = f'<a href="{text(quote(certificate))}">{text(certificate)}</a>'
         sentence = Html(f"Proofs that another program (Coq, PARI/GP or SymPy) checks: {link}")
@@ -167,9 +167,9 @@ def _title(file: SystemFile) -> str:
 
 def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
     file, final = analysis.file, analysis.conclusion
-    of = " in x and eps" if file.map.has_eps else ""
+    arguments = " in x and eps" if file.map.has_eps else ""
     explanation = (
-        f"Proved and supported: formulas, as identities{of}. Measured: modulo primes and along orbits, "
+        f"Proved and supported: formulas, as identities{arguments}. Measured: modulo primes and along orbits, "
         "which is evidence. The number of integrals and the growth are separate findings."
     )
     conclusion = Html(f"<strong>{text(final.kind)}</strong>"), final.sentence
@@ -182,8 +182,8 @@ def _analysis_sections(analysis: Analysis, pictures: Pictures) -> list[Section]:
         section = Section(name.replace(" ", "-"), title, statements=statements, pieces=pieces, folded=folded)
         sections.append(section)
     is_member = isinstance(file.normal_form, SystemNormalForm)  # in the coordinates of the system
-    drawn = (pictures.invariant_curves if is_member else pictures.portrait)(file, analysis.eps)
-    return [*sections, Section("orbits", "Orbits", pieces=[Html(drawn)] if drawn else [])]
+    picture = (pictures.invariant_curves if is_member else pictures.portrait)(file, analysis.eps)
+    return [*sections, Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
 
 
 def _catalogue(file: SystemFile) -> Section:
@@ -218,13 +218,13 @@ def _pictures_and_tables(
     analysis: Analysis, name: str, pictures: Pictures
 ) -> tuple[list[Html], list[tuple[str, Html]]]:
     """Return the pictures and folded tables below the statements of a section."""
-    drawn: list[str] = []
+    figures: list[str] = []
     folded: list[tuple[str, Html]] = []
     if name == "singularities":
-        at = " at eps = {}" if analysis.file.map.has_eps else ""
+        at_eps = " at eps = {}" if analysis.file.map.has_eps else ""
         for run in analysis.singularities:
             folded.append(
-                (f"Hypersurfaces{at.format(format_number(run.eps))}", wide(result_html(run, analysis.file.map)))
+                (f"Hypersurfaces{at_eps.format(format_number(run.eps))}", wide(result_html(run, analysis.file.map)))
             )
     growth, survey = analysis.degrees, analysis.heights
     if name == "growth" and growth is not None:
@@ -233,20 +233,20 @@ def _pictures_and_tables(
         caption = "Degrees of the iterates"
         caption += " and the recurrence that they satisfy." if growth.recurrence is not None else "."
         label = analysis.file.label
-        drawn.append(pictures.draw("degrees", caption, alt, lambda style: plot_degrees({label: growth}, style)))
+        figures.append(pictures.draw("degrees", caption, alt, lambda style: plot_degrees({label: growth}, style)))
         rows = [(str(n), str(d)) for n, d in enumerate(growth.degrees)]
         folded.append(("Degrees as a table", wide(markup.table(["n", "degree of the n-th iterate"], rows))))
     if name == "growth" and survey is not None and survey.orbits:
         alt = f"Heights of exact orbits in bits against the step: {survey.text}"
         caption = "Heights of exact orbits, and the growth that was fitted."
-        drawn.append(pictures.draw("heights", caption, alt, lambda style: plot_heights(survey, style)))
+        figures.append(pictures.draw("heights", caption, alt, lambda style: plot_heights(survey, style)))
         folded.append(("Orbits whose heights were measured", wide(result_html(survey))))
-    return [Html(figure) for figure in drawn if figure], folded
+    return [Html(figure) for figure in figures if figure], folded
 
 
 def formulas_of(analysis: Analysis) -> dict[str, Html]:
     """Return HTML for statements that are formulas, by their text in `analysis.sections`."""
-    shown: dict[str, str] = {}
+    html_by_text: dict[str, str] = {}
 
     def evidence(statement: Any) -> str:
         because = checks.because(statement.evidence, _LIMITS)
@@ -255,13 +255,13 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
     for integral in analysis.integrals.integrals if analysis.integrals is not None else ():
         html = formula(integral.function, integral.name, CHARACTERS)
         origin_and_evidence = f'<span class="soft">{text(integral.origin)}</span>\n{evidence(integral)}'
-        shown[f"{integral.name} = {integral.text}  [{integral.origin}]"] = f"{html}<br/>{origin_and_evidence}"
+        html_by_text[f"{integral.name} = {integral.text}  [{integral.origin}]"] = f"{html}<br/>{origin_and_evidence}"
     for relation in analysis.relations:
         if html := _relation(relation, (*relation.names, *analysis.file.variables, "eps")):
-            shown[f"along orbits {relation.text}"] = f"along orbits {html}"
+            html_by_text[f"along orbits {relation.text}"] = f"along orbits {html}"
     for density in analysis.densities.densities if analysis.densities is not None else ():
         html = formula(density.function, "phi", CHARACTERS)
-        shown[f"dx/phi is invariant, phi = {density.text}"] = f"dx/ϕ is invariant, {html}\n{evidence(density)}"
+        html_by_text[f"dx/phi is invariant, phi = {density.text}"] = f"dx/ϕ is invariant, {html}\n{evidence(density)}"
     if (
         analysis.degrees is not None
         and analysis.degrees.recurrence is not None
@@ -269,17 +269,17 @@ def formulas_of(analysis: Analysis) -> dict[str, Html]:
     ):
         closed = analysis.degrees.recurrence.closed_form
         with suppress(KahanmapsError):  # raised unless it is a polynomial in n
-            shown[f"d_n = {closed}"] = typeset(f"d_n = {latex_polynomial(parse_polynomial(closed, ['n']))}")
+            html_by_text[f"d_n = {closed}"] = typeset(f"d_n = {latex_polynomial(parse_polynomial(closed, ['n']))}")
     if analysis.hamiltonian is not None and analysis.hamiltonian.hamiltonian is not None:
         hamiltonian = analysis.hamiltonian.hamiltonian
         kind = "the standard J" if hamiltonian.is_standard else "a constant skew J"
         html = f"Hamiltonian with {kind}, {formula(hamiltonian.H, 'H', CHARACTERS)}"
-        shown[f"Hamiltonian with {kind}, H = {format_polynomial(hamiltonian.H)}"] = html
+        html_by_text[f"Hamiltonian with {kind}, H = {format_polynomial(hamiltonian.H)}"] = html
     for field in analysis.commuting.nontrivial if analysis.commuting is not None else ():
         parts = "<br/>\n".join(formula(g, f"g{k}", CHARACTERS) for k, g in enumerate(field.system.rhs, start=1))
         statement = "commutes with the Kahan maps of g and -g"
-        shown[f"{statement}, g = ({', '.join(field.rhs)})"] = f"{statement},<br/>\n{parts}"
-    return {text: Html(html) for text, html in shown.items()}
+        html_by_text[f"{statement}, g = ({', '.join(field.rhs)})"] = f"{statement},<br/>\n{parts}"
+    return {text: Html(html) for text, html in html_by_text.items()}
 
 
 def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
@@ -325,8 +325,8 @@ def _claims_sections(
     if file is not None:
         eps = first.context.get("eps")
         draw = pictures.portrait if file.member is None else pictures.invariant_curves
-        drawn = draw(file, None if eps in (None, "every") else str(eps))
-        sections += [system_section(file), Section("orbits", "Orbits", pieces=[Html(drawn)] if drawn else [])]
+        picture = draw(file, None if eps in (None, "every") else str(eps))
+        sections += [system_section(file), Section("orbits", "Orbits", pieces=[Html(picture)] if picture else [])]
     ids: Counter[str] = Counter()
     for section_id, name, findings in groups:
         sections.append(Section(section_id, name, claims=[_claim(finding, ids) for finding in findings]))

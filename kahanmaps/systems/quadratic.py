@@ -138,12 +138,12 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
         >>> QuadraticSystem.from_text(["y", "x"], ["x^2", "x*y"]).reordered(["x", "y"]).rhs
         (x*y, x^2)
         """
-        at = [self.variables.index(name) for name in variables]
-        if len(at) != self.dim or len(set(at)) != self.dim:
+        positions = [self.variables.index(name) for name in variables]
+        if len(positions) != self.dim or len(set(positions)) != self.dim:
             raise InputError(f"found the variables {', '.join(variables)}, expected {', '.join(self.variables)}")
         context = ring((*variables, *self.symbols))
         images = [context.gen(context.names().index(name)) for name in (*self.variables, *self.symbols)]
-        return QuadraticSystem(tuple(self.rhs[i].compose(*images, ctx=context) for i in at), self.symbols)
+        return QuadraticSystem(tuple(self.rhs[i].compose(*images, ctx=context) for i in positions), self.symbols)
 
     def at(self, values: Sequence[Any]) -> QuadraticSystem:
         """Return the system with numbers substituted for its symbols."""
@@ -228,20 +228,20 @@ class SystemOver:
             for i, polynomial in enumerate(system.rhs):
                 for monomial, coefficient in polynomial.terms():
                     # Of the variables in the monomial, each as often as it occurs.
-                    where = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
+                    indices = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
                     # Twice x_j^2/2 is an integer: f'' makes sense modulo 2 where Q does not.
-                    is_square = len(where) == 2 and where[0] == where[1]
+                    is_square = len(indices) == 2 and indices[0] == indices[1]
                     value = field.convert(coefficient * 2 if is_square else coefficient)
                     for exponent, at in zip(monomial[n:], values, strict=True):
                         for _ in range(exponent):  # a power of a ball around 0 is nan in python-flint 0.9.0
                             value = value * at
-                    if len(where) == 2:
-                        j, k = where
+                    if len(indices) == 2:
+                        j, k = indices
                         add(tensor, (i * n + j) * n + k, value)
                         if j != k:
                             add(tensor, (i * n + k) * n + j, value)
-                    elif len(where) == 1:
-                        add(linear, i * n + where[0], value)
+                    elif len(indices) == 1:
+                        add(linear, i * n + indices[0], value)
                     else:
                         add(constants, i, value)
             parts = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)

@@ -182,10 +182,10 @@ def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
         print_stdout(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
         for k in range(min(_TASKS_SHOWN, experiment.size)):
             task = experiment[k]
-            given = {name: value for name, value in task.options.items() if value is not None}
-            if "other" in given:
-                given["other"] = lib.system_words(given["other"])
-            print_stdout(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given)}")
+            given_options = {name: value for name, value in task.options.items() if value is not None}
+            if "other" in given_options:
+                given_options["other"] = lib.system_words(given_options["other"])
+            print_stdout(f"\t{task.key[:8]}\t{lib.system_words(task.system)}\t{lib.option_words(given_options)}")
         if experiment.size > _TASKS_SHOWN:
             print_stdout(f"\t... and {experiment.size - _TASKS_SHOWN} more")
         for system, reason in experiment.skipped:
@@ -205,8 +205,10 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     with lib.Store.open(db, create=spec is not None) as store:
         planned = {} if spec is None else lib.plan(spec, store)
         names = list(options["only"]) or ([e.name for e in experiments] if spec is not None else None)
-        which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}
-        progress = BatchProgress(store.count_pending(**which, retry_failed=options["retry_failed"]), options["quiet"])
+        selection: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}
+        progress = BatchProgress(
+            store.count_pending(**selection, retry_failed=options["retry_failed"]), options["quiet"]
+        )
         for experiment in experiments:
             if experiment.skipped:
                 progress.print(
@@ -222,7 +224,7 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
         progress.print(todo if progress.todo else f"nothing to do: every task has a result in {db}")
         was_interrupted = False
         if progress.todo:
-            jobs = store.pending(**which, retry_failed=options["retry_failed"])
+            jobs = store.pending(**selection, retry_failed=options["retry_failed"])
             cluster = (options["scheduler"], options["worker_python"])
             processes = options["jobs"] or lib.processors()
             executor = lib.executor_for(store.document, processes, *cluster, options["group_seconds"], progress.print)
@@ -241,7 +243,7 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                         for record in records if options["as_jsonl"] else ():
                             click.echo(json.dumps({"record": "result", **record.to_json()}))
                 was_interrupted = batch.was_interrupted
-        missing = store.count_pending(**which)
+        missing = store.count_pending(**selection)
         data = _status(store, names or ())
     interrupted = was_interrupted and missing > 0
     failed = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
@@ -257,20 +259,20 @@ def _run(path: str | None, db: str, options: Mapping[str, Any]) -> int:
             f"{_tasks(progress.lost)} lost without a result: their worker was killed or could not be started "
             f"{lib.TRIES} times ({progress.why_lost})"
         )
-    words = ["kahanmaps", "batch", "run", *([f"./{path}" if path.startswith("-") else path] if path else [])]
-    words += ["--db", db, *(word for name in options["only"] for word in ("-e", name))]
+    command_words = ["kahanmaps", "batch", "run", *([f"./{path}" if path.startswith("-") else path] if path else [])]
+    command_words += ["--db", db, *(word for name in options["only"] for word in ("-e", name))]
     for name in ("scheduler", "worker_python"):
         if options[name] is not None:
-            words += [f"--{name.replace('_', '-')}", options[name]]
+            command_words += [f"--{name.replace('_', '-')}", options[name]]
     if options["shard"]:
-        words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
-    again = as_typed(words)
+        command_words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
+    same_command = as_typed(command_words)
     if missing:
-        how = "interrupted: " if interrupted else ""
-        progress.print(f"{how}{_tasks(missing)} without a result yet; to continue: {again}")
+        prefix = "interrupted: " if interrupted else ""
+        progress.print(f"{prefix}{_tasks(missing)} without a result yet; to continue: {same_command}")
     if failed:
         why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
-        progress.print(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
+        progress.print(f"{_tasks(failed)} failed, why: {why}; to try again: {same_command} --retry-failed")
     if interrupted:
         return 130
     return 3 if failed or missing else 0

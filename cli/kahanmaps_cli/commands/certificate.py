@@ -77,17 +77,17 @@ def command(system: str | None, checker: str, output: str | None, quiet: bool, *
     else:
         file, other = load_pair(system, other, loading)
     integrals = {name or f"I{k}": text for k, (name, text) in enumerate(options["integrals"], 1)}
-    words = ["kahanmaps", "certificate", *([system] if system is not None else [])]
-    words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
-    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
-    words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
-    words += ["--for", checker, *(word for name in options["claims"] for word in ("--claim", name))]
-    words += [word for key in ("commute", "period") if options[key] for word in (f"--{key}", str(options[key]))]
-    words += ["--all"] if options["everything"] else []
-    words += ["--effort", str(options["effort"])] if options["effort"] != 1 else []
-    words += [word for name, text in integrals.items() for word in ("--integral", f"{name}={text}")]
+    command_words = ["kahanmaps", "certificate", *([system] if system is not None else [])]
+    command_words += [f"--vars={options['variables']}"] if options["variables"] is not None else []
+    command_words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
+    command_words += [word for name, value in options["parameters"] for word in ("-p", f"{name}={value}")]
+    command_words += ["--for", checker, *(word for name in options["claims"] for word in ("--claim", name))]
+    command_words += [word for key in ("commute", "period") if options[key] for word in (f"--{key}", str(options[key]))]
+    command_words += ["--all"] if options["everything"] else []
+    command_words += ["--effort", str(options["effort"])] if options["effort"] != 1 else []
+    command_words += [word for name, text in integrals.items() for word in ("--integral", f"{name}={text}")]
     try:
-        everything, command_line = options["everything"], as_typed(words)
+        everything, command_line = options["everything"], as_typed(command_words)
         text = lib.certificate(
             file,
             checker,

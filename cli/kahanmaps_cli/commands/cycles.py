@@ -69,12 +69,12 @@ def command(system: str | None, **options: Any) -> int:
         line = ", ".join(f"{text} modulo {run.prime}" for text, run in zip(results, runs, strict=True))
 
         def print_text() -> None:
-            what = "the Kahan map" if file.is_quadratic else file.map.kind
+            map_name = "the Kahan map" if file.is_quadratic else file.map.kind
             share = lib.eps_share(file.map)
-            print_stdout(f"# {file.name}, {what} on P^{file.dim} over GF(p){share and ', '}{share}")
+            print_stdout(f"# {file.name}, {map_name} on P^{file.dim} over GF(p){share and ', '}{share}")
             for census in runs:
-                at = f", eps = {census.eps}" if file.map.has_eps else ""
-                print_stdout(f"\n# p = {census.prime}{at}")
+                at_eps = f", eps = {census.eps}" if file.map.has_eps else ""
+                print_stdout(f"\n# p = {census.prime}{at_eps}")
                 print_stdout(str(census))
 
         def record() -> dict[str, Any]:

@@ -85,9 +85,9 @@ def command(system: str | None, **options: Any) -> int:
 
         def print_text() -> None:
             eps, lines = growth.eps, f"{len(growth.primes)} random lines modulo primes of 61 bits"
-            at = ", generic eps" if eps is None and file.map.has_eps else lib.eps_suffix(eps, file.map)
-            how = f"{lines}: measured, not proved" if growth.primes else "powers of the exponent matrix: exact"
-            print_stdout(f"# {file.name}{at}, {how}")
+            at_eps = ", generic eps" if eps is None and file.map.has_eps else lib.eps_suffix(eps, file.map)
+            method_text = f"{lines}: measured, not proved" if growth.primes else "powers of the exponent matrix: exact"
+            print_stdout(f"# {file.name}{at_eps}, {method_text}")
             print_stdout(growth.text)
 
         def record() -> dict[str, Any]:

@@ -315,8 +315,8 @@ def associated(
             "B_in_powers_of_A": [lib.format_univariate(c.polynomial, other.name) for c in other.coefficients],
             "K": other.K_text,
         }
-        which = roots.index(other.root) + 1 if len(roots) > 1 else ""
-        conjugate.append(with_file(row, f"-{other.name}{which}", partial(lib.SystemFile.from_conjugate, other)))
+        number = roots.index(other.root) + 1 if len(roots) > 1 else ""
+        conjugate.append(with_file(row, f"-{other.name}{number}", partial(lib.SystemFile.from_conjugate, other)))
     if write_to is not None:
         Path(write_to).mkdir(parents=True, exist_ok=True)
     for name, associate_file in written.items():

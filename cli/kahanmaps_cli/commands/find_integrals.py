@@ -121,13 +121,13 @@ def command(system: str | None, **options: Any) -> int:
         print_json(record("find-integrals", result, search, beside_map=comparison.to_json()))
         return 3 if result.reason else 0
     integrals: list[Any] = [*result.integrals, *result.in_iterates]
-    named = [(integral.name, integral, f"{integral.origin}: ") for integral in integrals]
-    print_search("find-integrals", result, search, options, named, _count(result))
+    rows = [(integral.name, integral, f"{integral.origin}: ") for integral in integrals]
+    print_search("find-integrals", result, search, options, rows, _count(result))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for integral in result.time_dependent:
-            where = "" if result.flow else "of the n-th point: "
+            prefix = "" if result.flow else "of the n-th point: "
             print_stdout(
-                f"{integral.name}\t{integral.integral.verdict}\t{formula(integral.text)}\n\t{where}depends on time"
+                f"{integral.name}\t{integral.integral.verdict}\t{formula(integral.text)}\n\t{prefix}depends on time"
             )
         for status, text in () if comparison is None else comparison.lines(others=False):
             print_stdout(f"{status}\t{formula(text)}")
@@ -173,12 +173,14 @@ def _bases(system: str | None, options: dict[str, Any]) -> int:
             letters = lib.with_iterates(file.variables, lib.iterates_in(text))
             functions = [lib.parse_polynomial(part, letters, file.parameters) for part in parts]
             for k, function in enumerate(functions):
-                which = f"function {k + 1}"
+                position = f"function {k + 1}"
                 if function.is_zero():
                     expected = "polynomials that are not 0"
-                    raise lib.InputError(f"found 0 as {which} of the set {lib.quoted(text)}, expected {expected}")
+                    raise lib.InputError(f"found 0 as {position} of the set {lib.quoted(text)}, expected {expected}")
                 if function in functions[:k]:
-                    raise lib.InputError(f"found {which} twice in the set {lib.quoted(text)}, expected different ones")
+                    raise lib.InputError(
+                        f"found {position} twice in the set {lib.quoted(text)}, expected different ones"
+                    )
             try:
                 if not reason:
                     rows.append(lib.hirota_kimura_basis(laboratory.maps, functions, parts))

@@ -87,7 +87,7 @@ def command(system: str | None, **options: Any) -> int:
     is_named, is_drawn = _require_consistent(system, options)
     require_every_eps(options)
     lib.page_template()  # raises the error for a missing package before the work
-    how = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
+    page_options = {"title": options["title"], "pictures": not options["no_pictures"], "command": command_line()}
     with SearchProgress(options) as search:
         if options["source"] == "analyze":
             from kahanmaps_cli.runs.search import symbols_and_eps
@@ -98,14 +98,14 @@ def command(system: str | None, **options: Any) -> int:
             try:
                 file = opt.load_system(system, options)
                 lib.analyze(file, **arguments, progress=search, on_result=results.append)
-                how["certificate"] = _certificate(file, options)
+                page_options["certificate"] = _certificate(file, options)
                 search("the page")
-                html = lib.report_html(results[-1], explore=options["explore"], **how)
+                html = lib.report_html(results[-1], explore=options["explore"], **page_options)
             except lib.TimeLimit:
                 if not results:
                     raise
                 results[-1].interrupt("stopped (--seconds)")
-                html = lib.report_html(results[-1], **{**how, "pictures": False}, left_out=[search.ending])
+                html = lib.report_html(results[-1], **{**page_options, "pictures": False}, left_out=[search.ending])
             status = 3 if search.is_over or results[-1].conclusion.kind == "undecided" else 0
         else:
             # Without SYSTEM, verify and the options of a random member need a member of the family.
@@ -126,9 +126,9 @@ def command(system: str | None, **options: Any) -> int:
                         left_out.append(f"{name} does not apply: {error}")
                 if not reports:
                     raise lib.InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
-            how["certificate"] = _certificate(file, options)
+            page_options["certificate"] = _certificate(file, options)
             search("the page")
-            html = lib.report_html(reports, file=file, left_out=left_out, **how)
+            html = lib.report_html(reports, file=file, left_out=left_out, **page_options)
             verdict = lib.combined(report.verdict for report in reports)
             status = {lib.Certainty.REFUTED: 1, lib.Certainty.UNDECIDED: 3}.get(verdict, 0)
     content = html.encode()

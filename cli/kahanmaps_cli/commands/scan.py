@@ -87,7 +87,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         entries = {**lib.eps_record(result.eps, result.file.map), **search.work, **result.to_json()}
         print_json(record_of("scan", result.file, "modulo primes", **entries))
     else:
-        at = "" if "eps" in result.over else lib.eps_suffix(result.eps, result.file.map)
-        print_stdout(f"# scan: {result.file.name} over {', '.join(result.over)}{at}")
+        at_eps = "" if "eps" in result.over else lib.eps_suffix(result.eps, result.file.map)
+        print_stdout(f"# scan: {result.file.name} over {', '.join(result.over)}{at_eps}")
         print_stdout(result.text)
     return ending(result, search)

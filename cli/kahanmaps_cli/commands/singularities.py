@@ -114,8 +114,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
             print_stdout(f"factors of {name}\t{formula(factors, 200) or 'none'}")
         for run in runs:
-            at = f"eps = {run.eps}: " if file.map.has_eps else ""
-            text = str(run).replace("# ", f"\n# {at}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
+            at_eps = f"eps = {run.eps}: " if file.map.has_eps else ""
+            text = str(run).replace("# ", f"\n# {at_eps}", 1).replace("\ndenominator\t", f"\n{name}\t", 1)
             print_stdout(
                 "\n".join("\t".join(formula(cell, 200) for cell in line.split("\t")) for line in text.split("\n"))
             )

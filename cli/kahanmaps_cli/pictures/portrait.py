@@ -134,8 +134,10 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     if levels is not None:
         if len(plane) != 2 or len(axes) != 2:
             raise lib.InputError("--levels needs two variables as axes: give --axes X,Y")
-        at = options["levels_at"]
-        values = lib.levels_through(levels, starts) if at is None else lib.to_floats(at).tolist()
+        requested_levels = options["levels_at"]
+        values = (
+            lib.levels_through(levels, starts) if requested_levels is None else lib.to_floats(requested_levels).tolist()
+        )
         curves = lib.level_curves(levels, plane, file.dim, values, shown.window)
         if missing := sum(not pieces for pieces in curves):
             notes.append(f"{missing} of {len(values)} levels of {levels.name} have no curve in the window")

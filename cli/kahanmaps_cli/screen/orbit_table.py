@@ -66,8 +66,9 @@ def _approximated(text: str) -> list[str]:
 
     is_small = abs(power) < 5
     long, short = (
-        sign + (f"{float(mantissa) * 10**power:.{kept}g}" if is_small else f"{float(mantissa):.{kept}g}e{power:+03d}")
-        for kept in (6, 3)
+        sign
+        + (f"{float(mantissa) * 10**power:.{figures}g}" if is_small else f"{float(mantissa):.{figures}g}e{power:+03d}")
+        for figures in (6, 3)
     )
     digits = f"{len(numerator)}/{len(denominator)}" if exact[3] else f"{len(numerator)}"
     most = max(len(numerator), len(denominator))

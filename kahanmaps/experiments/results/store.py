@@ -402,10 +402,12 @@ class Store(HtmlDisplay):
             "SELECT name, definition, limits, total, tasks, id, "
             "(SELECT max(number) + 1 FROM plan WHERE experiment = e.id) FROM experiment AS e ORDER BY id"
         )
-        known = [row[0] for row in rows]
+        all_names = [row[0] for row in rows]
         for name in names or ():
-            if name not in known:
-                raise StoreError(f"{self.name} has no experiment {name}: it has {', '.join(known) or 'none at all'}")
+            if name not in all_names:
+                raise StoreError(
+                    f"{self.name} has no experiment {name}: it has {', '.join(all_names) or 'none at all'}"
+                )
         chosen: list[StoredExperiment] = []
         offset = 0
         for name, definition, limits, total, tasks, id, planned in rows:
@@ -612,14 +614,14 @@ class Store(HtmlDisplay):
         with Store.open(other, readonly=True) as source, self._transaction():
             if source.path.samefile(self.path):
                 raise StoreError(f"{source.name} is this database itself: there is nothing to merge")
-            mine = dict(self._execute("SELECT name, digest FROM experiment").fetchall())
+            own_digests = dict(self._execute("SELECT name, digest FROM experiment").fetchall())
             for experiment in source.experiments():
-                if mine.get(experiment.name, defined := digest(experiment.definition)) != defined:
+                if own_digests.get(experiment.name, defined := digest(experiment.definition)) != defined:
                     raise StoreError(
                         f"the experiment {experiment.name} is defined in one way in {self.name} and in another way in "
                         f"{source.name}: rename it in one of them; nothing was merged"
                     )
-                if experiment.name not in mine:
+                if experiment.name not in own_digests:
                     sql = """
                         SELECT t.key, t.text FROM plan AS p JOIN task AS t ON t.id = p.task
                         WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
@@ -635,14 +637,14 @@ class Store(HtmlDisplay):
             last = 0
             while rows := source._fetch(sql, (last, RESULT_CHUNK)):
                 last = rows[-1][0]
-                for _, key, text, *theirs, attempts in rows:
+                for _, key, text, *other_result, attempts in rows:
                     new += self._add_tasks([(key, text)])
-                    task, *own, own_attempts = self._find_result(key) or ()
-                    if own[0] is None or theirs[0] == Outcome.OK != own[0]:
-                        results += own[0] is None
-                        replaced += own[0] is not None
-                        self._put_result(task, theirs, attempts + (own_attempts or 0))
-                    elif theirs[0] == Outcome.OK and theirs[1:3] != own[1:3]:
+                    task, *own_result, own_attempts = self._find_result(key) or ()
+                    if own_result[0] is None or other_result[0] == Outcome.OK != own_result[0]:
+                        results += own_result[0] is None
+                        replaced += own_result[0] is not None
+                        self._put_result(task, other_result, attempts + (own_attempts or 0))
+                    elif other_result[0] == Outcome.OK and other_result[1:3] != own_result[1:3]:
                         conflicts += 1
                         conflicting += [key] if conflicts <= CONFLICTS_SHOWN else []
         return Merged(new, results, replaced, conflicts, tuple(conflicting))

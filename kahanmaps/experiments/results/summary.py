@@ -206,8 +206,8 @@ def summarise(
         short_names, full_names = ({names_of(entry)[k] for entry in seen} for k in (0, 1))
         for name in by:
             if name not in full_names:
-                what = "to group by" if has_results else "to group by (there is no result yet)"
-                _must_exist(name, short_names.union(_WORDS), what)
+                purpose = "to group by" if has_results else "to group by (there is no result yet)"
+                _must_exist(name, short_names.union(_WORDS), purpose)
         for name in values or ():
             _must_exist(name, numeric, "of numbers")
     return Summary(by, tuple(groups[identity].group() for identity in sorted(groups)))
@@ -237,11 +237,13 @@ def _order(value: Any) -> tuple[Any, ...]:
     return (0, Fraction(value)) if is_number(value) else (2, plain(value))
 
 
-def _must_exist(name: str, known: set[str], what: str) -> None:
-    if name in known:
+def _must_exist(name: str, known_names: set[str], purpose: str) -> None:
+    if name in known_names:
         return
-    close = difflib.get_close_matches(name, sorted(known), _RELATED)
+    close = difflib.get_close_matches(name, sorted(known_names), _RELATED)
     meant = f", did you mean {' or '.join(close)}?" if close else ";"
-    listed = sorted(known)
+    listed = sorted(known_names)
     more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
-    raise InputError(f"found the unknown name {quoted(name)}{meant} names {what}: {', '.join(listed[:_LISTED])}{more}")
+    raise InputError(
+        f"found the unknown name {quoted(name)}{meant} names {purpose}: {', '.join(listed[:_LISTED])}{more}"
+    )

@@ -108,5 +108,5 @@ def _random_system(text: str) -> SystemFile:
         member = random_member_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
     if spec.get("signs"):
         member = FamilyMember(member.A, member.H, FAMILY["signs"].make(spec["signs"]))
-    how = f", {spec['draw']}" if spec["draw"] != "eigenvalues" else ""
-    return SystemFile.from_member(member, f"random member{how}, m = {member.m}, seed {seed}")
+    method_text = f", {spec['draw']}" if spec["draw"] != "eigenvalues" else ""
+    return SystemFile.from_member(member, f"random member{method_text}, m = {member.m}, seed {seed}")
