@@ -125,7 +125,7 @@ class Terms:
 
     def value(self, n: int) -> Any:
         """Return t(n) itself, for n = 1 to 4."""
-        return self._first[n] * self._terms[n]
+        return self._short_scales[n] * self._terms[n]
 
     def integer(self, n: int) -> Any:
         """Return w(n), for n >= 1."""

@@ -1,4 +1,4 @@
-"""The command `plot`: portrait, invariant-curves, compare, escape, heights, degrees, scan, rotation, section, commute."""
+"""The command `plot` with its subcommands, one for each kind of picture."""
 
 from __future__ import annotations
 
