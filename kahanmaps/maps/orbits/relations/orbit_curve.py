@@ -40,6 +40,8 @@ from kahanmaps.maps.orbits.relations.elliptic_steps import EllipticSteps
 from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
 
 _BITS = 100_000  # of coefficients that are searched for, and of points on rational curves
+_LATER, _APART = 16, 8  # steps after which the search starts again, up to the first number, as long as
+_SHORT = 2000  # ... points have at most this number of bits
 _LEVEL_POINTS = 8  # of an orbit, from which the translation of a level curve is computed
 _PERIODS = 24  # up to this period an orbit is recognized as periodic: twice the largest order of a torsion point
 _ACCURACY = 1e-15  # of rotation numbers
@@ -136,16 +138,19 @@ def orbit_curve(
     (1, -7323, 229622, '0.15215519')
     """
     point = IntegerPoint.from_rationals(map_over.point(start))
-    try:
-        steps = elliptic_steps(map_over, point, _BITS, most_primes=_BITS)
-    except TooLongRelation:
-        raise UnknownCurve(
-            f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_BITS} "
-            "bits: choose an initial point, eps or parameters with fewer digits"
-        ) from None
-    curve = None if steps is None else _on_elliptic_curve(map_over, steps)
-    if curve is not None and curve.iterate == 1:
-        return curve
+    # An initial point in special position leads to zeros among the first terms of the sequences.
+    curve, later = None, point
+    for skipped in range(_LATER + 1):
+        if skipped % _APART == 0:
+            found = _found_steps(map_over, later)
+            if found is not None:
+                curve = _on_elliptic_curve(map_over, found)
+                if curve.iterate == 1:
+                    return curve
+        image = map_over.integer_step(later)
+        if image is None or image.exceeding(_SHORT):
+            break
+        later = image
     orbit = _first_points(map_over, point)
     if map_over.dim == 2 and family is not None:
         level = _on_level_curve(map_over, [entry.rationals() for entry in orbit if entry], family, integrals)
@@ -164,6 +169,16 @@ def orbit_curve(
             "the coordinates have degree at most 8"
         )
     return result
+
+
+def _found_steps(map_over: Map, start: IntegerPoint) -> EllipticSteps | None:
+    try:
+        return elliptic_steps(map_over, start, _BITS, most_primes=_BITS)
+    except TooLongRelation:
+        raise UnknownCurve(
+            f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_BITS} "
+            "bits: choose an initial point, eps or parameters with fewer digits"
+        ) from None
 
 
 def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
