@@ -211,9 +211,9 @@ from .plots.portraits.windows import fullest_axes as fullest_axes
 from .plots.portraits.windows import require_window as require_window
 from .plots.rotation import plot_rotation as plot_rotation
 from .plots.scan import plot_scan as plot_scan
+from .plots.section import curves_on as curves_on
+from .plots.section import hyperplane_of as hyperplane_of
 from .plots.section import plot_section as plot_section
-from .plots.section import require_hyperplane as require_hyperplane
-from .plots.section import restricted_to as restricted_to
 from .plots.section import section_of as section_of
 from .plots.squares import pair_of_systems as pair_of_systems
 from .plots.squares import pairs_of_member as pairs_of_member

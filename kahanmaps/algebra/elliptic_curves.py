@@ -126,7 +126,7 @@ def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
     Raises PrecisionLost if 32768 bits do not suffice.
 
     >>> canonical_height(EllipticCurve(fmpq(0), fmpq(-1), fmpq(1)), (fmpq(1), fmpq(1))).str(10, radius=False)
-    '0.02494610450'
+    '0.02490419865'
     """
     d = fmpq(curve.a2.q.lcm(curve.a4.q).lcm(curve.a6.q))
     for factor in _candidates((curve.a2 * d**2).p.gcd((curve.a4 * d**4).p).gcd((curve.a6 * d**6).p)):

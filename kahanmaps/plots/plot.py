@@ -107,6 +107,39 @@ class Plot(AttributeHints):
         first, last = as_point(first, file.variables), as_point(last, file.variables)
         return _axes(plot_rotation(normal_form, rational(eps), first, last, Style(), points=points))
 
+    def section(
+        self,
+        system: SystemLike,
+        plane: str,
+        *,
+        x0: Any,
+        eps: Any = None,
+        n: int = 20_000,
+        axes: Sequence[str] | None = None,
+        direction: str = "up",
+    ) -> Axes:
+        """Plot a Poincare section of float orbits, as `plot section` draws it.
+
+        Args:
+            system: a map with at least 3 variables, or a system, which stands for its Kahan map.
+            plane: the hyperplane, a linear equation in the variables such as "x1 = 1/2".
+            x0: one initial point or many.
+            eps: an exact number, half the time step where there is one.
+            n: the number of steps of each orbit.
+            axes: two variables or expressions; by default those along which the crossings spread most.
+            direction: "up" for crossings to larger values, "down" or "both".
+        """
+        from kahanmaps.plots.drifts.drift_functions import requested_axis
+        from kahanmaps.plots.section import curves_on, hyperplane_of, plot_section, section_of
+
+        file = as_file(system)
+        value = file.real_approximation.at(resolve_eps(eps, None, floats=True)).eps
+        hyperplane = hyperplane_of(file, value, plane)
+        found = section_of(ensemble_for(file.map, value, start_rows(x0), n), hyperplane, n, direction=direction)
+        names = axes or [file.variables[k] for k in found.widest_axes(hyperplane)]
+        functions = [requested_axis(file, value, name) for name in names]
+        return _axes(plot_section(found, functions, curves=curves_on(file, value, hyperplane, functions)))
+
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""
         _require(trajectory, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")

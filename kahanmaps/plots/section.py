@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from flint import fmpq
 
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
-from kahanmaps.errors import InputError
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray
 from kahanmaps.plots.curves.level_sets import MAX_LEVELS, level_curves, levels_through
+from kahanmaps.plots.drifts.drift_functions import requested_axis
 from kahanmaps.plots.figures import draw_points, drawing, legend_above, new_figure
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.windows import Window, fullest_axes, window_of
@@ -52,13 +55,28 @@ class Section:
         return tuple(free[k] for k in fullest_axes(self.points[:, free], 2))
 
 
-def require_hyperplane(function: PointFunction, dim: int) -> None:
-    """Raise InputError unless a function is a nonconstant affine function of the variables."""
+def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
+    """Return F - C for a text F=C, or F for F=0; raise InputError unless it is affine in the variables, without eps."""
+    left, _, right = text.partition("=")
+    function = requested_axis(file, eps, left if right.strip() in ("", "0") else f"{left} - ({right})")
     polynomial = function.function.numerator
-    if not function.function.denominator.is_one() or degree_in(polynomial, dim) != 1 or polynomial.total_degree() != 1:
-        raise InputError(
-            f"found {function.name}, expected a hyperplane: a linear equation in the variables, such as x1 - x2 = 1"
-        )
+    if (
+        not function.function.denominator.is_one()
+        or not degree_in(polynomial, file.dim) == polynomial.total_degree() == 1
+    ):
+        raise InputError(f"found {quoted(text)}, expected a linear equation in the variables, such as x1 - x2 = 1")
+    return function
+
+
+def curves_on(
+    file: SystemFile, eps: fmpq | None, hyperplane: PointFunction, axes: Sequence[PointFunction]
+) -> list[PointFunction]:
+    """Return those integrals of a file that are, on a hyperplane, functions of the two variables that are the axes."""
+    plane = [axis.variable for axis in axes if axis.variable is not None]
+    if len(plane) != 2:
+        return []
+    restricted = (restricted_to(requested_axis(file, eps, name), hyperplane, plane) for name in file.integrals)
+    return [function for function in restricted if function is not None]
 
 
 def section_of(
@@ -107,8 +125,8 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
 
     >>> t = 0.3 * np.arange(12)
     >>> circle = np.stack([np.cos(t), np.sin(t)], axis=1)
-    >>> crossings_of(circle, circle[:, 0], "down")[0].round(6).tolist()
-    [[0.0, 1.0]]
+    >>> crossings_of(circle, circle[:, 0], "down")[0][:, 1].round(4).tolist()
+    [1.0]
     """
     signs = np.sign(values)
     up, down = (signs[:-1] < 0) & (signs[1:] >= 0), (signs[:-1] > 0) & (signs[1:] <= 0)

@@ -13,8 +13,10 @@ from planar_helpers import mean_turn
 import kahanmaps as km
 from kahanmaps import InputError
 from kahanmaps.algebra.elliptic_curves import EllipticCurve, canonical_height
+from kahanmaps.algebra.parsing import parse_rational_function
 from kahanmaps.errors import UnknownCurve
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
+from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
 from kahanmaps.maps.orbits.relations.orbit_curve import _on_singular_cubic, orbit_curve
 
 START, SPATIAL = ["1/3", "2/5"], ["1/3", "2/5", "3/7"]
@@ -160,6 +162,47 @@ def test_coefficients_that_are_too_long_are_undecided_with_a_hint(monkeypatch):
         km.geometry("euler_top", SPATIAL, "1/1000003")
 
 
-def test_a_finite_orbit_determines_no_curve():
-    with pytest.raises(InputError, match="the orbit has period 5"):
-        km.geometry(km.load("lyness").subs(a=1), ["1/3", "2/5"])
+PLANAR = ["mcmillan", "lyness", "qrt_symmetric", "weierstrass", "discrete_painleve_1", "somos_4", "somos_5"]
+
+
+@pytest.mark.parametrize("name", [*PLANAR, "zander_111", "planar_cubic_hamiltonian"])
+def test_the_level_curve_of_an_integral_is_the_curve_of_the_orbit(name):
+    """Two ways to the same curve: by the sequences of the orbit, and by a projection of the level curve."""
+    file, eps = km.load(name), fmpq(1, 10)
+    map_over = file.at(eps) if file.map.has_eps else file.at()
+    start = [fmpq(1, 3), fmpq(2, 5)]
+    orbit = orbit_curve(map_over, start)
+    (integral,) = file.integrals.values()
+    points = [tuple(start)]
+    for _ in range(5):
+        points.append(map_over.step(points[-1]))
+    found, point, F = level_curve(integral, map_over.eps, points)
+    curve, point = found.short_model(point)
+    assert is_conserved(file.map, map_over.eps, integral)
+    assert (curve.a4, curve.a6, point[0]) == (orbit.curve.a4, orbit.curve.a6, orbit.point[0])
+    degree = max(map(int, F.degrees())) if file.kind == "map" else int(F.total_degree())
+    assert degree == pytest.approx(orbit.height_constant * math.log(2) / float(orbit.height), rel=1e-12)
+
+
+def test_a_function_that_is_not_conserved_is_no_integral():
+    file = km.load("mcmillan")
+    assert is_conserved(file.map, fmpq(1), file.integrals["I"])
+    assert not is_conserved(file.map, fmpq(1), parse_rational_function("x^2*y^2 - x^2 - y^2", ["x", "y", "eps"]))
+
+
+@pytest.mark.parametrize(("parameters", "start", "order"), [({"a": 1}, START, 5), ({}, ["1", "2"], None)])
+def test_periodic_and_special_orbits_have_a_curve(parameters, start, order):
+    """For a = 1 all orbits of Lyness' map have period 5; the sequence U of the orbit of (1, 2) has a zero."""
+    system = km.load("lyness").subs(**parameters)
+    orbit = km.geometry(system, start)
+    assert (orbit.genus, orbit.iterate, orbit.order) == (1, 1, order)
+    if order:
+        assert (order * orbit.rotation - 1).contains(0)
+        assert orbit.height_constant is None
+        with pytest.raises(InputError, match="the orbit has period 5"):
+            orbit_curve(system.at(), [fmpq(1, 3), fmpq(2, 5)])
+
+
+def test_a_finite_orbit_without_an_integral_determines_no_curve():
+    with pytest.raises(InputError, match="the orbit has period 4"):
+        km.geometry("harmonic", [1, 2], 1)

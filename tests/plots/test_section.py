@@ -6,7 +6,7 @@ import pytest
 from kahanmaps import FloatEnsemble, InputError, load
 from kahanmaps.plots.drifts.drift_functions import requested_axis
 from kahanmaps.plots.point_functions import point_function
-from kahanmaps.plots.section import crossings_of, plot_section, require_hyperplane, restricted_to, section_of
+from kahanmaps.plots.section import crossings_of, hyperplane_of, plot_section, restricted_to, section_of
 
 TOP = load("euler_top")
 NAMES = ["x1", "x2", "x3"]
@@ -78,11 +78,12 @@ def test_the_level_curves_lead_through_the_crossings():
         plot_section(section("1/20", 3), axes)
 
 
-@pytest.mark.parametrize("text", ["x1^2", "1/x1", "3", "x1*x2", "eps*x1"])
+@pytest.mark.parametrize("text", ["x1^2", "1/x1 = 2", "3", "x1*x2=1", "eps*x1 = 0"])
 def test_a_hyperplane_is_a_linear_equation(text):
-    with pytest.raises(InputError, match="expected a hyperplane"):
-        require_hyperplane(point_function(text, NAMES, TOP.at("1/20").eps), 3)
-    require_hyperplane(point_function("x1 - 2*x2 + 1/3", NAMES), 3)
+    eps = TOP.at("1/20").eps
+    with pytest.raises(InputError, match="expected a linear equation"):
+        hyperplane_of(TOP, eps, text)
+    assert hyperplane_of(TOP, eps, "x1 - 2*x2 = -1/3")(np.array([1.0, 2.0, 5.0])) == pytest.approx(-8 / 3)
 
 
 def test_the_variable_that_is_constant_is_no_axis():

@@ -49,7 +49,7 @@ def command(system: str | None, as_json: bool, quiet: bool, start: Any, **option
     map_over.point(start)
     result: Any
     if isinstance(normal_form, lib.NoNormalForm):
-        result = lib.orbit_curve(map_over, start)
+        result = lib.orbit_curve(map_over, start, file.map, list(file.integrals.values()))
     else:
         result = lib.geometry_of(normal_form, eps, start)
     if as_json:

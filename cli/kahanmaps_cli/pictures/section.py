@@ -61,9 +61,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         raise lib.InputError(f"found {counted(file.dim, 'variable')}, expected at least 3: see kahanmaps plot portrait")
     eps = opt.eps_of(file, options)
     file.map.at(lib.rational(1) if eps is None else eps)
-    left, _, right = options["plane"].partition("=")
-    hyperplane = lib.requested_axis(file, eps, left if right.strip() in ("", "0") else f"{left} - ({right})")
-    lib.require_hyperplane(hyperplane, file.dim)
+    hyperplane = lib.hyperplane_of(file, eps, options["plane"])
     texts = None if options["axes"] is None else [text.strip() for text in options["axes"].split(",")]
     if texts is not None and (len(texts) != 2 or texts[0] == texts[1]):
         raise lib.InputError(f"found --axes {options['axes'][:60]}, expected two different ones, as A,B")
@@ -83,11 +81,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
         chosen = section.widest_axes(hyperplane)
         axes = [lib.requested_axis(file, eps, file.variables[k]) for k in chosen]
         notes.append(f"axes {', '.join(axis.name for axis in axes)}: the largest spread (--axes chooses)")
-    plane = [axis.variable for axis in axes if axis.variable is not None]
-    curves = []
-    if len(plane) == 2 and not options["no_curves"]:
-        integrals = [lib.requested_axis(file, eps, name) for name in file.integrals]
-        curves = [f for f in (lib.restricted_to(f, hyperplane, plane) for f in integrals) if f is not None]
+    curves = [] if options["no_curves"] else lib.curves_on(file, eps, hyperplane, axes)
     figure = lib.plot_section(
         section,
         axes,

@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 from flint import acb, arb, fmpq
@@ -193,7 +194,8 @@ def geometry(
         normal_form = system_normal_form(system)
         if isinstance(normal_form, SystemNormalForm):
             return geometry_of(normal_form, eps, start)
-    return orbit_curve(family.at(fmpq(1) if eps is None else eps, QQ), start)
+    integrals = import_module("kahanmaps.documents.inline").as_file(system).integrals
+    return orbit_curve(family.at(fmpq(1) if eps is None else eps, QQ), start, family, list(integrals.values()))
 
 
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:

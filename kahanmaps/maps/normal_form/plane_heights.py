@@ -71,7 +71,8 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
     height = _archimedean(Q[0], (b2, b4, b6, b8), resultant)
     with RR(128).working():  # the remaining cancelled factors divide R, and lower the height
         sixth = arb(part).log() / (6 * K.degree)
-        return (height - sixth + arb(0, sixth.upper())) / (2 * m * m)
+        result: arb = (height - sixth + arb(0, sixth.upper())) / (2 * m * m)
+    return result
 
 
 def _reduced(b: tuple[Any, ...]) -> tuple[tuple[Any, ...], Any]:
@@ -143,7 +144,8 @@ def _archimedean(x: Any, b: Any, resultant: Any) -> arb:
                     scale /= 4 if k < _TERMS else 1
                 total += arb(0, (scale * bound).upper())
             if total.is_finite() and float(total.rad()) < _ACCURACY:
-                return total / K.degree
+                result: arb = total / K.degree
+                return result
     raise PrecisionLost(f"the height needs more than {MAX_BITS} bits: the level is almost singular")
 
 

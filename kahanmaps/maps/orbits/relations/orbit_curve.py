@@ -29,15 +29,20 @@ from kahanmaps.algebra.elliptic_curves import (
 )
 from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.algebra.matrices import nullspace, rank
+from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve
-from kahanmaps.maps.implicit import Map
+from kahanmaps.maps.implicit import Map, MapFamily
 from kahanmaps.maps.orbits.integer_point import IntegerPoint
 from kahanmaps.maps.orbits.relations.elliptic_orbit import TooLongRelation, elliptic_steps
 from kahanmaps.maps.orbits.relations.elliptic_steps import EllipticSteps
+from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
 
 _BITS = 100_000  # of coefficients that are searched for, and of points on rational curves
+_LATER, _APART = 16, 8  # steps after which the search starts again, up to the first number, as long as
+_SHORT = 2000  # ... points have at most this number of bits
+_LEVEL_POINTS = 8  # of an orbit, from which the translation of a level curve is computed
 _PERIODS = 24  # up to this period an orbit is recognized as periodic: twice the largest order of a torsion point
 _ACCURACY = 1e-15  # of rotation numbers
 
@@ -114,10 +119,18 @@ class OrbitCurve(PrintableResult):
         }
 
 
-def orbit_curve(map_over: Map, start: Sequence[Any]) -> OrbitCurve:
+def orbit_curve(
+    map_over: Map, start: Sequence[Any], family: MapFamily | None = None, integrals: Sequence[RationalFunction] = ()
+) -> OrbitCurve:
     """Return the geometry of the orbit of a point under a map over Q, if it lies on curves of genus 1 or 0.
 
-    Raises UnknownCurve if no curve was found, InputError if the orbit is finite.
+    Args:
+        map_over: the map.
+        start: the initial point, exact.
+        family, integrals: the map for every eps, and its claimed integrals. In the plane their level curves are used
+            for orbits that are periodic or special, after a proof that they are integrals.
+
+    Raises UnknownCurve if no curve was found, InputError if it is not, and the orbit is finite.
 
     >>> from kahanmaps.documents.inline import as_file
     >>> curve = orbit_curve(as_file("mcmillan").map.at(fmpq(1), QQ), [fmpq(1, 3), fmpq(2, 5)])
@@ -125,22 +138,47 @@ def orbit_curve(map_over: Map, start: Sequence[Any]) -> OrbitCurve:
     (1, -7323, 229622, '0.15215519')
     """
     point = IntegerPoint.from_rationals(map_over.point(start))
-    try:
-        steps = elliptic_steps(map_over, point, _BITS, most_primes=_BITS)
-    except TooLongRelation:
-        raise UnknownCurve(
-            f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_BITS} "
-            "bits: choose an initial point, eps or parameters with fewer digits"
-        ) from None
-    if steps is not None:
-        return _on_elliptic_curve(map_over, steps)
-    result = _on_rational_curve(map_over, point)
+    # An initial point in special position leads to zeros among the first terms of the sequences.
+    curve, later = None, point
+    for skipped in range(_LATER + 1):
+        if skipped % _APART == 0:
+            found = _found_steps(map_over, later)
+            if found is not None:
+                curve = _on_elliptic_curve(map_over, found)
+                if curve.iterate == 1:
+                    return curve
+        image = map_over.integer_step(later)
+        if image is None or image.exceeding(_SHORT):
+            break
+        later = image
+    orbit = _first_points(map_over, point)
+    if map_over.dim == 2 and family is not None:
+        level = _on_level_curve(map_over, [entry.rationals() for entry in orbit if entry], family, integrals)
+        if level is not None:
+            return level
+    if curve is not None:
+        return curve
+    if orbit[-1] == point and len(orbit) > 1:
+        raise InputError(
+            f"the orbit has period {len(orbit) - 1}, and its points determine no curve: choose another initial point"
+        )
+    result = _on_rational_curve(map_over, orbit)
     if result is None:
         raise UnknownCurve(
             "undecided: no curve of genus 0 or 1 was found that contains the orbit; the search covers curves on which "
             "the coordinates have degree at most 8"
         )
     return result
+
+
+def _found_steps(map_over: Map, start: IntegerPoint) -> EllipticSteps | None:
+    try:
+        return elliptic_steps(map_over, start, _BITS, most_primes=_BITS)
+    except TooLongRelation:
+        raise UnknownCurve(
+            f"undecided: the orbit seems to lie on an elliptic curve, but its coefficients have more than {_BITS} "
+            "bits: choose an initial point, eps or parameters with fewer digits"
+        ) from None
 
 
 def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
@@ -195,29 +233,57 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
     return _rational(iterate, 2 * (y * y + m_squared * w * w) / (y * y - m_squared * w * w))
 
 
-def _on_rational_curve(map_over: Map, start: IntegerPoint) -> OrbitCurve | None:
+def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
+    """Return enough points to recognize a period, which ends them, or a rational curve; None after a too long one."""
+    dim = map_over.dim
+    top = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
+    points: list[IntegerPoint | None] = [start]
+    while len(points) < max(_PERIODS, top * dim + dim + 2, (dim + 1) ** 2) + dim:
+        image = map_over.integer_step(points[-1])  # type: ignore[arg-type]
+        if image is None or image.exceeding(_BITS):  # on a rational curve the length grows linearly
+            return [*points, None]
+        points.append(image)
+        if image == start:
+            break
+    return points
+
+
+def _on_level_curve(
+    map_over: Map, points: Sequence[tuple[fmpq, ...]], family: MapFamily, integrals: Sequence[RationalFunction]
+) -> OrbitCurve | None:
+    """Return the geometry of an orbit in the plane on the level curve of an integral; None if it is of another genus.
+
+    An automorphism over Q of a curve of genus 1 is a translation unless its square is the identity.
+    """
+    if len(points) < 3 or points[2] == points[0]:
+        return None
+    for integral in integrals:
+        found = level_curve(integral, map_over.eps, points[:_LEVEL_POINTS])
+        if found is not None and is_conserved(family, map_over.eps, integral):
+            (curve, point), F = found[0].short_model(found[1]), found[2]
+            # The degree of the coordinates one by one, or with a common denominator, as in the search.
+            is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
+            degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
+            order, (rotation, steps) = curve.order(point), _rotation(curve, point)
+            height = canonical_height(curve, point) if order is None else arb(0)
+            constant = degree * float(height.mid()) / math.log(2)
+            return OrbitCurve(
+                1, 1, curve, point, order, height, rotation, steps, height_constant=constant if order is None else None
+            )
+    return None
+
+
+def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> OrbitCurve | None:
     """Return the multiplier of an orbit on a rational normal curve: one of degree d in a space of dimension d.
 
     Hyperplanes through d - 1 points of the orbit give a coordinate z of the curve, on which the map acts by a matrix.
     The coordinates are forms of degree d in (z : 1); substituted into the equation of the map they give a form of known
     degree, which vanishes if it does at more points.
     """
-    factors, dim = map_over.factors, map_over.dim
-    if len(factors) > 1:  # the points between the factors lie on other curves
+    if len(map_over.factors) > 1 or None in points:  # the points between the factors lie on other curves
         return None
-    top = max(sum(exponent) for exponent in factors[0].equation.exponents)
-    points: list[IntegerPoint] = [start]
-    while len(points) < max(_PERIODS, top * dim + dim + 2, (dim + 1) ** 2) + dim:
-        image = map_over.integer_step(points[-1])
-        if image is None or image.exceeding(_BITS):  # on a rational curve the length grows linearly
-            return None
-        if image == start:
-            period = len(points)
-            raise InputError(
-                f"the orbit has period {period}, and its points determine no curve: choose another initial point"
-            )
-        points.append(image)
-    rows = [[*(fmpq(x) for x in point.numerators), fmpq(point.denominator)] for point in points]
+    dim, top = map_over.dim, max(sum(exponent) for exponent in map_over.factors[0].equation.exponents)
+    rows = [[*(fmpq(x) for x in p.numerators), fmpq(p.denominator)] for p in points if p is not None]
     size = dim + 3
     full = fmpq_mat(size, dim + 1, [x for row in rows[:size] for x in row])
     degree = rank(QQ, full) - 1
