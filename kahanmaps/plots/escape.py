@@ -114,7 +114,8 @@ def plot_escape(result: Escape, style: Style | None = None, *, show: str = "time
             legend_above(figure, handles, labels, style, f"direction in which |x| > {result.radius:g}")
         else:
             image = np.where(result.times >= 0, np.maximum(result.times, 1.0), np.nan)
-            norm = LogNorm(np.nanmin(image, initial=2), np.nanmax(image, initial=3))
+            least = float(np.nanmin(image, initial=result.steps))
+            norm = LogNorm(least, np.nanmax(image, initial=least + 1))
             drawn = axes.imshow(image, cmap=COLOR_MAP, norm=norm, **place)
             figure.colorbar(drawn, ax=axes, label=f"steps until |x| > {result.radius:g}")
         axes.set_xlabel(label_of(result.variables[result.axes[0]]))

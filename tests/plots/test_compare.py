@@ -166,6 +166,26 @@ def test_both_kernels_give_the_same_numbers(name):
     assert results[0].rows() == results[1].rows()
 
 
+def test_points_and_functions_may_be_text_and_others_are_refused():
+    how = {"eps": EPS, "steps": 3, "methods": ["kahan"], "orders": False}
+    first, *others = (
+        compare(CIRCLE, start, integrals=functions, **how)
+        for start, functions in (
+            ("1/2,1/3", "x^2"),
+            ({"y": "1/3", "x": "1/2"}, ["x^2"]),
+            (["1/2", "1/3"], [("", "x^2")]),
+        )
+    )
+    assert [result.to_json() for result in others] == [first.to_json()] * 2
+    for start, message in (
+        (1, "found the initial point 1"),
+        ([float("nan"), 0], "found the floating-point number nan"),
+        ([[1, 0], [1]], "found a start with 1 coordinate, expected 2"),
+    ):
+        refuses(message, compare, CIRCLE, start, **how)
+    refuses("found no method, expected some of", compare, CIRCLE, [1, 0], **{**how, "methods": []})
+
+
 def test_several_initial_points_give_the_largest_drift_of_them():
     starts = [[1, "1/2", "1/3"], [1, "1/2", "1/2"]]
     alone = [compare("euler_top", start, EPS, 100, methods=["rk4"], orders=False) for start in starts]

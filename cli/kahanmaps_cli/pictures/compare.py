@@ -55,8 +55,7 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         more["integrals"] = ()  # none, so that none are searched for
     result = requested_comparison(options, progress, **more)
     figure = lib.plot_comparison(result, options["style"], show=options["show"], scale=options["scale"])
-    start = ",".join(lib.format_number(entry) for entry in result.starts[0])
-    start = start if len(start) <= _MAX_START else start[:_MAX_START] + "..."
+    start = ",".join(map(lib.format_number, result.starts[0]))[:_MAX_START]
     others = f" and {len(result.starts) - 1} more" if len(result.starts) > 1 else ""
     messages = [f"start {start}{others}{lib.eps_suffix(result.eps)}", *result.remarks(), *early_messages(result)]
     for curve in result.curves:

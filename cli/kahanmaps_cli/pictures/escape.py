@@ -39,15 +39,12 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     Exit status: 0 done, 2 usage error.
     """
     file = opt.load_system(options["system"], options)
-    real = file.real_approximation
     eps = opt.eps_of(file, options)
-    axes = two_variables("--axes", options["axes"], file.variables) or (0, 1)
-    window = window_from(options, 2) or ((-2.0, 2.0), (-2.0, 2.0))
     found = lib.survey_escape(
-        real.map,
+        file.real_approximation.map,
         lib.rational(1) if eps is None else eps,
-        window,
-        axes,
+        window_from(options, 2) or ((-2.0, 2.0), (-2.0, 2.0)),
+        two_variables("--axes", options["axes"], file.variables) or (0, 1),
         options["at"],
         cells=options["cells"],
         steps=options["steps"],

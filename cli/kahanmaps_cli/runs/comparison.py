@@ -62,9 +62,5 @@ def requested_comparison(options: dict[str, Any], progress: Callable[[str], None
 
 def early_messages(result: lib.Comparison) -> list[str]:
     """Return a sentence for each method with orbits that ended early."""
-    sentences = []
-    for run in result.runs:
-        if run.early:
-            number = "" if len(run.ends) == 1 else f" in {lib.counted(len(run.early), 'orbit')} of {len(run.ends)}"
-            sentences.append(f"{lib.METHODS[run.method].title} ended early{number}: {run.early[0].message}")
-    return sentences
+    early = [(lib.METHODS[run.method].title, run.early, len(run.ends)) for run in result.runs if run.early]
+    return [f"{title} ended early in {len(ends)} of {n} orbits: {ends[0].message}" for title, ends, n in early]

@@ -25,7 +25,7 @@ from kahanmaps.algebra.fields import QQ, integer
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import degree, evaluate, gradient, is_homogeneous, monomials, primitive_part, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
-from kahanmaps.display_protocols import PrintableResult
+from kahanmaps.display_protocols import ResultPart
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
@@ -70,7 +70,7 @@ class SurvivingIntegral:
 
 
 @dataclass(frozen=True, eq=False)
-class ModifiedField(PrintableResult):
+class ModifiedField(ResultPart):
     """The result of `modified`: series in eps up to `order`, exact.
 
     `fields[k]` is the coefficient of eps^k of the modified vector field, 0 for odd k. `hamiltonian[k]` is that of the
@@ -107,9 +107,14 @@ class ModifiedField(PrintableResult):
         nothing = [] if self.integrals else ["no polynomial integral of the flow is known, or found by a search"]
         return lines + nothing
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
+        """The title and the lines."""
         title = f"# {self.file.name}: the Kahan map is the flow of f + eps^2 f_2 + eps^4 f_4 + ... at time 2 eps"
         return "\n".join([title, *self.lines()])
+
+    def __str__(self) -> str:
+        return self.text
 
 
 def _short(polynomial: fmpq_mpoly) -> str:
@@ -142,14 +147,10 @@ def modified(system: SystemLike, order: int = 4, *, progress: Callable[[str], No
     file = as_file(system)
     if file.map.root is not None:
         raise InputError(f"found the algebraic number {file.map.root}, expected a system over the rational numbers")
-    quadratic, hamiltonian = file.system, file.hamiltonian
-    fields = modified_fields(quadratic, order, progress)
-    series = () if hamiltonian is None else modified_hamiltonian(hamiltonian, order)
-    survivors = []
-    for integral in _integrals_of_flow(file, progress):
-        progress(f"corrections of {_short(integral)}")
-        survivors.append(_continued(integral, fields, order))
-    return ModifiedField(file, order, fields, series, tuple(survivors))
+    fields = modified_fields(file.system, order, progress)
+    series = () if file.hamiltonian is None else modified_hamiltonian(file.hamiltonian, order)
+    integrals = tuple(_continued(integral, fields, order) for integral in _integrals_of_flow(file, progress))
+    return ModifiedField(file, order, fields, series, integrals)
 
 
 def modified_fields(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import log2, sqrt
+from math import isfinite, log2, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.parsing import parse_point
 from kahanmaps.algebra.printing import all_fields, attributes, csv_line, format_number, json_float
 from kahanmaps.atomic_files import write_atomically
-from kahanmaps.display_protocols import PrintableResult, data_frame
+from kahanmaps.display_protocols import ResultPart, data_frame
 from kahanmaps.documents.files import SystemFile, float_normal_form
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
@@ -31,6 +32,7 @@ from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, exact, to_floats
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.iteration import OrbitEnd
+from kahanmaps.maps.values import point_by_names
 from kahanmaps.plots.comparison.functions import WatchedFunction, requested_functions, watched_functions
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.systems.taylor import solution
@@ -115,7 +117,7 @@ class MethodRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(PrintableResult):
+class Comparison(ResultPart):
     """The result of `compare`.
 
     `relative` is true for functions whose errors are relative to I(x_0) (for all initial points); they are absolute
@@ -141,10 +143,6 @@ class Comparison(PrintableResult):
         """Return the drift of a function along the orbits of a method."""
         return next(curve for curve in self.curves if (curve.method, curve.function) == (method, function))
 
-    def error_at(self, run: MethodRun) -> float | None:
-        """Return the error with the step size of the comparison."""
-        return next((entry.error for entry in run.errors if entry.eps == self.eps), None)
-
     def rows(self) -> list[dict[str, Any]]:
         """Return all measured curves as rows of one table, whose kind is drift or error."""
         rows: list[tuple[Any, ...]] = []
@@ -156,6 +154,10 @@ class Comparison(PrintableResult):
                 rows.append(("error", run.method, None, format_number(at.eps), at.steps, at.error, at.evaluations))
         return [dict(zip(_COLUMNS, row, strict=True)) for row in rows]
 
+    def to_pandas(self) -> Any:
+        """Return `rows()` as a DataFrame. Raises InputError if pandas is not installed."""
+        return data_frame(self.rows())
+
     def write(self, path: str | Path) -> None:
         """Write `rows` to a file, whose suffix is .csv or .parquet (which needs pandas and pyarrow)."""
         rows, suffix = self.rows(), Path(path).suffix
@@ -165,7 +167,7 @@ class Comparison(PrintableResult):
             lines = [["" if x is None else str(x) for x in row.values()] for row in rows]
             write_atomically(path, "".join(map(csv_line, [_COLUMNS, *lines])).encode())
         else:
-            write_atomically(path, data_frame(rows).to_parquet(index=False))
+            write_atomically(path, self.to_pandas().to_parquet(index=False))
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data, without the curves of the drift, which `rows` has."""
@@ -201,7 +203,7 @@ class Comparison(PrintableResult):
         rows = [head + ["seconds"] * timed]
         for run in self.runs:
             steps = max(1, sum(end.steps for end in run.ends))
-            error = self.error_at(run)
+            error = next((entry.error for entry in run.errors if entry.eps == self.eps), None)
             cells = [METHODS[run.method].title, str(METHODS[run.method].order)]
             cells += ["-" if run.order is None else f"{run.order:.2f}", "-" if error is None else f"{error:.2g}"]
             cells += [f"{run.evaluations / steps:.4g}", f"{run.systems / steps:.4g}"]
@@ -250,7 +252,7 @@ def compare(
     h: Any = None,
     n: int | None = None,
     methods: Sequence[str] | None = None,
-    integrals: Sequence[tuple[str, str]] | None = None,
+    integrals: str | Sequence[str | tuple[str, str]] | None = None,
     linear_bins: bool = False,
     orders: bool = True,
     seed: int = 0,
@@ -267,7 +269,7 @@ def compare(
         time_step, h: the time step 2 eps, instead of eps.
         steps, n: the number of steps over which the drift is measured, by default 10,000.
         methods: names in `METHODS`, by default kahan, midpoint, rk4, gauss4, suzuki4 and yoshida6.
-        integrals: pairs (name, text) of functions; by default the known integrals, or those that a quick search finds.
+        integrals: functions, texts or pairs (name, text); by default known integrals, or those of a quick search.
         linear_bins: bins of equal length for the drift; by default they grow with the step.
         orders: measure errors and orders, which needs the solution as reference.
         seed: the random seed of the initial point.
@@ -311,7 +313,9 @@ def compare(
                 "no drift: no integral of the map is known, and a quick search found none (--integral gives one)"
             )
     else:
-        functions = requested_functions(file, value, integrals)
+        integrals = [integrals] if isinstance(integrals, str) else integrals
+        requests = [("", one) if isinstance(one, str) else one for one in integrals]
+        functions = requested_functions(file, value, requests)
         origins = {function.name: "requested" for function in functions}
     if len(functions) > MAX_FUNCTIONS:
         notes.append(f"shown: {MAX_FUNCTIONS} of {len(functions)} functions")
@@ -377,16 +381,19 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
     """Return the initial points as exact numbers."""
     if given is None:
         return (small_start(system, eps, seed),)
+    given = parse_point(given) if isinstance(given, str) else given
+    if isinstance(given, Mapping):
+        given = point_by_names(given, system.variables)
+    if not hasattr(given, "__len__"):
+        raise InputError(f"found the initial point {given!r}, expected a sequence of numbers, or several")
     rows = given.tolist() if isinstance(given, np.ndarray) else given
     rows = rows if len(rows) and isinstance(rows[0], list | tuple | np.ndarray) else [rows]
-    starts = tuple(tuple(exact(float(x)) if isinstance(x, float) else rational(x) for x in row) for row in rows)
-    for start in starts:
-        if len(start) != system.dim:
-            raise InputError(
-                f"found a start with {counted(len(start), 'coordinate')}, expected {system.dim}: "
-                f"{', '.join(system.variables)}"
-            )
-    return starts
+    starts = []
+    for row in rows:
+        starts.append(tuple(exact(float(x)) if isinstance(x, float) and isfinite(x) else rational(x) for x in row))
+        if len(row) != system.dim:
+            raise InputError(f"found a start with {counted(len(row), 'coordinate')}, expected {system.dim}")
+    return tuple(starts)
 
 
 def _methods(
@@ -406,7 +413,8 @@ def _methods(
     if isinstance(found, NoNormalForm) and "normal-form" in names:
         skipped["normal-form"] = found.reason
     if len(skipped) == len(names):
-        raise InputError("; ".join(f"the method {name} is not available: {why}" for name, why in skipped.items()))
+        problems = [f"the method {name} is not available: {why}" for name, why in skipped.items()]
+        raise InputError("; ".join(problems) or f"found no method, expected some of {', '.join(METHODS)}")
     points = np.array([to_floats(start) for start in starts])
 
     def ensemble_of(name: str, at: fmpq, count: int, steps: int) -> FloatEnsemble:

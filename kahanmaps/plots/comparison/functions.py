@@ -120,9 +120,8 @@ def watched_functions(
     for function in found:
         functions.append(function)
         name = function.name
-        origins[name] = "declared" if name in declared else "flow" if name == "H" else "theorem"
-        if not (declared or hamiltonian):
-            origins[name] = "found"
+        of_theorem = "theorem" if hamiltonian else "found"
+        origins[name] = "declared" if name in declared else "flow" if name == "H" else of_theorem
         if isinstance(function, PointFunction) and name != "H":
             leading = normalized(function.function, file.dim).leading
             if leading is not None and leading != function.function and leading not in of_flow:
