@@ -248,6 +248,7 @@ km.compare("euler_top", x0=[1, 0.5, 0.25], h=0.1, n=100, methods=["kahan", "rk4"
 km.modified("weierstrass", 2)
 km.plot.rotation("nahm_tetrahedral", ["1/10", "1/5"], [2, 3], eps="1/10", points=5)
 km.plot.section("euler_top", "x1=0", x0=[-0.1, 1, 1], eps="1/10", n=500)
+km.plot.escape("henon_heiles", eps="1/20", window=[[-1, 1], [-1, 1]], n=20, cells=4, show="basin")
 km.plot.commute("paper_m2", x0=["1/2", "-1/3", 0, 1], eps="1/50")
 km.plot.invariant_curves("paper_m2", x0=["1/2", "-1/3", 0, 1], eps="1/10", n=50)
 km.load("lotka_volterra").plot(eps=0.05, n=20)

@@ -362,7 +362,7 @@ def test_methods_and_plots_name_their_arguments():
             lambda: km.System(FISH).plot(eps="1/10", figsize=3),
             "km.portrait has no argument figsize=.*axes are returned",
         ),
-        (lambda: km.plot.drift("euler_top", dt=1), "h= is the time step"),
+        (lambda: km.plot.portrait("euler_top", dt=1), "h= is the time step"),
         (lambda: km.certificate(FISH), 'checker= is "sympy", "gp" or "rocq"'),
         (lambda: km.fixed_points(FISH, eps=1), "leave it out"),
         (lambda: km.check_integrals(FISH, integral="q"), "extra= is the claim"),

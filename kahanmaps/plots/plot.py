@@ -129,16 +129,50 @@ class Plot(AttributeHints):
             axes: two variables or expressions; by default those along which the crossings spread most.
             direction: "up" for crossings to larger values, "down" or "both".
         """
-        from kahanmaps.plots.drifts.drift_functions import requested_axis
+        from kahanmaps.plots.comparison.functions import requested_axis
         from kahanmaps.plots.section import curves_on, hyperplane_of, plot_section, section_of
 
         file = as_file(system)
         value = file.real_approximation.at(resolve_eps(eps, None, floats=True)).eps
         hyperplane = hyperplane_of(file, value, plane)
-        found = section_of(ensemble_for(file.map, value, start_rows(x0), n), hyperplane, n, direction=direction)
+        found = section_of(
+            ensemble_for(file.map, value, start_rows(x0, file.variables), n), hyperplane, n, direction=direction
+        )
         names = axes or [file.variables[k] for k in found.widest_axes(hyperplane)]
         functions = [requested_axis(file, value, name) for name in names]
         return _axes(plot_section(found, functions, curves=curves_on(file, value, hyperplane, functions)))
+
+    def escape(
+        self,
+        system: SystemLike,
+        *,
+        eps: Any = None,
+        window: Sequence[Sequence[float]] = ((-2, 2), (-2, 2)),
+        n: int = 200,
+        show: str = "time",
+        cells: int = 300,
+        radius: float = 1000,
+    ) -> Axes:
+        """Plot when, or in which direction, float orbits leave a ball, as `plot escape` draws it.
+
+        Args:
+            system: a map, or a system, which stands for its Kahan map.
+            eps: an exact number, half the time step where there is one.
+            window: the intervals of the first two coordinates of the initial points; the others are 0.
+            n: the number of steps.
+            show: "time", or "basin" for the direction.
+            cells: the number of initial points along each axis.
+            radius: outside of the ball, some coordinate is larger than this.
+        """
+        from kahanmaps.plots.escape import plot_escape, survey_escape
+
+        file = as_file(system).real_approximation
+        value = file.at(resolve_eps(eps, None, floats=True)).eps
+        (a, b), (c, d) = window
+        survey = survey_escape(
+            file.map, value, ((a, b), (c, d)), (0, 1), None, cells=cells, steps=n, radius=float(radius)
+        )
+        return _axes(plot_escape(survey, show=show))
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
         """The points of what `km.orbit` returned, in two of its coordinates."""
@@ -153,7 +187,18 @@ class Plot(AttributeHints):
         return public_function(plot_orbits, "portrait")(given, *others, **options)  # type: ignore[no-any-return]
 
 
-for _name in ("degrees", "heights", "scan", "compare", "commute", "invariant_curves", "rotation", "orbit"):
+for _name in (
+    "degrees",
+    "heights",
+    "scan",
+    "compare",
+    "commute",
+    "invariant_curves",
+    "rotation",
+    "section",
+    "escape",
+    "orbit",
+):
     setattr(Plot, _name, public_function(getattr(Plot, _name), f"plot.{_name}"))
 
 

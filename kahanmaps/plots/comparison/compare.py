@@ -32,7 +32,7 @@ from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, exact, to_floats
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.iteration import OrbitEnd
-from kahanmaps.maps.values import point_by_names
+from kahanmaps.maps.values import as_point
 from kahanmaps.plots.comparison.functions import WatchedFunction, requested_functions, watched_functions
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.systems.taylor import solution
@@ -383,7 +383,7 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
         return (small_start(system, eps, seed),)
     given = parse_point(given) if isinstance(given, str) else given
     if isinstance(given, Mapping):
-        given = point_by_names(given, system.variables)
+        given = as_point(given, system.variables)
     if not hasattr(given, "__len__"):
         raise InputError(f"found the initial point {given!r}, expected a sequence of numbers, or several")
     rows = given.tolist() if isinstance(given, np.ndarray) else given
