@@ -390,13 +390,14 @@ class _Script:
         says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
         if claim.fraction is None:
             self.fraction(claim)
+            self.check("P is not 0", "P != 0")
             self.derivative(label)
             identity = "put(P, old, new)*Q*det(M) == P*put(Q, old, new)*det(L)"
             self.check(f"{says} for any x and x~", identity)
             return
         k, shared = claim.fraction.degree, claim.balance[0].powers[0]
         left, right = self.products(claim.fraction, label, "PQ", [k + self.data.dim + 1 - shared, k - shared])
-        self.check("Q is not 0", "Q != 0")
+        self.check("P and Q are not 0", "P != 0 && Q != 0")
         self.derivative(label)
         self.check("D = det M", "D == det(M)")
         self.check(f"{says} at x~ = N/D", f"{left} == {right}*det(images(L, 1, new))")
