@@ -584,7 +584,10 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     groups: dict[tuple[int, ...], list[Claim]] = {}  # by map: its equation and Cramer's rule are stated once
     for k, claim in enumerate(claims, 1):
         if type(claim) not in _PROOFS:
-            raise InputError(f"{claim.name} is certified for gp and sympy only, not for rocq: ask for --for gp")
+            raise InputError(
+                f"{claim.name} is certified for gp and sympy only, as the standard library of Coq has no degrees of "
+                "rational maps: ask for --for gp"
+            )
         own = k if isinstance(claim, Chain) else 0
         groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), own), []).append(claim)
     theorems = list[str]()
