@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import gcd, prod
 
-from flint import fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.certificates.identities import (
@@ -29,7 +29,6 @@ from kahanmaps.certificates.identities import (
 from kahanmaps.errors import InputError
 
 _MAX_FACTORED_TERMS = 3000  # of a cofactor: longer ones are left as they are
-_MAX_SPARE = 3  # further powers of D
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ class DarbouxProduct:
     @property
     def is_single(self) -> bool:
         """Whether it is written as one polynomial."""
-        return self.content == 1 and [factor.exponent for factor in self.factors] == [1]
+        return self.content.is_one() and [factor.exponent for factor in self.factors] == [1]
 
     @property
     def degree(self) -> int:
@@ -145,14 +144,18 @@ class DarbouxPolynomial(Claim):
 class InvariantVolume(Claim):
     """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L.
 
-    `is_free`: the identity holds for any two points, also if x~ is not the image of x, as for Hamiltonian systems.
+    `fraction` are P and Q as products of Darboux polynomials, or None where the identity holds for any two points, also
+    if x~ is not the image of x, as for Hamiltonian systems.
     """
 
     numerator: fmpq_mpoly
     denominator: fmpq_mpoly
-    degree: int
-    is_free: bool
-    fraction: DarbouxProducts | None = None  # if P and Q are Darboux polynomials
+    fraction: DarbouxProducts | None
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the identity holds for any two points."""
+        return self.fraction is None
 
     @property
     def balance(self) -> tuple[Monomial, Monomial, Monomial]:
@@ -208,26 +211,22 @@ def invariant_volume(data: MapData, name: str, function: RationalFunction) -> In
         InputError: if the identity has too many terms.
     """
     P, Q = coprime(function, data.names)
-    n, k = data.dim, max(degree_in(P, data.dim), degree_in(Q, data.dim))
     if not P:
         raise InputError("found the density 0, expected another function: no certificate is written")
     at_old, at_new = data.at_points(P, Q, data.determinant)
     if times(times(at_new[0], at_old[1]), at_old[2]) == times(
         times(at_old[0], at_new[1]), determinant(data.derivative)
     ):
-        return InvariantVolume(name, data, P, Q, k, True)
+        return InvariantVolume(name, data, P, Q, None)
     volume = determinant(derivative_at_image(data))
-    fraction = darboux_products(data, [P, Q])
+    fraction = darboux_products(data, [P, Q])  # P and Q are Darboux polynomials if dx/phi is invariant
     if fraction is not None:
-        claim = InvariantVolume(name, data, P, Q, fraction.degree, False, fraction)
+        claim = InvariantVolume(name, data, P, Q, fraction)
         letters = (data.determinant, *fraction.letters)
         _, left, right = claim.balance
         if left.at(letters) == times(right.at(letters), volume):
             return claim
-    values = [homogeneous_value(F, k, data) for F in (P, Q)]
-    if times(times(values[0], Q), data.determinant ** (n + 1)) != times(times(values[1], P), volume):
-        raise FalseClaim("dx/phi is not invariant: no certificate can be written")
-    return InvariantVolume(name, data, P, Q, k, False)
+    raise FalseClaim("dx/phi is not invariant: no certificate can be written")
 
 
 def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: bool = True) -> DarbouxProducts | None:
@@ -238,11 +237,11 @@ def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: b
         polynomials: polynomials over Z, not 0, in the names of the map.
         splits: whether factors of the polynomials are looked at one by one, where these are Darboux polynomials too.
     """
-    known = list[fmpq_mpoly]()
+    known, k = list[fmpq_mpoly](), max(degree_in(P, data.dim) for P in polynomials)
     pieces = []
     for P in polynomials:
-        factors = _with_cofactors(data, _factored(P, data.dim)) if splits else None
-        factors = factors or _with_cofactors(data, (P**0, [(P, 1)]))
+        factors = _with_cofactors(data, _factored(P, data.dim), k) if splits else None
+        factors = factors or _with_cofactors(data, (P**0, [(P, 1)]), k)
         if factors is None:
             return None
         content, parts = factors
@@ -270,22 +269,26 @@ def _factored(P: fmpq_mpoly, dim: int) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpol
 
 
 def _with_cofactors(
-    data: MapData, factored: tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]]
+    data: MapData, factored: tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]], most: int
 ) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int, int, fmpq_mpoly]]] | None:
-    """The factors with k, their exponents and cofactors, or None if one of them has none."""
+    """The factors with k, their exponents and cofactors, or None if one of them has none.
+
+    A factor f that has a factor of D may divide D^k f(N/D) for a larger k than its degree: up to `most`, that of P and
+    Q, if P/Q is an integral, and n + 1 more if dx/phi is invariant, phi = P/Q.
+    """
     content, factors = factored
     result = []
     for f, e in factors:
         k, D = degree_in(f, data.dim), data.determinant
         value = homogeneous_value(f, k, data)
-        cofactor, spare = quotient(value, f), 0
-        if cofactor is None and degree_in(f.gcd(D), data.dim) > 0:  # f may divide D^(k + 1) f(N/D), with a larger k
-            while cofactor is None and spare < _MAX_SPARE:
-                value, spare = times(value, D), spare + 1
+        cofactor = quotient(value, f)
+        if cofactor is None and degree_in(f.gcd(D), data.dim) > 0:
+            while cofactor is None and k < most + data.dim + 1:
+                value, k = times(value, D), k + 1
                 cofactor = quotient(value, f)
         if not cofactor:  # 0: the image of the map lies in f = 0
             return None
-        result.append((f, k + spare, e, cofactor))
+        result.append((f, k, e, cofactor))
     return content, result
 
 
@@ -295,9 +298,7 @@ def _monomial(C: fmpq_mpoly, D: fmpq_mpoly, known: list[fmpq_mpoly]) -> tuple[in
     if not D.is_constant() and gcd(*(int(c.p) for c in D.coeffs())) == 1:  # so that the quotients are over Z
         while (smaller := quotient(rest, D)) is not None:
             power, rest = power + 1, smaller
-    constant, factors = (
-        rest.factor() if len(rest) <= _MAX_FACTORED_TERMS else (rest.leading_coefficient() ** 0, [(rest, 1)])
-    )
+    constant, factors = rest.factor() if len(rest) <= _MAX_FACTORED_TERMS else (fmpq(1), [(rest, 1)])
     powers = {}
     for f, e in factors:
         if f not in known:

@@ -28,7 +28,6 @@ from kahanmaps.certificates.identities import (
     EquationClaim,
     InvariantTensor,
     MapData,
-    homogeneous_value,
     letters_of,
     restricted,
 )
@@ -362,17 +361,17 @@ class _Script:
                 lines += self.moved(name, factor.polynomial, factor.degree, f"{value} * {name} {old}", *used)
             if is_single:
                 continue
-            content = [] if product.content == 1 and names else [f"({self.text(product.content)})"]
+            content = [] if product.content.is_one() and names else [f"({self.text(product.content)})"]
             factors = list(zip(names, product.factors, strict=True))
             text = " * ".join(content + [f"{name} {old}" + _power(factor.exponent) for name, factor in factors])
             scaled = [f"({name} {new} * det ^ {f.degree})" + _power(f.exponent) for name, f in factors]
-            scaled = " * ".join([*content, *scaled, f"det ^ {k - product.degree}"])
+            scaled = [*content, *scaled, f"det ^ {k - product.degree}"]
             images = "".join(f"?{name}_image, " for name in names)[:-2]
             lines += [
                 f"Definition {label} ({old} : R) : R := {text}.",
                 f"Lemma {label}_image : {label} {new} * det ^ {k} = {letter} * {label} {old}.",
                 "Proof.",
-                f"  transitivity ({scaled}); [unfold {label}; ring |].",
+                f"  transitivity ({' * '.join(scaled)}); [unfold {label}; ring |].",
                 f"  {f'rewrite {images}. ' if images else ''}unfold {label}, {letter}. ring.",
                 "Qed.",
             ]
@@ -524,7 +523,6 @@ class _Script:
     def invariant(self, claim: InvariantVolume, theorem: str) -> list[str]:
         """The theorem that dx/phi is invariant: phi(x~) det M = phi(x) det L."""
         n, old, new = self.data.dim, self.x, self.y
-        power = claim.degree
         lines, flat = self.derivative()
         lines += [
             f"Definition volume : R := {determinant_text(entries('l', n))}.  (* det L *)",
@@ -541,49 +539,33 @@ class _Script:
             "  apply equal_fractions; [assumption | apply Rmult_integral_contrapositive_currified; [assumption |"
             " exact regular] |].",
         ]
-        if claim.is_free:
+        if claim.fraction is None:
             further = f"num den volume {flat}"
             lines += self.functions(old, num=claim.numerator, den=claim.denominator)
             return [*lines, *statement, f"  (* This identity holds for any x and x~. *) {self.expand(further)}", "Qed."]
-        if claim.fraction is not None:
-            lines += self.products(claim.fraction, ("num", "cofactor_num"), ("den", "cofactor_den"))
-        else:
-            for label, polynomial in (("num", claim.numerator), ("den", claim.denominator)):
-                lines += self.functions(old, **{label: polynomial})
-                lines += self.moved(
-                    label, polynomial, power, self.text(homogeneous_value(polynomial, power, self.data))
-                )
+        lines += self.products(claim.fraction, ("num", "cofactor_num"), ("den", "cofactor_den"))
         # det L has degree 1 in each row in x~: det^n det L is the determinant with the rows at (det, det x~).
         scaled = [[f"({_scaled_row(entry, self, n)})" for entry in row] for row in self.data.derivative]
-        last = [f"  rewrite num_image, den_image, volume_scaled, {self.cramer}.", f"  {self.expand('num', 'den')}"]
-        balance = list[str]()
-        if claim.fraction is not None:
-            common, left, right = map(_monomial_text, claim.balance)
-            used = [f"c{j}" for j in range(1, len(claim.fraction.letters) + 1)]
-            balance = [
-                f"Lemma shorter : {left} = {right} * (volume * det ^ {n}).",
-                f"Proof. rewrite volume_scaled, {self.cramer}. {self.expand(*used)} Qed.",
-                f"Lemma balance : cofactor_num * (det * det ^ {n}) = cofactor_den * (volume * det ^ {n}).",
-                "Proof.",
-                f"  transitivity ({common} * ({left})); [unfold cofactor_num; ring |].",
-                "  rewrite shorter. unfold cofactor_den. ring.",
-                "Qed.",
-            ]
-            last = [
-                "  rewrite num_image, den_image.",
-                f"  transitivity (num {old} * den {old} * (cofactor_num * (det * det ^ {n}))); [ring |].",
-                "  rewrite balance. ring.",
-            ]
+        common, left, right = map(_monomial_text, claim.balance)
+        used, k = [f"c{j}" for j in range(1, len(claim.fraction.letters) + 1)], claim.fraction.degree
         return [
             *lines,
             f"Lemma volume_scaled : volume * det ^ {n} = {determinant_text(scaled)}.",
             f"Proof. cbv delta [volume {flat}] beta; ring. Qed.",
-            *balance,
+            f"Lemma shorter : {left} = {right} * (volume * det ^ {n}).",
+            f"Proof. rewrite volume_scaled, {self.cramer}. {self.expand(*used)} Qed.",
+            f"Lemma balance : cofactor_num * (det * det ^ {n}) = cofactor_den * (volume * det ^ {n}).",
+            "Proof.",
+            f"  transitivity ({common} * ({left})); [unfold cofactor_num; ring |].",
+            "  rewrite shorter. unfold cofactor_den. ring.",
+            "Qed.",
             *statement,
-            f"  apply (Rmult_eq_reg_r (det ^ {power + n})); [| apply pow_nonzero; exact regular].",
-            f"  transitivity (num {new} * det ^ {power} * (den {old} * det * det ^ {n})); [ring |].",
-            f"  transitivity (num {old} * (volume * det ^ {n}) * (den {new} * det ^ {power})); [| ring].",
-            *last,
+            f"  apply (Rmult_eq_reg_r (det ^ {k + n})); [| apply pow_nonzero; exact regular].",
+            f"  transitivity (num {new} * det ^ {k} * (den {old} * det * det ^ {n})); [ring |].",
+            f"  transitivity (num {old} * (volume * det ^ {n}) * (den {new} * det ^ {k})); [| ring].",
+            "  rewrite num_image, den_image.",
+            f"  transitivity (num {old} * den {old} * (cofactor_num * (det * det ^ {n}))); [ring |].",
+            "  rewrite balance. ring.",
             "Qed.",
         ]
 
@@ -602,7 +584,10 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     groups: dict[tuple[int, ...], list[Claim]] = {}  # by map: its equation and Cramer's rule are stated once
     for k, claim in enumerate(claims, 1):
         if type(claim) not in _PROOFS:
-            raise InputError(f"{claim.name} is certified for gp and sympy only, not for rocq: ask for --for gp")
+            raise InputError(
+                f"{claim.name} is certified for gp and sympy only, as the standard library of Coq has no degrees of "
+                "rational maps: ask for --for gp"
+            )
         own = k if isinstance(claim, Chain) else 0
         groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), own), []).append(claim)
     theorems = list[str]()
@@ -725,8 +710,8 @@ def _homogeneous_text(
     for powers, coefficients in terms.items():
         spare = degree - sum(powers)
         factors = [*powers_text(letters[image], powers), *([det.format(spare)] if spare else [])]
-        coefficient = polynomial_text(polynomial.context().from_dict(coefficients), letters)
-        pieces.append(" * ".join([f"({coefficient})", *factors]))
+        collected = polynomial_text(polynomial.context().from_dict(coefficients), letters)
+        pieces.append(" * ".join([f"({collected})", *factors]))
     return " + ".join(pieces) or "0"
 
 

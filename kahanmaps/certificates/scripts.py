@@ -372,7 +372,7 @@ class _Script:
                     self.define(name, content)
             else:
                 self.define(f"e{name}", f"[{', '.join(str(factor.exponent) for factor in product.factors)}]")
-                content = "" if product.content == 1 else f"{content}*"
+                content = "" if product.content.is_one() else f"{content}*"
                 self.define(name, f"{content}monomial([{', '.join(parts)}], e{name})")
                 gains = [factor.cofactor.powers[0] - factor.degree for factor in product.factors]
                 rests = ", ".join(factor.cofactor.text("") for factor in product.factors)
@@ -387,26 +387,20 @@ class _Script:
 
     @prove.register
     def volume(self, claim: InvariantVolume, label: str) -> None:
+        says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
         if claim.fraction is None:
             self.fraction(claim)
-        else:
-            k = claim.fraction.degree
-            shared = claim.balance[0].powers[0]
-            left, right = self.products(claim.fraction, label, "PQ", [k + self.data.dim + 1 - shared, k - shared])
-            self.check("Q is not 0", "Q != 0")
-        self.derivative(label)
-        says = f"{label}: phi(x~) det M = phi(x) det L(x, x~)"
-        if claim.is_free:
+            self.check("P is not 0", "P != 0")
+            self.derivative(label)
             identity = "put(P, old, new)*Q*det(M) == P*put(Q, old, new)*det(L)"
             self.check(f"{says} for any x and x~", identity)
             return
+        k, shared = claim.fraction.degree, claim.balance[0].powers[0]
+        left, right = self.products(claim.fraction, label, "PQ", [k + self.data.dim + 1 - shared, k - shared])
+        self.check("P and Q are not 0", "P != 0 && Q != 0")
+        self.derivative(label)
         self.check("D = det M", "D == det(M)")
-        if claim.fraction is not None:
-            self.check(f"{says} at x~ = N/D", f"{left} == {right}*det(images(L, 1, new))")
-            return
-        k = claim.degree
-        identity = f"image(P, {k}, old)*Q*D^(n + 1) == P*image(Q, {k}, old)*det(images(L, 1, new))"
-        self.check(f"{says} at x~ = N/D", identity)
+        self.check(f"{says} at x~ = N/D", f"{left} == {right}*det(images(L, 1, new))")
 
     @prove.register
     def tensor(self, claim: InvariantTensor, label: str) -> None:

@@ -278,6 +278,15 @@ def test_a_volume_form_that_is_not_invariant_is_refused_by_the_programs(checker,
     pytest.fail("no density was changed")
 
 
+@pytest.mark.parametrize("name", ["harmonic", "lotka_volterra"])
+@pytest.mark.parametrize("checker", ["gp", "sympy"])
+def test_a_density_of_0_is_refused(name, checker, tmp_path):
+    text = certificate(load(name), checker, ["volume"])
+    wrong = re.sub(r"^P = ", "P = 0*", text, flags=re.MULTILINE)
+    assert wrong != text
+    assert run(checker, wrong, tmp_path).returncode != 0
+
+
 WRONG_DERIVATIVES = {  # with the same determinant, so that the identity of the volume form holds
     "rocq": [("l12 : R := eps", "l12 : R := - eps"), ("l21 : R := - eps", "l21 : R := eps")],
     "gp": [("L = [1, eps; - eps, 1]", "L = [1, - eps; eps, 1]")],
