@@ -1,6 +1,6 @@
 """SageMath, Macaulay2 and PARI on the Kahan maps of the catalogue: their answers and times beside those of kahanmaps.
 
-    python benchmarks/peers.py [--limit SECONDS] [--only NAME ...] [--venv FOLDER]
+    python benchmarks/peers.py [--limit SECONDS] [--only NAME ...] [--programs NAME ...] [--venv FOLDER]
 
 Installs pinned wheels in a temporary folder (0.7 GB; none is used by kahanmaps; --venv keeps the folder for the next
 run) and prints the tables of docs/comparison.md. A cell has the time of the program relative to that of kahanmaps,
@@ -39,6 +39,7 @@ TERMS = {2: 6, 3: 3, 4: 3}
 START_UP = 5  # seconds of loading, which do not count
 MOST_RUNS = 200
 HERE = Path(__file__).parent
+sys.set_int_max_str_digits(0)  # coordinates have thousands of digits
 LAST = "w0"  # the homogeneous coordinate
 
 
@@ -262,11 +263,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--limit", type=int, default=10)
     parser.add_argument("--only", nargs="*", default=INPUTS)
+    parser.add_argument("--programs", nargs="*", choices=list(QUESTIONS), default=list(QUESTIONS))
     parser.add_argument("--venv", type=Path)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         programs = install(options.venv or Path(folder))
-        for program, questions in QUESTIONS.items():
+        for program in options.programs:
+            questions = QUESTIONS[program]
             print(f"| {program} | {' | '.join(questions)} |")
             print("|---" * (len(questions) + 1) + "|")
             for name in options.only:

@@ -2,7 +2,9 @@
 (their pictures are only asked to be there), the study learns what it has committed, and the demo runs through.
 """
 
+import importlib.util
 import os
+import random
 import re
 import shutil
 import subprocess
@@ -19,8 +21,8 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 
 
-# The cluster and the whole paper have quicker tests of their own.
-LONG = {"08_the_paper", "10_cluster_batch"}
+# The cluster, the whole paper and planar fields have quicker tests of their own.
+LONG = {"08_the_paper", "10_cluster_batch", "13_planar_fields"}
 
 
 @pytest.mark.parametrize(
@@ -100,3 +102,72 @@ def test_a_fresh_run_of_a_notebook_shows_what_is_stored(path):
 def test_a_dump_of_a_dataclass_is_seen():
     assert DUMP.search("(FoundDensity(function=x, verdict='proved'),)")
     assert not DUMP.search("<FoundIntegral: (x + 1)/(y)> KahanMap(x, y; eps=1/10, over QQ)")
+
+
+def fields_of_the_plane():
+    """The example on planar fields as a module."""
+    spec = importlib.util.spec_from_file_location("planar_fields", EXAMPLES / "13_planar_fields.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def moved(field, matrix):
+    """g^-1 f(g x) for the matrix g, times det g."""
+    (p, q), (r, s) = matrix
+    parts = [
+        (
+            a * p * p + b * p * r + c * r * r,
+            2 * a * p * q + b * (p * s + q * r) + 2 * c * r * s,
+            a * q * q + b * q * s + c * s * s,
+        )
+        for a, b, c in field
+    ]
+    return tuple(tuple(u * x + v * y for x, y in zip(*parts, strict=True)) for u, v in ((s, -q), (-r, p)))
+
+
+def test_the_class_of_a_planar_field_is_invariant_and_tells_degrees_apart():
+    module, draw = fields_of_the_plane(), random.Random(1)
+    for _ in range(500):
+        field = tuple(tuple(draw.choice((-2, -1, 0, 0, 1, 2)) for _ in range(3)) for _ in range(2))
+        matrix = [[draw.randint(-3, 3) for _ in range(2)] for _ in range(2)]
+        if matrix[0][0] * matrix[1][1] != matrix[0][1] * matrix[1][0]:
+            assert module.class_of(moved(field, matrix)) == module.class_of(field)
+    # The exponents (1, 1, 1), (1, 1, 2) and (1, 2, 3) of three lines.
+    nahm = [((1, 0, -1), (0, -2, 0)), ((2, 0, -12), (0, -6, -4)), ((2, 0, -1), (0, -10, 1))]
+    assert len({module.class_of(field) for field in nahm}) == 3
+
+
+def test_fields_of_one_class_have_the_same_degrees():
+    module = fields_of_the_plane()
+    fields = module.classes()
+    assert (len(fields), sum(map(len, fields.values()))) == (1132, 15624)
+    draw = random.Random(2)
+    for members in draw.sample([members for members in fields.values() if len(members) > 20], 3):
+        results = {
+            tuple(km.degree_growth(module.system_of(field), max_terms=6, steps=10, enclosed=False).degrees)
+            for field in draw.sample(members, 3)
+        }
+        assert len(results) == 1
+
+
+def test_the_counts_of_planar_fields_on_the_page_are_those_of_the_example():
+    printed = (EXAMPLES / "13_planar_fields.out").read_text(encoding="utf-8")
+    page = (EXAMPLES.parent / "docs" / "beyond.md").read_text(encoding="utf-8").partition("## Small planar fields")[2]
+    lines = [
+        line.split(" | ") for line in re.findall(r"^\| ((?:bounded|linear|quadratic) .*) \|$", printed, re.MULTILINE)
+    ]
+    kinds = {"bounded": [], "linear, $2n$": [], "linear, $n + 1$": [], "quadratic": []}
+    for growth, degrees, _, _, fields, integral in lines:
+        kinds[f"{growth}, ${degrees.replace('*', '')}$" if growth == "linear" else growth].append(
+            (int(fields), integral)
+        )
+    for kind, found in kinds.items():
+        assert f"| {kind} | {len(found)} | {sum(fields for fields, _ in found)} |" in page
+    without = {kind: sum(integral == "none found" for _, integral in found) for kind, found in kinds.items()}
+    assert without == {"bounded": 0, "linear, $2n$": 0, "linear, $n + 1$": 31, "quadratic": 0}
+    exponential = sum(map(int, re.findall(r"^\| (\d+) \| \d", printed, re.MULTILINE)))
+    assert (
+        f"| exponential | {exponential} | {15624 - sum(fields for found in kinds.values() for fields, _ in found)} |"
+        in page
+    )
