@@ -14,8 +14,8 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray
-from kahanmaps.plots.curves.level_sets import MAX_LEVELS, level_curves, levels_through
 from kahanmaps.plots.comparison.functions import requested_axis
+from kahanmaps.plots.curves.level_sets import MAX_LEVELS, level_curves, levels_through
 from kahanmaps.plots.figures import draw_points, drawing, legend_above, new_figure
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.portraits.windows import Window, fullest_axes, window_of
