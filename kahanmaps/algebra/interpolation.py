@@ -30,7 +30,7 @@ from flint import nmod_mat, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.residues import chinese, random_prime, rational_reconstruction, rational_vector
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.errors import BadPrime, InputError
 
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
@@ -356,7 +356,7 @@ def _along_line(
         for i in entries:
             if fractions[i] is None:
                 values.samples.check()
-                count(5 + n * (1 + n / 100))
+                count_work(5 + n * (1 + n / 100))
                 interpolants[i] += vanishing * ((values.values[-1][i] - interpolants[i](t)) * inverse)
         vanishing *= nmod_poly([-t, 1], p)
         for i in entries:
@@ -469,7 +469,7 @@ def _solve(
     width = sum(widths) + (len(denominator) if known_denominator is None else 1)
     if height == 0:
         return max(1, -(-(width - 1) // len(members)))
-    count(20 + len(rows) * (0.5 + min(height, width) / 1500))
+    count_work(20 + len(rows) * (0.5 + min(height, width) / 1500))
     kernel, nullity = nmod_mat(height, width, rows, p).nullspace()
     if nullity > 1:
         return int(-(-(nullity - 1) // len(members)))
@@ -555,7 +555,7 @@ def _functions_with_residues(
     context = ring(names)
     functions = []
     for shape, entries in zip(shapes, residues, strict=True):
-        count((20 + 5 * len(entries)) * modulus.bit_length() / 60)
+        count_work((20 + 5 * len(entries)) * modulus.bit_length() / 60)
         coefficients = rational_vector(entries, modulus)
         if coefficients is None:
             return None

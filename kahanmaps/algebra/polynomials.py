@@ -36,7 +36,7 @@ from flint import (
 )
 
 from kahanmaps.algebra.integers import content, over_one
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError, quoted
 
@@ -189,7 +189,7 @@ def irreducible_factors(polynomial: fmpq_mpoly) -> list[tuple[fmpq_mpoly, int]]:
     """
     if len(polynomial) > _MAX_FACTORED_TERMS:
         return [(polynomial, 1)]
-    count(10 + 12 * len(polynomial))
+    count_work(10 + 12 * len(polynomial))
     return [(factor, int(power)) for factor, power in polynomial.factor()[1]]
 
 
@@ -217,7 +217,7 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     field_value = field.value(polynomial, point)
     if field_value is not None:
         return field_value
-    count(1 + 3 * len(polynomial))
+    count_work(1 + 3 * len(polynomial))
     powers = [[field.one, entry] for entry in point]
     total = field.zero
     with field.working():
@@ -303,7 +303,7 @@ class RationalFunction(LatexDisplay):
         >>> RationalFunction.reduced(x * y, 2 * y**2).denominator
         y
         """
-        count(10 + (len(numerator) + len(denominator)) / 2)
+        count_work(10 + (len(numerator) + len(denominator)) / 2)
         common = numerator.gcd(denominator)
         return cls(numerator / common, denominator / common)
 

@@ -427,7 +427,9 @@ def test_results_about_one_eps_or_the_flow_have_no_certificate():
 
 def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note(monkeypatch):
     monkeypatch.setattr("kahanmaps.certificates.identities.MAX_PRODUCTS", 10)
-    refuses("more than 10 products of terms to multiply out; raise --effort", certificate, load("euler_top"), "gp", ["F1"])
+    refuses(
+        "more than 10 products of terms to multiply out; raise --effort", certificate, load("euler_top"), "gp", ["F1"]
+    )
     text = certificate(load("weierstrass"), "gp")
     assert "Not in this certificate: modified_H: the identities of the certificate take more than 10 products" in text
     assert "dx/phi is invariant" in text

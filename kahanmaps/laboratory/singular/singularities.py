@@ -24,7 +24,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomial_work import counted_product, factored
 from kahanmaps.algebra.printing import all_fields, attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.hard_stop import TimeLimit
@@ -221,7 +221,7 @@ def singularities(
         if is_long(map_at_eps):
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
         map_form = homogeneous_map(map_at_eps)
-        count(3 * sum(map(len, map_form.forms)))
+        count_work(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
         try:
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
