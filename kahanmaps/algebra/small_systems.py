@@ -370,9 +370,9 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
             return False
         lead = tuple(map(int, p.monoms()[0]))
         for i, other in enumerate(leads):
-            common = list(map(max, lead, other))
-            if sum(common) < sum(lead) + sum(other):  # else it reduces to 0, by Buchberger's criterion
-                heappush(pairs, (sum(common), [-e for e in reversed(common)], i, len(basis)))
+            lcm = list(map(max, lead, other))
+            if sum(lcm) < sum(lead) + sum(other):  # else it reduces to 0, by Buchberger's criterion
+                heappush(pairs, (sum(lcm), [-e for e in reversed(lcm)], i, len(basis)))
                 waiting.add((i, len(basis)))
         basis.append(p)
         leads.append(lead)
@@ -392,10 +392,11 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
         lcm_degree, _, i, j = heappop(pairs)
         waiting.remove((i, j))
         count_work(4 + len(basis) / 10)
-        common = pack(map(max, leads[i], leads[j])) + guard
-        # Buchberger's chain criterion: a third leading monomial divides it, and both pairs with that one are done.
+        # Buchberger's chain criterion: a third leading monomial divides the least common multiple of these two, and
+        # both pairs with the third polynomial are done.
+        guarded_lcm = pack(map(max, leads[i], leads[j])) + guard
         if any(
-            (common - lead) & guard == guard
+            (guarded_lcm - lead) & guard == guard
             and k not in (i, j)
             and (min(i, k), max(i, k)) not in waiting
             and (min(j, k), max(j, k)) not in waiting

@@ -170,7 +170,8 @@ class _Curve:
 
     @cached_property
     def key(self) -> Key:
-        """The key of its hypersurface: whether it is contracted, which forms vanish there, and the first rows.
+        """The key of its hypersurface: whether it is contracted, which forms vanish there, and the first
+        `rows`.
 
         Raises OrbitDataUnknown where there is no first step.
         """

@@ -54,7 +54,7 @@ from kahanmaps.laboratory.singular.written import (
     is_long,
     name_of,
     period_of,
-    written,
+    poles_and_critical_factors,
 )
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapFamily
@@ -251,7 +251,7 @@ def singularities(
         return replace(run, is_undefined=is_undefined, is_dominant=False)
     if map_form.degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
-    forms, critical_degree = written(map_form)
+    forms, critical_degree = poles_and_critical_factors(map_form)
     if critical_degree is None and len(map_at_eps.factors) > 1:
         followed_run = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
         if followed_run is not None:

@@ -58,7 +58,7 @@ class Word:
         )
 
 
-def written(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
+def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
     """The poles of a map and the factors of its Jacobian determinant, with the degree of the determinant; exact.
 
     Where the determinant is too large the degree is None, and the list has only the poles and infinity.
@@ -101,7 +101,7 @@ def followed_map_by_map(
     equations = map_.at(eps).equations
     period = period_of(equations)
     letters = [homogeneous_map(factor) for factor in map_.at(eps).factors[:period]]
-    by_letter = [written(letter) for letter in letters]
+    by_letter = [poles_and_critical_factors(letter) for letter in letters]
     if any(degree is None for _, degree in by_letter):
         return None
     followed = [
