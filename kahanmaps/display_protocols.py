@@ -21,7 +21,7 @@ class HtmlDisplay(AttributeHints):
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        _load(self)
+        _load_displays(self)
         return html_form(self)
 
 
@@ -56,7 +56,7 @@ class PrintableResult(HtmlDisplay, WithoutTruthValue):
     _parts, _noun = "", ("", "")
 
     def __str__(self) -> str:
-        _load(self)
+        _load_displays(self)
         return text_form(self)
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -156,7 +156,7 @@ class LatexDisplay(AttributeHints):
 
 def latex(value: object) -> str:
     """Return a system, a map, a polynomial or a rational function as LaTeX."""
-    _load(value)
+    _load_displays(value)
     return latex_form(value)
 
 
@@ -189,7 +189,7 @@ def latex_form(value: object) -> str:
 _FILES = {"documents": "systems", "family": "systems", "maps": "systems"}
 
 
-def _load(value: object) -> None:
+def _load_displays(value: object) -> None:
     """Import the file of kahanmaps.display for this class: named after the folder of the class, or as in `_FILES`."""
     for base in type(value).__mro__:  # subclasses defined by a user are displayed like ours
         top, *folders = base.__module__.split(".")

@@ -22,7 +22,7 @@ from kahanmaps.algebra.matrices import EntryMatrix
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.printing import format_rational_function
-from kahanmaps.algebra.work import count, counted
+from kahanmaps.algebra.work import count_work, counted
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
@@ -110,7 +110,7 @@ class FunctionField(Field):
         self.budget -= products
         if self.budget < 0:
             raise BudgetExceeded(_TOO_MANY)
-        count(1 + products / 100)
+        count_work(1 + products / 100)
 
     def require(self, pairs: Sequence[tuple[fmpq_mpoly, fmpq_mpoly]]) -> None:
         """Raise BudgetExceeded at once if the budget is too small for the products of all these pairs."""
@@ -122,7 +122,7 @@ class FunctionField(Field):
         if self.reduces and not denominator.is_constant():
             if numerator.is_zero():
                 return self.zero
-            count(10 + (len(numerator) + len(denominator)) / 2)
+            count_work(10 + (len(numerator) + len(denominator)) / 2)
             common = numerator.gcd(denominator)
             if not common.is_constant():
                 return Function(self, numerator / common, denominator / common)
@@ -362,13 +362,13 @@ def _minors(field: FunctionField, rows: list[list[fmpq_mpoly]]) -> list[fmpq_mpo
     counted as if it were computed again, so that no verdict depends on earlier computations. For the same reason a
     failure is cached together with its budget: with another budget the work until it is exceeded would differ.
     """
-    count(sum(map(len, chain(*rows))))  # for the text of the hash key
+    count_work(sum(map(len, chain(*rows))))  # for the text of the hash key
     key = sha256(repr((field.context.names(), [list(map(str, row)) for row in rows])).encode()).digest()
     budget, before = field.budget, counted()
     for cached_key in (key, (key, budget)):
         minors, products, units = _cache.get(cached_key, (None, 0, 0))
         if cached_key in _cache and products <= budget:
-            count(units)
+            count_work(units)
             if minors is None:
                 field.budget = -1
                 raise BudgetExceeded(_TOO_MANY)

@@ -15,10 +15,10 @@ SMALL_PRIMES = tuple(n for n in range(2, 100) if all(n % k for k in range(2, int
 _LOW = (fmpz(1) << 64) - 1
 
 
-def over_one(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
+def over_common_denominator(numbers: Iterable[fmpq]) -> tuple[list[fmpz], fmpz]:
     """Return the numerators of rational numbers over their least common denominator, and this denominator.
 
-    >>> over_one([fmpq(1, 2), fmpq(-2, 3), fmpq(5)])
+    >>> over_common_denominator([fmpq(1, 2), fmpq(-2, 3), fmpq(5)])
     ([3, -4, 30], 6)
     """
     pairs, denominator = [(number.p, number.q) for number in numbers], fmpz(1)

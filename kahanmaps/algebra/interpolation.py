@@ -30,7 +30,7 @@ from flint import nmod_mat, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.residues import chinese, random_prime, rational_reconstruction, rational_vector
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.errors import BadPrime, InputError
 
 __all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
@@ -238,7 +238,11 @@ def reconstruct(
         for _ in range(_UNLUCKY_PRIMES):
             try:
                 functions = _lift(
-                    _first_prime(at_new_prime(), len(names), max_degree, rng), at_new_prime, tuple(names), primes, rng
+                    _modulo_first_prime(at_new_prime(), len(names), max_degree, rng),
+                    at_new_prime,
+                    tuple(names),
+                    primes,
+                    rng,
                 )
                 return Reconstruction(functions, "", samples.taken, tuple(primes))
             except Unlucky as unlucky:
@@ -251,7 +255,7 @@ def reconstruct(
 # -- modulo the first prime --------------------------------------------------------------------------------------------
 
 
-def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: random.Random) -> list[Quotient]:
+def _modulo_first_prime(values: SampledValues, symbols: int, max_degree: int, rng: random.Random) -> list[Quotient]:
     """Interpolate the functions modulo one prime."""
     p = values.prime
     values.take(values.random_points(symbols, rng))
@@ -265,11 +269,11 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
         axes.append(_along_line(values, anchor, direction, max_degree, rng))
     # Symbols of large degree first: a symbol multiplies the number of all monomials known before it.
     order = sorted(range(symbols), key=lambda j: -max((_size(N) + _size(D) for N, D in axes[j]), default=0))
-    keys: list[list[str]] = [[] for _ in entries]
+    denominators: list[list[str]] = [[] for _ in entries]
     for stage, j in enumerate(order):
         active = order[: stage + 1]
         for i in entries:
-            keys[i].append(str(axes[j][i][1]))
+            denominators[i].append(str(axes[j][i][1]))
         dependent = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
         for i in dependent:
             if quotients[i].shape.unknowns <= 2 and set(
@@ -301,18 +305,18 @@ def _first_prime(values: SampledValues, symbols: int, max_degree: int, rng: rand
             direction = tuple(rng.randrange(1, p) if i in active else 0 for i in range(symbols))
             line = _along_line(values, anchor, direction, max_degree, rng)
             for i in dependent:
-                keys[i].append(str(line[i][1]))
+                denominators[i].append(str(line[i][1]))
                 shapes[i] = Shape(
                     tuple(m for m in shapes[i].numerator if sum(m) <= _size(line[i][0])),
                     tuple(m for m in shapes[i].denominator if sum(m) <= _size(line[i][1])),
                 )
         groups: dict[tuple[str, ...], list[int]] = {}
         for i in dependent:
-            groups.setdefault(tuple(keys[i]), []).append(i)
+            groups.setdefault(tuple(denominators[i]), []).append(i)
         monic = [str(N / N.leading_coefficient()) if int(N.degree()) >= 0 else "" for N, _ in axes[j]]
-        pairs = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
+        split_groups = [split_group(group, [monic[i] for i in group], shapes) for group in groups.values()]
         fixed = {i: anchor[i] for i in order[stage + 1 :]}
-        for i, quotient in fit(values, shapes, pairs, symbols, rng, fixed).items():
+        for i, quotient in fit(values, shapes, split_groups, symbols, rng, fixed).items():
             quotients[i] = quotient
     return quotients
 
@@ -356,7 +360,7 @@ def _along_line(
         for i in entries:
             if fractions[i] is None:
                 values.samples.check()
-                count(5 + n * (1 + n / 100))
+                count_work(5 + n * (1 + n / 100))
                 interpolants[i] += vanishing * ((values.values[-1][i] - interpolants[i](t)) * inverse)
         vanishing *= nmod_poly([-t, 1], p)
         for i in entries:
@@ -469,7 +473,7 @@ def _solve(
     width = sum(widths) + (len(denominator) if known_denominator is None else 1)
     if height == 0:
         return max(1, -(-(width - 1) // len(members)))
-    count(20 + len(rows) * (0.5 + min(height, width) / 1500))
+    count_work(20 + len(rows) * (0.5 + min(height, width) / 1500))
     kernel, nullity = nmod_mat(height, width, rows, p).nullspace()
     if nullity > 1:
         return int(-(-(nullity - 1) // len(members)))
@@ -555,7 +559,7 @@ def _functions_with_residues(
     context = ring(names)
     functions = []
     for shape, entries in zip(shapes, residues, strict=True):
-        count((20 + 5 * len(entries)) * modulus.bit_length() / 60)
+        count_work((20 + 5 * len(entries)) * modulus.bit_length() / 60)
         coefficients = rational_vector(entries, modulus)
         if coefficients is None:
             return None

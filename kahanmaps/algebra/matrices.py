@@ -14,7 +14,7 @@ from typing import Any, Self
 from flint import acb_mat, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import Field, operand
-from kahanmaps.algebra.integers import content, over_one
+from kahanmaps.algebra.integers import content, over_common_denominator
 from kahanmaps.algebra.modular_matrices import split_columns
 from kahanmaps.errors import PrecisionLost, SingularMatrix
 
@@ -100,7 +100,7 @@ def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
 
 def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
     """Return the coprime integers proportional to a rational vector, the first nonzero one positive."""
-    integers, _ = over_one(vector)
+    integers, _ = over_common_denominator(vector)
     common = content(integers)
     if common == 0:
         return tuple(integers)
@@ -200,7 +200,7 @@ def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
     """Multiply each row by its own denominator: rank and null space stay, and entries are smaller than with a common
     one.
     """
-    rows = [over_one(row)[0] for row in matrix.tolist()]
+    rows = [over_common_denominator(row)[0] for row in matrix.tolist()]
     return fmpz_mat(rows) if rows else fmpz_mat(0, matrix.ncols())
 
 

@@ -7,12 +7,12 @@ from typing import Any
 
 from flint import fmpz_mat, nmod, nmod_mat
 
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 
 
 def matrix(rows: Sequence[Sequence[Any]], prime: int) -> nmod_mat:
     """Return the matrix modulo a prime with these rows (at least one) of integers or residues."""
-    count(2 + 0.3 * len(rows) * len(rows[0]))
+    count_work(2 + 0.3 * len(rows) * len(rows[0]))
     if rows[0] and isinstance(rows[0][0], nmod):
         return nmod_mat(rows, prime)
     return nmod_mat(fmpz_mat(rows), prime)  # twice as fast as nmod_mat from Python integers
@@ -26,12 +26,12 @@ def reduced(A: nmod_mat) -> tuple[nmod_mat, int]:
 
 
 def _count_elimination(A: nmod_mat) -> None:
-    count(10 + A.nrows() * A.ncols() * min(A.nrows(), A.ncols()) / 1500)
+    count_work(10 + A.nrows() * A.ncols() * min(A.nrows(), A.ncols()) / 1500)
 
 
 def multiply(A: nmod_mat, B: nmod_mat) -> nmod_mat:
     """Return the product of two matrices modulo a prime."""
-    count(1 + A.nrows() * A.ncols() * B.ncols() / 1000)
+    count_work(1 + A.nrows() * A.ncols() * B.ncols() / 1000)
     return A * B
 
 
@@ -43,7 +43,7 @@ def determinant(A: nmod_mat) -> int:
 
 def integers(A: nmod_mat) -> list[list[int]]:
     """Return the rows of a matrix modulo a prime as integers."""
-    count(A.nrows() * A.ncols() / 2)
+    count_work(A.nrows() * A.ncols() / 2)
     return [list(map(int, row)) for row in A.tolist()]
 
 
@@ -77,7 +77,7 @@ def kernel(form: nmod_mat, rank: int) -> list[list[int]]:
     [[5, 1, 0]]
     """
     prime, (pivot_columns, free) = form.modulus(), split_columns(form, rank)
-    count(len(free) * (len(pivot_columns) / 3 + form.ncols() / 50))
+    count_work(len(free) * (len(pivot_columns) / 3 + form.ncols() / 50))
     basis = []
     for k in free:
         vector = [0] * form.ncols()

@@ -11,7 +11,7 @@ from typing import Any
 
 from flint import fmpq_mpoly, nmod_mpoly, nmod_poly
 
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 
 
 def product_units(length: int, other: int) -> float:
@@ -45,9 +45,9 @@ def roots_units(length: int, roots: int = 0) -> float:
 def counted_product(left: Any, right: Any) -> Any:
     """Return the product of two polynomials, and count its work."""
     if isinstance(left, nmod_poly):
-        count(product_units(len(left), len(right)))
+        count_work(product_units(len(left), len(right)))
     elif isinstance(left, fmpq_mpoly | nmod_mpoly):
-        count(1 + len(left) * len(right) / 100)
+        count_work(1 + len(left) * len(right) / 100)
     return left * right
 
 
@@ -56,5 +56,5 @@ def factored(polynomial: Any) -> list[tuple[Any, int]]:
 
     The work is counted by terms, whose number the caller has to bound.
     """
-    count(50 + 10 * len(polynomial))
+    count_work(50 + 10 * len(polynomial))
     return [(factor, int(k)) for factor, k in polynomial.factor()[1]]

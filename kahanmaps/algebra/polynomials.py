@@ -35,8 +35,8 @@ from flint import (
     nmod,
 )
 
-from kahanmaps.algebra.integers import content, over_one
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.integers import content, over_common_denominator
+from kahanmaps.algebra.work import count_work
 from kahanmaps.display_protocols import LatexDisplay, shorten
 from kahanmaps.errors import InputError, quoted
 
@@ -121,7 +121,7 @@ def monomials(count: int, of_degree: int) -> Iterator[tuple[int, ...]]:
 
 def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
     """Return the least positive integer whose product with `polynomial` has integer coefficients."""
-    return over_one(polynomial.coeffs())[1]
+    return over_common_denominator(polynomial.coeffs())[1]
 
 
 def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
@@ -131,7 +131,9 @@ def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
     >>> digits_of([x/3, 1000*y])
     4
     """
-    integers, denominator = over_one(coefficient for polynomial in polynomials for coefficient in polynomial.coeffs())
+    integers, denominator = over_common_denominator(
+        coefficient for polynomial in polynomials for coefficient in polynomial.coeffs()
+    )
     longest = max([denominator, *integers], key=abs)
     return int(longest.bit_length() * 0.30103) + 1
 
@@ -170,7 +172,7 @@ def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
     """
     if polynomial.is_zero():
         return fmpq(1), polynomial
-    integers, denominator = over_one(polynomial.coeffs())
+    integers, denominator = over_common_denominator(polynomial.coeffs())
     factor = fmpq(content(integers), denominator)
     if polynomial.leading_coefficient() < 0:
         factor = -factor
@@ -189,7 +191,7 @@ def irreducible_factors(polynomial: fmpq_mpoly) -> list[tuple[fmpq_mpoly, int]]:
     """
     if len(polynomial) > _MAX_FACTORED_TERMS:
         return [(polynomial, 1)]
-    count(10 + 12 * len(polynomial))
+    count_work(10 + 12 * len(polynomial))
     return [(factor, int(power)) for factor, power in polynomial.factor()[1]]
 
 
@@ -203,7 +205,7 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
         total_degree = degree(polynomial)
         if total_degree <= 0:
             return polynomial.leading_coefficient() if total_degree == 0 else fmpq(0)
-        X, W = over_one(point)
+        X, W = over_common_denominator(point)
         denominator = common_denominator(polynomial)
         powers: list[list[Any]] = [*([fmpz(1), entry] for entry in X), [fmpz(1), W]]
         total: Any = fmpz(0)
@@ -217,7 +219,7 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     field_value = field.value(polynomial, point)
     if field_value is not None:
         return field_value
-    count(1 + 3 * len(polynomial))
+    count_work(1 + 3 * len(polynomial))
     powers = [[field.one, entry] for entry in point]
     total = field.zero
     with field.working():
@@ -303,7 +305,7 @@ class RationalFunction(LatexDisplay):
         >>> RationalFunction.reduced(x * y, 2 * y**2).denominator
         y
         """
-        count(10 + (len(numerator) + len(denominator)) / 2)
+        count_work(10 + (len(numerator) + len(denominator)) / 2)
         common = numerator.gcd(denominator)
         return cls(numerator / common, denominator / common)
 

@@ -26,7 +26,7 @@ from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly, fmpz_mpoly_c
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, names_of, primitive_part
-from kahanmaps.algebra.work import SPENT, Budget, count
+from kahanmaps.algebra.work import SPENT, Budget, count_work
 
 MAX_BASIS = 120  # polynomials of a Groebner basis
 MAX_TERMS = 400  # of one of them
@@ -133,7 +133,7 @@ def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
     # A polynomial with all the monomials has them in the order of the ring.
     order = context.from_dict({m: fmpq(1) for p in nonzero for m in p.monoms()}).monoms()
     places = {tuple(m): k for k, m in enumerate(order)}
-    count(20 + 7 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(places) / 30)
+    count_work(20 + 7 * sum(map(len, nonzero)) + len(nonzero) ** 2 * len(places) / 30)
     matrix = fmpq_mat(len(nonzero), len(places))
     for i, p in enumerate(nonzero):
         for monomial, value in p.terms():
@@ -159,7 +159,7 @@ def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
     leads = [(tuple(g.monoms()[0]), g) for g in basis]
     while not p.is_zero():
         leading_exponents, leading_coefficient = tuple(p.monoms()[0]), p.leading_coefficient()
-        count(10 + len(p) + len(leads) / 2)
+        count_work(10 + len(p) + len(leads) / 2)
         for lead, g in leads:
             if all(a <= b for a, b in zip(lead, leading_exponents, strict=True)):
                 cofactor = context.from_dict(
@@ -225,7 +225,7 @@ class _Solver:
         """Add the solutions of `equations` to the result; `is_basis` says that they are already a Groebner basis."""
         if self.stopped:  # the reason is already in the result
             return
-        count(50)
+        count_work(50)
         original = [p for p in equations if not p.is_zero()]
         equations = equations if is_basis else independent(equations)
         if len(original) > len(equations):
@@ -247,7 +247,7 @@ class _Solver:
                 context = p.context()
                 gens, k = list(context.gens()), max(i for i, e in enumerate(p.degrees()) if e)
                 gens[k] = gens[k] - p / p.derivative(k).leading_coefficient()
-                count(sum(20 + len(q) * len(p) for q in (*original, *values)))
+                count_work(sum(20 + len(q) * len(p) for q in (*original, *values)))
                 substituted = [
                     tuple(q.compose(*gens, ctx=context) for q in polynomials) for polynomials in (original, values)
                 ]
@@ -296,7 +296,7 @@ class _Solver:
             for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
                 matrix[places[tuple(int(e) for e in monomial)], k] = value
         size = max((max(abs(e.p), e.q).bit_length() for e in matrix.entries()), default=1)
-        count(20 + len(quotient) ** 3 * size / 200)
+        count_work(20 + len(quotient) ** 3 * size / 200)
         _, factors = matrix.charpoly().factor()
         for factor, _ in factors:
             if factor.degree() > 1:
@@ -330,9 +330,9 @@ def _easiest_product(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None
         variable_count = sum(e > 0 for e in p.degrees())
         if variable_count == 1:
             bits = max(max(abs(c.p), c.q).bit_length() for c in p.coeffs())
-            count(40 + degree(p) ** 2 * (1 + bits / 200) / 2)
+            count_work(40 + degree(p) ** 2 * (1 + bits / 200) / 2)
         elif len(p) <= MAX_FACTORED:
-            count(60 + 5 * variable_count**2 + 3 * len(p))
+            count_work(60 + 5 * variable_count**2 + 3 * len(p))
         else:
             continue
         products.append(p.factor()[1])
@@ -370,9 +370,9 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
             return False
         lead = tuple(map(int, p.monoms()[0]))
         for i, other in enumerate(leads):
-            common = list(map(max, lead, other))
-            if sum(common) < sum(lead) + sum(other):  # else it reduces to 0, by Buchberger's criterion
-                heappush(pairs, (sum(common), [-e for e in reversed(common)], i, len(basis)))
+            lcm = list(map(max, lead, other))
+            if sum(lcm) < sum(lead) + sum(other):  # else it reduces to 0, by Buchberger's criterion
+                heappush(pairs, (sum(lcm), [-e for e in reversed(lcm)], i, len(basis)))
                 waiting.add((i, len(basis)))
         basis.append(p)
         leads.append(lead)
@@ -391,11 +391,12 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
             return None
         lcm_degree, _, i, j = heappop(pairs)
         waiting.remove((i, j))
-        count(4 + len(basis) / 10)
-        common = pack(map(max, leads[i], leads[j])) + guard
-        # Buchberger's chain criterion: a third leading monomial divides it, and both pairs with that one are done.
+        count_work(4 + len(basis) / 10)
+        # Buchberger's chain criterion: a third leading monomial divides the least common multiple of these two, and
+        # both pairs with the third polynomial are done.
+        guarded_lcm = pack(map(max, leads[i], leads[j])) + guard
         if any(
-            (common - lead) & guard == guard
+            (guarded_lcm - lead) & guard == guard
             and k not in (i, j)
             and (min(i, k), max(i, k)) not in waiting
             and (min(j, k), max(j, k)) not in waiting
@@ -404,7 +405,7 @@ def groebner(equations: Sequence[fmpq_mpoly], budget: Budget) -> list[fmpq_mpoly
             continue
         s_polynomial = basis[i].spoly(basis[j])
         mean = sum(map(len, basis)) / len(basis)
-        count(5 + mean * lcm_degree * variable_count * sqrt(variable_count * bits * len(s_polynomial)) / 200)
+        count_work(5 + mean * lcm_degree * variable_count * sqrt(variable_count * bits * len(s_polynomial)) / 200)
         remainder = s_polynomial.reduction_primitive_part(vector)
         if not remainder.is_zero():
             if not add(remainder):

@@ -1,8 +1,8 @@
 """Counted work: it bounds a search instead of a clock, so that a search has the same result on every machine.
 
 Work is counted in units of about a microsecond of field operations on a laptop of 2020. Expensive operations call
-`count` in advance, with an estimate from the sizes of their arguments. A `Budget` is a number of units; all work that
-is counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
+`count_work` in advance, with an estimate from the sizes of their arguments. A `Budget` is a number of units; all work
+that is counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
 
 Trap: a result from a module-level cache costs no work the second time, so budgets would depend on earlier calls. For
 functions that count work use `counted_cache`, which counts it again. Caches within a single search are harmless.
@@ -30,7 +30,7 @@ class _Counter(threading.local):
 _counter = _Counter()
 
 
-def count(units: float) -> None:
+def count_work(units: float) -> None:
     """Add units to the work counted in this thread."""
     _counter.units += ceil(units)
 
@@ -47,7 +47,7 @@ class Budget:
     >>> stages = budget.share([1, 3])
     >>> next(stages).units
     25.0
-    >>> count(5)
+    >>> count_work(5)
     >>> budget.spent, budget.left, next(stages).units  # the unused units of the first stage go to the second
     (5, 95.0, 95.0)
     """
@@ -113,7 +113,7 @@ def counted_cache(size: int) -> Callable[[Callable[..., Any]], Callable[..., Any
         def call(*arguments: Any) -> Any:
             before = counted()
             result, units = cached(*arguments)
-            count(units - (counted() - before))
+            count_work(units - (counted() - before))
             return result
 
         return call

@@ -80,7 +80,7 @@ class Identity:
         field, before = BoundField(), work.counted()
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
-        work.count(7 * (work.counted() - before))  # bounds take longer than the numbers that were counted
+        work.count_work(7 * (work.counted() - before))  # bounds take longer than the numbers that were counted
         # If the sides are not defined there is no bound, and the identity cannot be supported.
         return (CoefficientSize(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 

@@ -89,8 +89,8 @@ _CHECKS = [
         they are expected NOT to commute, and this does not affect the exit status.
 
         SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p
-        sets a parameter of both systems, or of the one that has it. An inline system (--rhs) and a SYSTEM are f and g
-        in the order in which they are typed.
+        sets a parameter of both systems, or of the one that has it. The first system on the command line is called f,
+        the second g; one of them may be given by --rhs.
 
         --arithmetic float measures the size of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)) along a float orbit, and its order
         in eps; the verdict and the exit status are those of the exact check beside it.
@@ -114,7 +114,7 @@ _CHECKS = [
         Without --eps the integrals are checked for every eps.
 
         A Hamiltonian system has a known integral, the modified Hamiltonian, in both normalizations of the paper; a
-        member of the family also has the K~ of all rational associated systems. The section [integrals] of the file
+        member of the family also has those of all rational associated systems. The section [integrals] of the file
         claims further ones. By default all of them are checked, with --integral only the given ones.
         """,
         "conserved",
@@ -122,7 +122,7 @@ _CHECKS = [
             "--integral",
             "[NAME=]EXPR",
             "An integral to check: a rational function of x, its images x~, x~~ and eps; the name of an integral of "
-            "the file; or known, for all known and claimed ones.",
+            "the file; or the word 'known': all known and claimed ones.",
             many=True,
         ),
     ),

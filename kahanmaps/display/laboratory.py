@@ -204,10 +204,10 @@ def _brackets(tensor: Any) -> HtmlCell:
 
 @lines_of.register
 def _darboux(search: DarbouxSearch) -> Iterator[Line]:
-    """The law, the polynomials by cofactor, or that there are none."""
+    """The equation of a Darboux polynomial, then the polynomials found for each cofactor, or that there are none."""
     meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(search.cofactors) else ""
-    law = f"P(x~) = C P(x){meaning}; spaces spanned by products left out"
-    yield ("P' = K P, irreducible; integrals left out" if search.flow else law,)
+    equation = f"P(x~) = C P(x){meaning}; without the spaces that products of others span"
+    yield ("P' = K P, irreducible; integrals left out" if search.flow else equation,)
     for space in search.spaces:
         yield (f"{'K' if search.flow else 'C'} = {space.cofactor}",)
         yield from (("", space.verdict, _polynomial(P)) for P in space.polynomials)

@@ -77,10 +77,10 @@ def require_skew_hamiltonian(A: fmpq_mat) -> None:
 
 
 def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
-    """Return the irreducible factors of chi, where det(t - A) = chi(t)^2, in the order of the signs.
+    """Return the irreducible factors of chi, where det(t - A) = chi(t)^2.
 
-    Linear factors come first, by increasing root, then factors by degree and by the coefficients of the monic
-    polynomial, constant term first.
+    The signs that define an associated system have the same order: linear factors come first, by increasing root, then
+    factors by degree and by the coefficients of the monic polynomial, constant term first.
     """
     require_skew_hamiltonian(A)
     _, pairs = A.charpoly().factor()

@@ -47,7 +47,7 @@ from typing import Any
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.parsing import wrong_kind
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
@@ -287,7 +287,7 @@ def _within(orbit: Orbit, every: int, budget: Budget | None) -> Iterator[tuple[O
             rise = max(0, bits - before)
             yield point, bits
         # Steps that multiply heights need gcds of longer numbers than steps of slow growth.
-        count(20 + len(orbit.start) ** 2 * (bits / 100 + rise / 15))
+        count_work(20 + len(orbit.start) ** 2 * (bits / 100 + rise / 15))
         if budget is not None and budget.is_spent:
             orbit.interrupt()
 

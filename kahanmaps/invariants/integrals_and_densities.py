@@ -36,7 +36,7 @@ from kahanmaps.algebra.polynomials import (
 )
 from kahanmaps.algebra.printing import format_polynomial, format_rational_function
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.iterates import iterates_in
 from kahanmaps.errors import InputError, quoted
@@ -462,7 +462,7 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     if P.is_zero():
         return unchanged
     while True:
-        count(20 + len(P) + len(Q))
+        count_work(20 + len(P) + len(Q))
         # Divide by factors that are free of x: they are conserved trivially.
         numerator, denominator = _content(P, dim), _content(Q, dim)
         P, Q = P / numerator, Q / denominator

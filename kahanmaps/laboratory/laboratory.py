@@ -38,7 +38,7 @@ from kahanmaps.algebra.polynomials import (
 from kahanmaps.algebra.printing import format_polynomial
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.checks.certify import MAX_DIMENSION, try_expand
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides, decide
@@ -493,7 +493,7 @@ def is_kept_by_flow(
     """
     P, Q = function.numerator, function.denominator
     context = P.context()
-    count(10 + len(P) * len(Q) * sum(map(len, system.rhs)) / 10)
+    count_work(10 + len(P) * len(Q) * sum(map(len, system.rhs)) / 10)
     change = system.derivative(P) * Q - P * system.derivative(Q)
     if is_density:
         change -= P * Q * system.divergence.compose(*context.gens()[: system.dim + len(system.symbols)], ctx=context)

@@ -14,7 +14,7 @@ from flint import fmpq_mpoly, nmod, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, monomials
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
 from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.maps.implicit import MapFamily
@@ -56,7 +56,7 @@ class ModularMap:
         if eps % prime == 0:
             raise BadPrime(f"found eps = 0 modulo {prime}: use another prime", prime)
         self.map = as_map(system).at(field.convert(eps), field, [field.convert(value) for value in values])
-        count(20 if isinstance(self.map, KahanMap) else 200)
+        count_work(20 if isinstance(self.map, KahanMap) else 200)
 
     def random_point(self) -> Point:
         """Return a random point modulo the prime."""
@@ -65,7 +65,7 @@ class ModularMap:
     def step(self, x: Point) -> Point | None:
         """Return the image of a point, None if the map is not defined there."""
         # The evaluation of polynomials counts its own work.
-        count(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMap) else 10)
+        count_work(15 + 5 * self.dim + self.dim**3 / 20 if isinstance(self.map, KahanMap) else 10)
         try:
             return tuple(int(entry) for entry in self.map.step(x))
         except SingularStep:
@@ -73,7 +73,7 @@ class ModularMap:
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
         """Return the sides of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x))."""
-        count(25 + 8 * self.dim + self.dim**3 / 10)
+        count_work(25 + 8 * self.dim + self.dim**3 / 10)
         numerator, denominator = jacobian_determinant_fraction(self.map, x, self.map.point(image))
         return int(numerator), int(denominator)
 
@@ -174,7 +174,7 @@ class ModularFlow(ModularMap):
     def step(self, x: Point) -> Point:
         """Return x + f(x)."""
         values = monomial_values(x, self.degree, self.prime)
-        count(5 + sum(map(len, self._f)) / 6)
+        count_work(5 + sum(map(len, self._f)) / 6)
         return tuple((a + sum(c * values[k] for c, k in f)) % self.prime for a, f in zip(x, self._f, strict=True))
 
     def determinant(self, x: Point, image: Point) -> tuple[int, int]:
@@ -188,7 +188,7 @@ class ModularFlow(ModularMap):
         """Return the values of all monomials P up to a degree and of P + f . grad P, times the two `factors`."""
         p = self.prime
         values = monomial_values(x, degree, p)
-        count(len(values) * self.dim / 4)
+        count_work(len(values) * self.dim / 4)
         f = [after - before for before, after in zip(x, image, strict=True)]
         image_values = [
             (value + sum(e * values[place] * f[k] for k, e, place in derivatives)) * factors[1] % p
@@ -211,7 +211,7 @@ class ModularFlow(ModularMap):
         p, factors = self.prime, monomial_tables(self.dim, degree)
         columns = len(factors) if support is None else len(support)
         in_rows = len(self._products) * orders / 25 + sum(map(len, self._f)) / 3
-        count(orders * (in_rows + columns / 2) + 3 * columns)
+        count_work(orders * (in_rows + columns / 2) + 3 * columns)
         # The keys are indices of monomials: 0 is that of 1, k + 1 that of the k-th variable.
         coefficients = {0: [1], **{k + 1: [c] for k, c in enumerate(start)}}
         coefficients |= {place: list[int]() for place, _ in self._products}
@@ -280,7 +280,7 @@ def _layers(dim: int, degree: int) -> list[list[tuple[int, int]]]:
 def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
     """Return the values of all monomials of degree at most `degree` at a point modulo a prime."""
     values = _layered_values(point, _layers(len(point), degree), prime)
-    count(len(values) / 8)
+    count_work(len(values) / 8)
     return list(map(int, values))
 
 
@@ -289,7 +289,7 @@ def _layered_values(point: Point, layers: Sequence[Sequence[tuple[int, int]]], p
     x, table = [nmod(entry, prime) for entry in point], [nmod(factor, prime)]
     for layer in layers:
         table += [table[place] * x[variable] for variable, place in layer]
-    count(len(table) / 10)
+    count_work(len(table) / 10)
     return table
 
 
@@ -297,7 +297,7 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
     """Return the value and the gradient at a point of the polynomial with these coefficients."""
     value, gradient = 0, [0] * len(point)
     powers = monomial_values(point, degree, prime)
-    count(len(vector) / 20 + 0.75 * sum(map(bool, vector)))
+    count_work(len(vector) / 20 + 0.75 * sum(map(bool, vector)))
     for coefficient, factors, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
         if coefficient:  # most are 0
             value += coefficient * power
@@ -310,7 +310,7 @@ def monomial_derivatives(point: Point, degree: int, prime: int) -> list[list[int
     """Return the partial derivatives of all monomials of degree at most `degree`, a row for each variable."""
     powers = monomial_values(point, degree, prime)
     rows = [[0] * len(powers) for _ in point]
-    count(len(point) * len(powers) / 5)
+    count_work(len(point) * len(powers) / 5)
     for k, factors in enumerate(monomial_tables(len(point), degree)):
         for variable, exponent, place in factors:
             rows[variable][k] = exponent * powers[place] % prime
@@ -324,7 +324,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
     """
     exponents, places = exponents_up_to(dim, degree), places_of(dim, degree)
     row = [0] * len(exponents)
-    count(len(exponents) / 10 + 1.5 * sum(map(bool, P)) * sum(map(bool, Q)))
+    count_work(len(exponents) / 10 + 1.5 * sum(map(bool, P)) * sum(map(bool, Q)))
     for a, p in zip(exponents, P, strict=False):
         if p:
             for b, q in zip(exponents, Q, strict=False):
@@ -339,7 +339,7 @@ def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime:
 def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmod_poly:
     """Return the polynomial modulo a prime with these values at distinct nodes, of degree less than their number."""
     table = list(values)
-    count(len(nodes) ** 2 / 2)
+    count_work(len(nodes) ** 2 / 2)
     inverse = cache(lambda difference: pow(difference, -1, prime))
     for k in range(1, len(nodes)):  # Newton's divided differences
         for i in range(len(nodes) - 1, k - 1, -1):

@@ -4,26 +4,26 @@ import threading
 
 import pytest
 
-from kahanmaps.algebra.work import Budget, count, counted, counted_cache, units_at
+from kahanmaps.algebra.work import Budget, count_work, counted, counted_cache, units_at
 from kahanmaps.errors import InputError
 
 
 def test_a_budget_is_spent_by_what_is_counted_after_it_was_made():
-    count(1000)
+    count_work(1000)
     budget = Budget(10)
     assert (budget.spent, budget.left, budget.is_spent) == (0, 10, False)
-    count(9)
+    count_work(9)
     assert (budget.spent, budget.left, budget.is_spent) == (9, 1, False)
-    count(1)
+    count_work(1)
     assert (budget.left, budget.is_spent) == (0, True)
-    count(5)
+    count_work(5)
     assert (budget.spent, budget.left) == (15, 0)
 
 
 def test_fractions_are_counted_as_whole_units_so_that_sums_do_not_depend_on_their_order():
     budget = Budget()
     for _ in range(10):
-        count(0.1)
+        count_work(0.1)
     assert budget.spent == 10
     assert isinstance(counted(), int)
     assert not budget.is_spent
@@ -32,27 +32,27 @@ def test_fractions_are_counted_as_whole_units_so_that_sums_do_not_depend_on_thei
 def test_no_units_are_spent_at_once_and_no_bound_never():
     assert Budget(0).is_spent
     endless = Budget()
-    count(10**12)
+    count_work(10**12)
     assert not endless.is_spent
 
 
 def test_what_a_stage_leaves_goes_to_those_after_it_and_what_it_takes_too_much_is_theirs_as_well():
     stages = Budget(120).share([1, 2, 3])
     assert next(stages).units == 20
-    count(0)
+    count_work(0)
     assert next(stages).units == 48  # 2/5 of all 120
-    count(100)
+    count_work(100)
     assert next(stages).units == 20
     stages = Budget(100).share([1, 1])
     next(stages)
-    count(150)
+    count_work(150)
     last = next(stages)
     assert (last.units, last.is_spent) == (0, True)
 
 
 def test_a_part_is_one_of_what_is_left():
     budget = Budget(100)
-    count(60)
+    count_work(60)
     assert budget.part(0.25).units == 10
 
 
@@ -73,12 +73,12 @@ def test_a_counted_cache_counts_a_hit_as_a_miss():
     @counted_cache(8)
     def inner(x):
         calls.append(x)
-        count(100)
+        count_work(100)
         return 2 * x
 
     @counted_cache(8)
     def outer(x):
-        count(10)
+        count_work(10)
         return inner(x) + inner(x)
 
     def units(function, x):
@@ -96,7 +96,7 @@ def test_threads_count_for_themselves():
 
     def work():
         before = counted()
-        count(1000)
+        count_work(1000)
         others.append(counted() - before)
 
     thread = threading.Thread(target=work)

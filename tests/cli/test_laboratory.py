@@ -3,7 +3,7 @@
 import pytest
 from cli_helpers import time_is_over
 
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.growth import Growth
@@ -77,7 +77,7 @@ def test_values_of_eps_that_disagree_are_reported(monkeypatch):
 
 def test_no_orbit_is_begun_after_the_budget_is_spent(monkeypatch):
     def expensive(*arguments, **options):
-        count(1e6)
+        count_work(1e6)
         return height_growth(*arguments, **{**options, "budget": Budget()})
 
     monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.height_growth", expensive)

@@ -155,9 +155,9 @@ DIMENSION_5 = "b; c; d; e; 3/(b*c*d*e) - a - b - c - d - e"
 )
 def test_the_affine_jacobian_has_the_factors_of_the_homogeneous_one(variables, image, monkeypatch):
     forms = homogeneous_map(by_formulas(variables, image).at(1))
-    expanded, degree = written.written(forms)
+    expanded, degree = written.poles_and_critical_factors(forms)
     monkeypatch.setattr(written, "_is_short", lambda size, degree: False)
-    by_affine_map, same_degree = written.written(forms)
+    by_affine_map, same_degree = written.poles_and_critical_factors(forms)
     assert (sorted(map(repr, by_affine_map)), same_degree) == (sorted(map(repr, expanded)), degree)
 
 

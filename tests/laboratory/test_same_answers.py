@@ -11,7 +11,7 @@ import pytest
 from helpers import quick
 from search_helpers import analysis_of, integrals_of
 
-from kahanmaps.algebra.work import Budget, count, counted
+from kahanmaps.algebra.work import Budget, count_work, counted
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
@@ -116,9 +116,9 @@ def test_work_that_is_not_the_search_is_not_charged_to_it():
     """Negative control: what is counted elsewhere before is not spent, but what is counted meanwhile is."""
     map_ = load("henon_heiles").map
     complete = degree_growth(map_, effort=Budget(100_000))
-    count(1_000_000)
+    count_work(1_000_000)
     assert degree_growth(map_, effort=Budget(100_000)).degrees == complete.degrees
-    less = degree_growth(map_, effort=Budget(100_000), progress=lambda _: count(20_000))
+    less = degree_growth(map_, effort=Budget(100_000), progress=lambda _: count_work(20_000))
     assert len(less.degrees) < len(complete.degrees)
 
 

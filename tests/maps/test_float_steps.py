@@ -113,7 +113,7 @@ def test_an_orbit_in_normal_form_follows_the_exact_one(name):
     orbit = FloatOrbit(system, "1/10", start, 30, form=form, kernel="numpy")
     # Roundings in x are magnified by the change of coordinates and back, and by the derivatives of 30 steps, which add
     # errors of their own: along these orbits by less than 1000 in all.
-    condition = np.linalg.cond(planar_blocks(form, "1/10").into)
+    condition = np.linalg.cond(planar_blocks(form, "1/10").x_to_state)
     largest = 0.0
     for (step, x), point in zip(orbit, balls, strict=True):
         expected = np.array([float(entry.mid()) for entry in point])
@@ -168,9 +168,9 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
     for r, has_pole in enumerate(lines):
         if has_pole:
             at, size = (2 * r, 2) if r < blocks.reals else (4 * r - 2 * blocks.reals, 4)
-            rows = blocks.into @ starts[20 + r]
+            rows = blocks.x_to_state @ starts[20 + r]
             rows[at : at + size] = [1 - 2.0**-43, *[0.0] * (size - 1)]
-            starts[20 + r] = blocks.out @ rows
+            starts[20 + r] = blocks.state_to_x @ rows
     system, form = MEMBERS[name].chosen.system, FORMS[name]
     entry, other = (FloatEnsemble(system, "1/10", starts, form=form, kernel=k, sampled=10) for k in ("numpy", "numba"))
     for it in (entry, other):

@@ -116,7 +116,7 @@ def _measured_commutator(
 
 
 class _PairCommand(click.Command):
-    """A command with an argument and an inline system, which are f and g in the order in which they are typed.
+    """A command with an argument and an inline system: the one that is typed first is f, the other g.
 
     click processes arguments after all options, so this order must be determined here.
     """

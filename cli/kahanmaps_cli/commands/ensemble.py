@@ -54,7 +54,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
           --steps 1000 --integral F1
 
     FILE.npy is an array (records, orbits, dimension): record k holds the points after
-    k K steps, with K of --every. It grows during the computation and is
+    k*K steps, where K is the value of --every. It grows during the computation and is
     valid at all times, also after Ctrl-C. It contains NaN for orbits that ended early. Initial points in text files are
     exact numbers, separated by commas or blanks; # begins a comment, and the first line may name the columns.
 

@@ -91,7 +91,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         else:
             print_stdout(f"steps\t{result.steps} after {result.transient}")
             columns = {"per unit of time": result.mean} if file.map.time_steps else {}
-            columns |= {"per step": result.per_step, "spread": result.spread, "change from half": result.change}
+            columns |= {"per step": result.per_step, "spread": result.spread, "change from first half": result.change}
             rows = [
                 [str(k), *(f"{number:.6g}" for number in numbers)]
                 for k, numbers in enumerate(zip(*columns.values(), strict=True), 1)

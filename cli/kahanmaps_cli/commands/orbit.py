@@ -55,8 +55,8 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     "--kernel", type=click.Choice(("numpy", "numba")), help="Kernel for float orbits; numba needs kahanmaps[fast]."
 )
 @opt.integral_option(
-    "Add a column with a function: an expression in the variables and eps, the name of an integral of the file, or, "
-    "except with --arithmetic float, known for all integrals that follow from theorems."
+    "Add a column with a function: an expression in the variables and eps, the name of an integral of the file, or the "
+    "word 'known': all integrals that follow from theorems (not with --arithmetic float)."
 )
 @click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default: by the suffix of FILE, otherwise text.")

@@ -64,7 +64,7 @@ _LEGEND = {
     type=Section(),
     metavar="N",
     multiple=True,
-    help="Restrict to this section (1 to 9, beyond or conclusions). Repeatable.",
+    help="Restrict to this section: 1 to 9, beyond (or 10) or conclusions (or 11). Repeatable.",
 )
 @click.option(
     "--order",

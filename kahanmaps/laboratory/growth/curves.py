@@ -26,7 +26,7 @@ from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomial_work import counted_product, gcd_units, minpoly_units, product_units, series_units
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow, kernel, row_units
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import Map, MapFamily
@@ -128,11 +128,11 @@ class Line:
         if denominator.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
         common = denominator.gcd(self._random_combination(numerators))
-        count(gcd_units(len(denominator), len(common)))
+        count_work(gcd_units(len(denominator), len(common)))
         self._require_budget()
         curve, t = [], nmod(self._rng.randrange(self.prime), self.prime)
         for entry in (*numerators, denominator):
-            count(product_units(len(common), len(entry) - len(common) + 1) + len(entry) / 20)
+            count_work(product_units(len(common), len(entry) - len(common) + 1) + len(entry) / 20)
             quotient = entry // common
             # Once in about p the random combination has a factor that not all numerators have.
             if quotient(t) * common(t) != entry(t):
@@ -153,7 +153,7 @@ class Line:
         """Return the coordinates of the next curve as power series, to `length` terms."""
         X = [entry.truncate(length) for entry in self._X]
         values = [entry.truncate(length) for entry in equation.monomials(X, counted_product)]
-        count(row_units(equation, length))
+        count_work(row_units(equation, length))
         try:
             rows = equation.rows(values, nmod_poly([0], self.prime))
             *x, denominator = kernel(rows, 1, length, [], self._require_budget)
@@ -161,7 +161,7 @@ class Line:
             raise ZeroDivisionError("the point t = 0 of the line has no image") from None
         if not int(denominator[0]):
             raise ZeroDivisionError("the point t = 0 of the line has no image")
-        count(series_units(length) + len(x) * product_units(length, length))
+        count_work(series_units(length) + len(x) * product_units(length, length))
         inverse = denominator.inverse_series_trunc(length)
         return [entry.mul_low(inverse, length) for entry in x]
 
@@ -173,7 +173,7 @@ class Line:
             )
             if int(denominator_series[0]) == 0:
                 continue
-            count(series_units(length) + minpoly_units(length) + (2 + len(x)) * product_units(length, length))
+            count_work(series_units(length) + minpoly_units(length) + (2 + len(x)) * product_units(length, length))
             inverse = denominator_series.inverse_series_trunc(length)
             values = [int(c) for c in numerator_series.mul_low(inverse, length).coeffs()]
             # Numerator and denominator may have the same degree; without its first term the series is t times a

@@ -34,7 +34,7 @@ from flint import arb, fmpq, fmpq_mpoly, nmod_mat, nmod_poly
 from kahanmaps.algebra.chance import derive_seed
 from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.algebra.printing import attributes
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.defaults import budget_for
@@ -236,7 +236,7 @@ def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> I
     iterate = list(X)
     for _ in range(_MAX_FORMULAS):
         image = [entry.compose(*iterate, symbol, ctx=ring) for entry in forms]
-        count(20 + 10 * sum(map(len, image)))  # includes the gcd
+        count_work(20 + 10 * sum(map(len, image)))  # includes the gcd
         common = reduce(fmpq_mpoly.gcd, image)
         iterate = [entry / common for entry in image]
         yield max(degree_in(entry, 3) for entry in iterate)

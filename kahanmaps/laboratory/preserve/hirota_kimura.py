@@ -40,7 +40,7 @@ from kahanmaps.algebra.modular_matrices import (
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import chinese, simple_fraction
-from kahanmaps.algebra.work import SPENT, Budget, count
+from kahanmaps.algebra.work import SPENT, Budget, count_work
 from kahanmaps.laboratory.modular_points import (
     Exponent,
     ModularMap,
@@ -157,7 +157,7 @@ def relations_on_orbit(
     if independent > rank_bound or not leading <= new_leading:
         return relations_on_orbit(map_, degree)  # `rank_bound` or `leading` came from a special orbit
     # The gradient of a relation: that of its dependent monomial minus the combination of those of the independent ones.
-    count(len(exponents) / 2 + map_.dim * len(support) / 3)
+    count_work(len(exponents) / 2 + map_.dim * len(support) / 3)
     monomial_gradients = [[row[k] for k in support] for row in monomial_derivatives(point, degree, map_.prime)]
     at_pivots = [[row[k] for k in pivot_columns] + [0] * (form.nrows() - independent) for row in monomial_gradients]
     gradients = matrix(monomial_gradients, map_.prime) - multiply(matrix(at_pivots, map_.prime), form)
@@ -460,7 +460,7 @@ def _number_text(entry: int, other_entry: int, map_: ModularMap, other_map: Modu
             for residue, modular_map in ((entry, map_), (other_entry, other_map))
         ]
         [residue] = chinese(residues[0], map_.prime, residues[1], other_map.prime)
-        count(60)
+        count_work(60)
         value = simple_fraction(residue, map_.prime * other_map.prime, _SPARE_BITS)
         if value is not None:
             number, q = format_number(value), "" if value.q == 1 else f"{value.q}*"

@@ -39,7 +39,7 @@ from kahanmaps.algebra.polynomials import (
     ring,
 )
 from kahanmaps.algebra.printing import format_product
-from kahanmaps.algebra.work import Budget, count, counted_cache
+from kahanmaps.algebra.work import Budget, count_work, counted_cache
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
@@ -166,7 +166,7 @@ class _Line:
 
         def step(t: int) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
             """Return the point of the curve at t, its image and Z."""
-            count(30 + 15 * n)
+            count_work(30 + 15 * n)
             *X, Z = (factor.field.convert(int(entry(t))) for entry in curve)
             if Z == 0:
                 raise SingularStep("a point of a curve is at infinity", (), factor.eps)
@@ -203,7 +203,7 @@ class _Line:
         degree_of_g = degree_in(g, n)
         powers = [list(accumulate(repeat(c, degree_of_g), mul, initial=nmod_poly([1], p))) for c in curve]
         total = nmod_poly([0], p)
-        count(50 + 15 * len(g))
+        count_work(50 + 15 * len(g))
         for monomial, coefficient in g.terms():
             exponents = [int(e) for e in monomial]
             factors = (c**e for c, e in zip(parameters, exponents[n:], strict=True))
@@ -243,7 +243,7 @@ def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
             continue
         for k, Q in enumerate(base):
             common = P.gcd(Q)
-            count(2 + (P.degree() + Q.degree()) / 3)
+            count_work(2 + (P.degree() + Q.degree()) / 3)
             if common.degree() > 0:
                 base.pop(k)
                 waiting += [P // common, Q // common, common]
@@ -275,7 +275,7 @@ def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
     if not rows:
         return []
     size, width = len(rows), len(rows[0])
-    count(10 + size**2 * (size + width) / 50)
+    count_work(10 + size**2 * (size + width) / 50)
     augmented = fmpz_mat([[*row, *(int(i == k) for i in range(size))] for k, row in enumerate(rows)]).hnf()
     return [[int(e) for e in row[width:]] for row in augmented.tolist() if not any(row[:width])]
 
@@ -347,7 +347,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
         p, residues, products = map_.prime, GF(map_.prime), list[int]()
         parameters = [residues.convert(c) for c in (*map_.values, map_.eps)]
         for (x, image), vector in zip(map_.pairs(len(vectors)), vectors, strict=True):
-            count(50 + 10 * n)
+            count_work(50 + 10 * n)
             total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
             for g, k in zip(polynomials, vector[1:], strict=True):
                 if k:

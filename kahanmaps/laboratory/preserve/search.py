@@ -31,8 +31,7 @@ from kahanmaps.algebra.modular_matrices import null_space
 from kahanmaps.algebra.polynomials import RationalFunction, irreducible_factors, over_one_denominator, ring, substitute
 from kahanmaps.algebra.residues import chinese, simple_fraction
 from kahanmaps.algebra.roots import Root
-from kahanmaps.algebra.work import SPENT, Budget
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import SPENT, Budget, count_work
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.laboratory import Laboratory, reconstruct_at
 from kahanmaps.laboratory.modular_points import ModularFlow, ModularMap, NoPoint

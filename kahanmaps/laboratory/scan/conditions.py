@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from kahanmaps.algebra.modular_matrices import pivots
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import count_work
 from kahanmaps.laboratory.scan.lift import (
     lift_conjugate_points,
     lift_hypersurfaces,

@@ -23,7 +23,7 @@ from flint import fmpq, fmpq_mpoly, fmpz_mat
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.algebra.residues import chinese, rational_reconstruction, rational_vector
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.laboratory.modular_points import exponents_up_to, product_of
 from kahanmaps.laboratory.scan.members import solutions
 from kahanmaps.laboratory.scan.modular_components import Rows
@@ -66,12 +66,12 @@ def lift_linear(
         pairs += sizes[p, q]
         if pairs > _MAX_PAIRS:
             break
-        count(15 * sizes[p, q])
+        count_work(15 * sizes[p, q])
         for at_p, at_q in product(subspaces[p], subspaces[q]):
             rows = _lift_rows(at_p, p, at_q, q)
             if rows is None or rows in lifted:
                 continue
-            count(15 * len(sets))
+            count_work(15 * len(sets))
             primes = tuple(r for r in sorted(sets) if residues(rows, r) in sets[r])
             height = max((max(abs(int(x.p)), int(x.q)) for row in rows for x in row), default=0)
             missing = sum(r not in primes and residues(rows, r) is not None for r in sets)
@@ -181,7 +181,7 @@ def _multiply(forms: Sequence[Sequence[int]], p: int, variables: int) -> list[in
         return next(d for d in range(100) if len(exponents_up_to(variables, d)) == len(form))
 
     degree = sum(map(degree_of, forms))
-    count(5 * sum(map(len, forms)) + (10 + len(exponents_up_to(variables, degree))) * len(forms))
+    count_work(5 * sum(map(len, forms)) + (10 + len(exponents_up_to(variables, degree))) * len(forms))
     row = reduce(lambda a, b: product_of(a, b, variables, degree, p) or [], forms, [1])
     scale = pow(next(c for c in row if c), -1, p)
     return [c * scale % p for c in row]
@@ -256,7 +256,7 @@ def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[
     size = len(residues)
     rows = [[modulus, *[0] * (size - 1)]]
     rows += [[-r, *(int(i == k) for i in range(1, size))] for k, r in enumerate(residues[1:], 1)]
-    count(20 * size + size**3 * modulus.bit_length() / 500)
+    count_work(20 * size + size**3 * modulus.bit_length() / 500)
     shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
     height = max(abs(int(c)) for c in shortest)
     # Any residues have a relation with (2 height + 1)^size of about the modulus; only much smaller ones count.

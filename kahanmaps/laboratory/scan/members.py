@@ -11,8 +11,7 @@ from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 
 from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import Budget
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import BadPrime

@@ -15,7 +15,7 @@ from typing import Any
 from flint import Ordering, nmod_mpoly_ctx
 
 from kahanmaps.algebra.modular_matrices import echelon, null_space, pivots
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import count_work
 from kahanmaps.laboratory.modular_points import Point, exponents_up_to, monomial_tables
 
 Rows = tuple[tuple[int, ...], ...]

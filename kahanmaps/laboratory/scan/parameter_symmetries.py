@@ -14,7 +14,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.laboratory.scan.lift import residues
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
@@ -62,10 +62,10 @@ def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: 
 def _permutes_members(change: Change, p: int, special: Mapping[Point, Degrees]) -> bool:
     """Return whether every special member modulo p is mapped to one with the same degrees, or to infinity."""
     rows = residues(change, p)
-    count(20)
+    count_work(20)
     for point, degrees in special.items() if rows is not None else ():
         *image, denominator = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows or ())
-        count(5)
+        count_work(5)
         if denominator and special.get(tuple(x * pow(denominator, -1, p) % p for x in image)) != degrees:
             return False
     return True

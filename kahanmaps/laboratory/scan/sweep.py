@@ -15,7 +15,7 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import count_work
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import MapFamily
 

@@ -29,7 +29,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomial_work import counted_product, factored, gcd_units
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.following import AlongCurves, Range, TestCurve, divided_powers
 from kahanmaps.laboratory.singular.jets import Function, JetStep, form_order, image_of, modulo, roots_modulo
@@ -79,7 +79,7 @@ def components(
         for entry, w in zip(curve, direction, strict=True)
     ]
     image = equation.image(X, ring.constant(0), counted_product)
-    count(2 * sum(map(len, image)))
+    count_work(2 * sum(map(len, image)))
     common = reduce(nmod_mpoly.gcd, image)
     image = [entry / common for entry in image]
     multiplicities: dict[str, tuple[nmod_mpoly, list[int]]] = {}
@@ -170,7 +170,8 @@ class _Curve:
 
     @cached_property
     def key(self) -> Key:
-        """The key of its hypersurface: whether it is contracted, which forms vanish there, and the first rows.
+        """The key of its hypersurface: whether it is contracted, which forms vanish there, and the first
+        `rows`.
 
         Raises OrbitDataUnknown where there is no first step.
         """
@@ -412,7 +413,7 @@ def _on_line(
     a, b, across = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
     line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
     image = equation.image(line, nmod_poly([], p), counted_product)
-    count(sum(gcd_units(len(entry)) for entry in image))
+    count_work(sum(gcd_units(len(entry)) for entry in image))
     common = reduce(nmod_poly.gcd, image)
     image = [entry // common for entry in image]
     degree = max(int(entry.degree()) for entry in image)

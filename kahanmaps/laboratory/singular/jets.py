@@ -17,7 +17,7 @@ from flint import Ordering, nmod, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_pol
 
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.polynomial_work import product_units, roots_units, series_units
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.maps.equation import Equation
 
 # Returns the order in t of a function along a curve with these coordinates; None if it is at least the precision.
@@ -154,10 +154,10 @@ def _image(
     the pivots of the curve must be given. Raises PrecisionTooLow.
     """
     zero, units_per_product = X[0] * 0, product_units(known_terms, known_terms)
-    count(row_units(equation, known_terms))
+    count_work(row_units(equation, known_terms))
 
     def times(left: nmod_poly, right: nmod_poly) -> nmod_poly:
-        count(units_per_product)
+        count_work(units_per_product)
         return left.mul_low(right, known_terms)
 
     if equation.dim >= _MIN_ELIMINATION_DIMENSION and equation.explicit is None:
@@ -190,14 +190,16 @@ def kernel(
         power, i, j = pivots[k]
         free_rows.remove(i)
         free_columns.remove(j)
-        count(units_per_inversion + units_per_product * len(free_columns) * 2)  # includes the products for the kernel
+        count_work(
+            units_per_inversion + units_per_product * len(free_columns) * 2
+        )  # includes the products for the kernel
         inverse = rows[i][j].right_shift(power).inverse_series_trunc(known_terms - power)
         scaled_row = {c: rows[i][c].right_shift(power).mul_low(inverse, known_terms - power) for c in free_columns}
         for r in free_rows:
             check()
             factor = rows[r][j]
             if not factor.is_zero():
-                count(units_per_product * sum(not entry.is_zero() for entry in scaled_row.values()))
+                count_work(units_per_product * sum(not entry.is_zero() for entry in scaled_row.values()))
                 for c in free_columns:
                     if not scaled_row[c].is_zero():
                         rows[r][c] = rows[r][c] - factor.mul_low(scaled_row[c], known_terms)
@@ -236,9 +238,9 @@ def roots_modulo(polynomial: nmod_poly) -> list[int]:
     [2, 3]
     """
     t = nmod_poly([0, 1], polynomial.modulus())
-    count(roots_units(len(polynomial)))
+    count_work(roots_units(len(polynomial)))
     linear = polynomial.gcd(t.pow_mod(polynomial.modulus(), polynomial) - t) if polynomial.degree() > 1 else polynomial
-    count(roots_units(1, len(linear)))
+    count_work(roots_units(1, len(linear)))
     return [-int(factor[0]) % polynomial.modulus() for factor, _ in linear.factor()[1]]
 
 
@@ -256,17 +258,17 @@ def form_order(form: Any, field: PrimeField) -> Function:
     p, reduced = field.prime, modulo(form, field)
     terms = [(exponents, nmod_poly([int(c)], p)) for exponents, c in reduced.terms()]
     products = sum(map(bool, chain.from_iterable(exponents for exponents, _ in terms)))
-    count(20 + 2 * len(terms))
+    count_work(20 + 2 * len(terms))
 
     def order(X: Sequence[nmod_poly], precision: int) -> int | None:
-        count(2 + len(terms) / 5)
+        count_work(2 + len(terms) / 5)
         if int(reduced(*(int(entry[0]) for entry in X))):
             return 0
         if precision > _LOW_PRECISION:  # most orders are small, and few terms show them
             low = order([entry.truncate(_LOW_PRECISION) for entry in X], _LOW_PRECISION)
             if low is not None:
                 return low
-        count(products * (0.3 + product_units(precision, precision)))
+        count_work(products * (0.3 + product_units(precision, precision)))
         powers = [[nmod_poly([1], p), entry] for entry in X]
         total = nmod_poly([], p)
         for exponents, term in terms:
@@ -290,7 +292,7 @@ def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] |
     """Return the image of a point of projective space modulo p; None at an indeterminacy point."""
     prime, X = equations[0].over.characteristic, list(point)
     for equation in equations:
-        count(row_units(equation, 1) + equation.dim**2 / 2)
+        count_work(row_units(equation, 1) + equation.dim**2 / 2)
         values = [nmod(x, prime) for x in X]
         if equation.explicit is not None:
             X = [int(x) for x in equation.image(values, nmod(0, prime))]

@@ -25,7 +25,7 @@ from kahanmaps.algebra.polynomial_work import counted_product, product_units
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.following import (
@@ -124,7 +124,7 @@ def critical_points(
             terms = gap + power
 
             def times(left: nmod_poly, right: nmod_poly, terms: int = terms) -> nmod_poly:
-                count(product_units(terms, terms))
+                count_work(product_units(terms, terms))
                 return left.mul_low(right, terms)
 
             at_point, *nearby = (int(function(X, times)[terms - 1]) for X in curves)

@@ -24,7 +24,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomial_work import counted_product, factored
 from kahanmaps.algebra.printing import all_fields, attributes, format_number, format_polynomial
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.hard_stop import TimeLimit
@@ -54,7 +54,7 @@ from kahanmaps.laboratory.singular.written import (
     is_long,
     name_of,
     period_of,
-    written,
+    poles_and_critical_factors,
 )
 from kahanmaps.maps.convention import resolve_eps
 from kahanmaps.maps.implicit import MapFamily
@@ -221,7 +221,7 @@ def singularities(
         if is_long(map_at_eps):
             raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
         map_form = homogeneous_map(map_at_eps)
-        count(3 * sum(map(len, map_form.forms)))
+        count_work(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
         try:
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
@@ -251,7 +251,7 @@ def singularities(
         return replace(run, is_undefined=is_undefined, is_dominant=False)
     if map_form.degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
-    forms, critical_degree = written(map_form)
+    forms, critical_degree = poles_and_critical_factors(map_form)
     if critical_degree is None and len(map_at_eps.factors) > 1:
         followed_run = _map_by_map(map_, replace(run, denominator="?"), seed, limits, progress)
         if followed_run is not None:

@@ -24,7 +24,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomial_work import counted_product, factored
 from kahanmaps.algebra.polynomials import degree_in, ring
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.outcomes import Hypersurface, HypersurfaceForm, Tracking, outcome_of
@@ -58,7 +58,7 @@ class Word:
         )
 
 
-def written(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
+def poles_and_critical_factors(map_: HomogeneousMap) -> tuple[list[HypersurfaceForm], int | None]:
     """The poles of a map and the factors of its Jacobian determinant, with the degree of the determinant; exact.
 
     Where the determinant is too large the degree is None, and the list has only the poles and infinity.
@@ -101,7 +101,7 @@ def followed_map_by_map(
     equations = map_.at(eps).equations
     period = period_of(equations)
     letters = [homogeneous_map(factor) for factor in map_.at(eps).factors[:period]]
-    by_letter = [written(letter) for letter in letters]
+    by_letter = [poles_and_critical_factors(letter) for letter in letters]
     if any(degree is None for _, degree in by_letter):
         return None
     followed = [
@@ -185,11 +185,11 @@ def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
     multiply(denominator, n + 1)
     rows = []
     for numerator in numerators:
-        count(10 * (len(numerator) + len(denominator)))
+        count_work(10 * (len(numerator) + len(denominator)))
         common = numerator.gcd(denominator)
         P, Q = numerator / common, denominator / common
         row = [counted_product(Q, P.derivative(j)) - counted_product(P, Q.derivative(j)) for j in range(n)]
-        count(sum(map(len, row)))
+        count_work(sum(map(len, row)))
         content = reduce(lambda left, right: left.gcd(right), row)
         multiply(Q, -2)
         multiply(content, 1)
@@ -292,6 +292,6 @@ def forms_over_eps(rows: Sequence[Sequence[fmpq_mpoly]], eps: fmpq | None = None
         return context.from_dict(terms).compose(*X, value, ctx=context)
 
     minors = kernel_minors([[form(entry) for entry in row] for row in rows], counted_product)
-    count(5 * sum(map(len, minors)))
+    count_work(5 * sum(map(len, minors)))
     common = reduce(fmpq_mpoly.gcd, minors)
     return [minor / common for minor in minors]

@@ -20,7 +20,7 @@ from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import SolutionComponent
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.checks import theorems
 from kahanmaps.checks.certify import certify
 from kahanmaps.checks.claims import Evidence, Finding
@@ -48,7 +48,7 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
     for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
         if g == f.scaled(factor):
             return Finding(claim, theorems.PROVED, Evidence(theorems.METHOD, why), formula=_FORMULA)
-    count(2_000 + 350 * f.dim**2)
+    count_work(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))
     proof = theorems.commuting_by_splitting(f, g) or proof_by_affine_lemma(f, [g]) or _in_dimension_one(f, g)
     return certify(claim, identity, settings, proof, formula=_FORMULA)
@@ -56,7 +56,7 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
 
 def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:
     """Certify that the Kahan maps of f and of every member of a linear family commute, for every eps."""
-    count(2_000 + 350 * f.dim**2 * len(family.free))
+    count_work(2_000 + 350 * f.dim**2 * len(family.free))
     members = [field_at(space, family.point), *(field_at(space, family.direction(i)) for i in family.free)]
     proof = proof_by_affine_lemma(f, members) or _in_dimension_one(f, f)
     claim = "the Kahan maps of f and of every member g of the family commute"

@@ -24,7 +24,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.small_systems import independent
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SHAPES = ("linear", "quadratic")
@@ -124,7 +124,7 @@ class _SeriesMap:
         terms_of = [len(c) if isinstance(c, fmpq_mpoly) else 1 for terms in self._terms for c, _, _ in terms]
         for order in range(len(y)):
             lengths = [len(e) if isinstance(e, fmpq_mpoly) else 1 for row in (*y[: order + 1], *v) for e in row]
-            count((order + 1) * (2 * len(terms_of) + sum(terms_of) * sum(lengths) / len(lengths) / 2))
+            count_work((order + 1) * (2 * len(terms_of) + sum(terms_of) * sum(lengths) / len(lengths) / 2))
             value = [fmpq(0)] * len(y[0])
             for i, terms in enumerate(self._terms):
                 for c, j, k in terms:
@@ -200,7 +200,7 @@ def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat |
                         for k, (phi, derivative) in itertools.product(range(n), scalars)
                     ]
                 )
-        count(500 + len(rows) * len(rows[0]) * (2 + len(rows[0]) / 400))
+        count_work(500 + len(rows) * len(rows[0]) * (2 + len(rows[0]) / 400))
         kernel = nullspace(QQ, fmpq_mat(rows))
         if len(kernel) > MAX_DIMENSION:
             return CommutingSpace((f,), (QQ.identity(n),) * (shape == "linear"), len(kernel))

@@ -19,7 +19,7 @@ from flint import fmpq, fmpq_mat, fmpz
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 12
@@ -134,9 +134,9 @@ def _signed_permutations_of(
         for checked, index in enumerate(equations[len(p) - 1], 1):
             image = numbers.get(tuple(p[k] for k in index), 0) * math.prod(s[k] for k in index)
             if image != numbers.get(index, 0) * sign:
-                count(2 + 1.5 * checked)
+                count_work(2 + 1.5 * checked)
                 return False
-        count(2 + 1.5 * len(equations[len(p) - 1]))
+        count_work(2 + 1.5 * len(equations[len(p) - 1]))
         return True
 
     def extend(p: list[int], s: list[int]) -> Iterator[list[tuple[int, int]] | None]:

@@ -22,7 +22,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import coefficients_in, linear_combinations, ring
 from kahanmaps.algebra.printing import attributes, format_polynomial, plain
 from kahanmaps.algebra.small_systems import SolutionComponent, solve_system
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import PrintableResult, ResultPart
 from kahanmaps.laboratory.defaults import budget_for
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
@@ -227,7 +227,7 @@ def _add_infinitesimal(symmetries: Symmetries) -> None:
             for monomial, value in p.terms():
                 rows.setdefault((k, tuple(monomial)), [fmpq(0)] * len(columns))[place] = value
     table = list(rows.values()) or [[fmpq(0)] * len(columns)]
-    count(200 + len(table) * len(columns) * (3 + len(columns) / 50))
+    count_work(200 + len(table) * len(columns) * (3 + len(columns) / 50))
     # In echelon form from the right, with s last, the linear fields come first and are a basis of their own.
     basis = nullspace(QQ, fmpq_mat([row[:-1] for row in table]))
 
@@ -304,7 +304,7 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
     while waiting:
         element = waiting.pop()
         for matrix in matrices:
-            count(5 + n**2)
+            count_work(5 + n**2)
             product = element * matrix
             if _key(product) not in group:
                 group.add(_key(product))
@@ -380,7 +380,7 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
     (-1,)
     """
     n = f.dim
-    count(100 + 6 * n**3)
+    count_work(100 + 6 * n**3)
     zero = (fmpq(0),) * n
     if is_symmetry(f, S, zero, sign):
         return zero
@@ -419,7 +419,7 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
     [s^2 - s, 2*s - 2]
     """
     n, entries = f.dim, [entry for row in S for entry in row]
-    count(100 + 10 * n**4)
+    count_work(100 + 10 * n**4)
     joint = ring([f"x{j}" for j in range(n)] + [f"s{k}" for k in range(n * n)])
     x, s = joint.gens()[:n], joint.gens()[n:]
     images = [sum((s[i * n + j] * x[j] for j in range(n)), joint.constant(0)) for i in range(n)]

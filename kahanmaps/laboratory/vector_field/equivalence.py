@@ -21,7 +21,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
 from kahanmaps.algebra.printing import attributes, format_number, format_polynomial
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.work import Budget, count
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.inline import as_file
@@ -196,7 +196,7 @@ def _solve_for_equivalence(
     contain c and q, and are solved first.
     """
     n = f.dim
-    count(300 * n)
+    count_work(300 * n)
     entries = [(i, j) for i in range(n) for j in range(n) if order is None or order[j] == i]
     # Where there is a choice, unknowns are set to their defaults in this order.
     scales = [f"t{i}{j}" for i, j in entries]

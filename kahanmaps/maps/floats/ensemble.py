@@ -144,7 +144,7 @@ class FloatEnsemble(AttributeHints):
         if form is not None:
             require_same_system(form, map_)
             self._blocks = planar_blocks(form, -epsilon if backward else epsilon)
-            state = _product(self._blocks.into, state)
+            state = _product(self._blocks.x_to_state, state)
             self._base = self._blocks.integrals(state)
             self._largest = np.zeros(self._base.shape)
         self._factors = (map_over.inverse if backward else map_over).factors
@@ -320,14 +320,14 @@ class FloatEnsemble(AttributeHints):
         self._interrupted = False
 
     def _points_of(self, record: FloatArray) -> FloatArray:
-        """Return the points x (count, n, dim) of recorded states (count, rows, n)."""
-        count, _, n = record.shape
+        """Return the points of n orbits, an array (records, n, dim), from their states, an array (records, rows, n)."""
+        records, _, n = record.shape
         if self._blocks is None:
             return np.ascontiguousarray(record.transpose(0, 2, 1))
         if n == 1:  # multiplying contiguous numbers is fastest
             record = np.ascontiguousarray(record[:, :, 0].T)[None]
-        x = _product(self._blocks.out, record)
-        return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(count, n, self.system.dim)
+        x = _product(self._blocks.state_to_x, record)
+        return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(records, n, self.system.dim)
 
 
 class WatchedFunction:

@@ -71,7 +71,7 @@ class Lyapunov(ResultPart):
     def text(self) -> str:
         """The table of the exponents."""
         lines = [f"orbits\t{self.orbits - self.ended} of {self.orbits}", f"steps\t{self.steps} after {self.transient}"]
-        lines.append("# exponent\tper unit of time\tper step\tspread\tchange from half")
+        lines.append("# exponent\tper unit of time\tper step\tspread\tchange from first half")
         table = zip(self.mean, self.per_step, self.spread, self.change, strict=True)
         lines += ["\t".join([str(k), *(f"{number:.6g}" for number in row)]) for k, row in enumerate(table, 1)]
         return "\n".join(lines)

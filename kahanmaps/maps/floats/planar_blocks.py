@@ -56,8 +56,8 @@ class PlanarBlocks:
     """The planar maps of a normal form at one eps, in doubles.
 
     The `reals` real blocks come first, by increasing root; then one block for each root with positive imaginary part.
-    `coefficients` has a row (a, b, c, d) of complex numbers for each block. `into` is the 2m x 2m matrix that maps x to
-    the rows of the blocks, and `out` is its inverse.
+    `coefficients` has a row (a, b, c, d) of complex numbers for each block. `x_to_state` is the 2m x 2m matrix that
+    maps x to the rows of the blocks, and `state_to_x` is its inverse.
 
     >>> from flint import fmpq_poly
     >>> from kahanmaps.family.random_members import random_member_with_chi
@@ -70,14 +70,14 @@ class PlanarBlocks:
     reals: int
     coefficients: NDArray[np.complex128]
     kappa: NDArray[np.complex128]
-    into: FloatArray
-    out: FloatArray
+    x_to_state: FloatArray
+    state_to_x: FloatArray
     roots: tuple[complex, ...]
 
     @property
     def rows(self) -> int:
         """The number of rows of a state, 2m."""
-        return len(self.into)
+        return len(self.x_to_state)
 
     @property
     def labels(self) -> tuple[str, ...]:

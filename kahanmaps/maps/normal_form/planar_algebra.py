@@ -19,7 +19,15 @@ from typing import Any
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mat, nmod, nmod_poly
 
 from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
-from kahanmaps.algebra.integers import SMALL_PRIMES, common_part, content, over_one, radical, split_by_primes, without
+from kahanmaps.algebra.integers import (
+    SMALL_PRIMES,
+    common_part,
+    content,
+    over_common_denominator,
+    radical,
+    split_by_primes,
+    without,
+)
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.normal_form.planar_integers import LevelBlock
 
@@ -86,7 +94,7 @@ class AlgebraBlock(LevelBlock):
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
-            numerators, denominator = over_one(e for z in (U, V) for e in (z / W).coefficients)
+            numerators, denominator = over_common_denominator(e for z in (U, V) for e in (z / W).coefficients)
             return numerators, denominator, denominator
         # W' and the norm N = W W', by Faddeev and LeVerrier's recursion: traces instead of determinants.
         algebra, power = W.field, W

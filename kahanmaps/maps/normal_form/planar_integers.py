@@ -18,7 +18,7 @@ from typing import Any
 
 from flint import fmpq, fmpz, nmod
 
-from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_one, radical
+from kahanmaps.algebra.integers import common_part, content, divide_exactly, over_common_denominator, radical
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.somos import Integers
 
@@ -82,13 +82,13 @@ class IntegerBlock(LevelBlock):
     """
 
     def __init__(self, cubic: Sequence[fmpq], eps: fmpq, u: fmpq, v: fmpq) -> None:
-        integers, denominator = over_one(cubic)
+        integers, denominator = over_common_denominator(cubic)
         common = content(integers)
         if common == 0:
             common = fmpz(1)
         self.block = PlanarBlock(*(entry // common for entry in integers))
         self.scale: fmpq = 2 * eps * fmpq(common, denominator)
-        (U, V), W = over_one((u * self.scale, v * self.scale))
+        (U, V), W = over_common_denominator((u * self.scale, v * self.scale))
         self.start = U, V, W
 
     @cached_property
@@ -175,7 +175,7 @@ class PlaneIntegers(Integers):
         self, scales: Sequence[fmpq], terms: Sequence[fmpz], lifts: Sequence[IntegerTriple], divisor: fmpz
     ) -> IntegerTriple:
         """The primitive triple of the sum of scale times term times lift, which the divisor divides."""
-        factors, _ = over_one(scales)
+        factors, _ = over_common_denominator(scales)
         undivided = [
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))
             for i in range(3)
@@ -186,7 +186,7 @@ class PlaneIntegers(Integers):
 
 
 def _cleared(points: Sequence[Triple]) -> list[IntegerTriple]:
-    integers, _ = over_one(chain(*points))
+    integers, _ = over_common_denominator(chain(*points))
     return list(zip(integers[::3], integers[1::3], integers[2::3], strict=True))
 
 

@@ -20,7 +20,7 @@ from typing import Any
 from flint import fmpq, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.integers import content, divide_exactly, is_all, over_one, radical
+from kahanmaps.algebra.integers import content, divide_exactly, is_all, over_common_denominator, radical
 from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.normal_form.planar_algebra import AlgebraBlock
 from kahanmaps.maps.normal_form.planar_block import Triple
@@ -58,7 +58,7 @@ class Assembly:
                 for planar_block, table in zip(blocks, matrices, strict=True)
             ]
             support = tuple(i for i, form in enumerate(forms) if any(entry != 0 for entry in form))
-            _, denominator = over_one(chain(*forms))
+            _, denominator = over_common_denominator(chain(*forms))
             integers = [tuple((entry * denominator).p for entry in forms[i]) for i in support]
             factors, dividing = [denominator], []
             for i, form in zip(support, integers, strict=True):

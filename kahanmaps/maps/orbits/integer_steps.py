@@ -12,7 +12,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
-from kahanmaps.algebra.integers import content, over_one
+from kahanmaps.algebra.integers import content, over_common_denominator
 from kahanmaps.maps.orbits.elimination import is_unique_solution, solve_fraction_free
 from kahanmaps.maps.orbits.forward_substitution import forward_substitution
 from kahanmaps.maps.orbits.integer_point import IntegerPoint, UnreducedPoint
@@ -43,7 +43,7 @@ class IntegerSteps:
         entries = [fmpz(0)] * (n * (n + 1) * len(exponents))
         self._scale = fmpz(1)
         for i, row in enumerate(terms):
-            _, denominator = over_one(coefficient for entry in row for _, coefficient in entry)
+            _, denominator = over_common_denominator(coefficient for entry in row for _, coefficient in entry)
             self._scale *= denominator
             for j, entry in enumerate(row):
                 for k, coefficient in entry:

@@ -29,7 +29,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField,
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, evaluate, linear_combinations, primitive_part
 from kahanmaps.algebra.printing import format_polynomial
-from kahanmaps.algebra.work import count
+from kahanmaps.algebra.work import count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.errors import counted
 from kahanmaps.maps.kahan import KahanFamily, SystemLike
@@ -218,7 +218,7 @@ def _determinant_along(
 ) -> fmpq_poly:
     """Interpolate the extactic determinant at start + t direction as a polynomial in t."""
     m = len(free)
-    count(1000 + 3 * m**5)  # the work of the whole search for hyperplanes, of which this is the main part
+    count_work(1000 + 3 * m**5)  # the work of the whole search for hyperplanes, of which this is the main part
     nodes = range(m * (m + 3) // 2 + 1)
     values = [
         _taylor_rows(over_Q, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes

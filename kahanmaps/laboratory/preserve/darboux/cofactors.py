@@ -29,8 +29,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField,
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, multiply, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import degree_in, evaluate, irreducible_factors, substitute
 from kahanmaps.algebra.printing import format_polynomial, format_product
-from kahanmaps.algebra.work import SPENT, Budget
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import SPENT, Budget, count_work
 from kahanmaps.invariants.integrals_and_densities import jacobian_determinant_fraction
 from kahanmaps.laboratory.modular_points import Exponent, ModularMap, Point, exponents_up_to, gradient_values, places_of
 from kahanmaps.laboratory.preserve.darboux.darboux_spaces import (

@@ -37,7 +37,7 @@ from flint import nmod_mat
 
 from kahanmaps.algebra.matrices import combination_of
 from kahanmaps.algebra.modular_matrices import combine, echelon, integers, matrix, multiply, null_space, pivots, rank
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import count_work
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     NoPoint,

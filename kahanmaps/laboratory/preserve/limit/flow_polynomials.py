@@ -39,7 +39,7 @@ from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.modular_matrices import combine, determinant, echelon, matrix, multiply, null_space, pivots, rank
 from kahanmaps.algebra.polynomials import common_denominator, degree_in, evaluate, primitive_part
 from kahanmaps.algebra.residues import chinese, random_prime, rational_vector
-from kahanmaps.algebra.work import SPENT, Budget, count
+from kahanmaps.algebra.work import SPENT, Budget, count_work
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.modular_points import ModularFlow, Point, Values, exponents_up_to, interpolated
 from kahanmaps.laboratory.preserve.darboux.affine_functions import darboux_cofactor
@@ -295,7 +295,7 @@ class _Search:
             residual = flow_derivative(P) - combination(K_coefficients, cofactor) * P
             if any(int(c.p) % modulus for c in residual.coeffs()):
                 return []
-            count(len(terms) * sum(map(len, f)))  # without `solve`, which counts its own work
+            count_work(len(terms) * sum(map(len, f)))  # without `solve`, which counts its own work
             correction = solve(columns, residual / -modulus)
             if correction is None:
                 return []
@@ -320,7 +320,7 @@ def _is_irrational(residue: int, modulus: int) -> bool:
         powers = [pow(residue, k, modulus) for k in range(1, degree + 1)]
         rows = [[modulus, *[0] * degree]]
         rows += [[-power, *(int(k == j) for j in range(1, degree + 1))] for k, power in enumerate(powers, 1)]
-        count(50 * degree**3)
+        count_work(50 * degree**3)
         shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(map(abs, row)))
         # For a random residue the entries have about 1/(degree + 1) of the bits of the modulus.
         if max(map(abs, shortest)) ** (degree + 1) < modulus >> modulus.bit_length() // 4:
@@ -359,7 +359,7 @@ class _Line:
         special if this space is larger than for as many random points, where products of I - c with integrals I vanish.
         """
         points = []
-        count(max(0, int(on_line.degree())) ** 2)
+        count_work(max(0, int(on_line.degree())) ** 2)
         for factor, _ in on_line.factor()[1] if on_line.degree() > 0 else ():
             if factor.degree() <= self.degree:
                 space = null_space(self._conjugates(factor), self.count, self.flow.prime)
@@ -420,7 +420,7 @@ class _Line:
             return self._rows(self.at(int(-factor[0] / factor[1])))
         nodes = range(self.degree + (orders - 1) * max(0, flow.degree - 1) + 1)
         values = [[c for row in self._rows(self.at(t)) for c in row] for t in nodes]
-        count(len(nodes) ** 2 / 5)
+        count_work(len(nodes) ** 2 / 5)
         all_nodes = reduce(mul, (nmod_poly([-t, 1], p) for t in nodes))
         basis = []
         for t in nodes:

@@ -131,7 +131,7 @@ class FlowAndMap:
         return "\n".join("\t".join(line) for line in self.lines())
 
     def lines(self, *, others: bool = True) -> list[tuple[str, str]]:
-        """Return the statements, each as (certainty, sentence); with `others` also the formulas of the others."""
+        """Return statements, each as (certainty, sentence); with `others` also the formulas of `other_integrals`."""
         statements = [("proved", limit.text) for limit in self.limits]
         for F in self.other_integrals if others else ():
             statements.append((str(F.verdict), f"{F.name} = {F.short_text} is an integral of the flow  [{F.origin}]"))

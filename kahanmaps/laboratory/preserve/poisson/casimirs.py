@@ -39,14 +39,14 @@ def casimir_candidates(
     """Yield functions of the integrals that may be Casimirs, each as text in their names and as an expanded function.
 
     Args:
-        laboratory: the maps.
+        laboratory: the reductions of the map modulo primes.
         tensor: a tensor that the map preserves.
         integrals: the known integrals.
-        budget: the work for the coefficients of polynomials.
+        budget: the work allowed for finding the coefficients of polynomials.
 
     Yields:
         Products of powers, polynomials of degree at most 2, then quotients of affine functions. They are Casimirs
-        modulo a prime; functions of single Casimirs may be among them.
+        modulo a prime, and need not be independent: with a Casimir C also a power or a polynomial of C may occur.
     """
     names = [integral.name for integral in integrals]
     if set(names) & {*laboratory.symbols, "eps"}:

@@ -34,7 +34,7 @@ from kahanmaps.algebra.modular_matrices import rank
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.printing import all_fields, format_polynomial, plain
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import count_work
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, counted
 from kahanmaps.invariants.integrals_and_densities import modified

@@ -29,8 +29,7 @@ from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in
 from kahanmaps.algebra.printing import attributes
 from kahanmaps.algebra.residues import random_prime
-from kahanmaps.algebra.work import Budget
-from kahanmaps.algebra.work import count as count_work
+from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.errors import BadPrime
 from kahanmaps.invariants.growth import Growth
 from kahanmaps.laboratory.defaults import budget_for

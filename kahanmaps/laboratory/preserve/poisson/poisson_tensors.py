@@ -25,7 +25,7 @@ from kahanmaps.algebra.fields import GF, Field, integer
 from kahanmaps.algebra.modular_matrices import null_space, rank
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.printing import attributes, format_factored, format_rational_function
-from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget, count
+from kahanmaps.algebra.work import SPENT, UNFINISHED, Budget, count_work
 from kahanmaps.checks.certify import MAX_DIMENSION
 from kahanmaps.checks.claims import Certainty, Evidence
 from kahanmaps.checks.decide import Identity, Sides
@@ -430,7 +430,7 @@ def tensor_space(
     for x, image in map_.pairs(max(unknowns_by_pair, default=0) + _SPARE_POINTS):
         J = [[nmod(int(entry), prime) for entry in row] for row in map_.map.jacobian(x).tolist()]
         monomials, image_monomials = map_.monomials_at_both(x, image, degree, (factor(image), factor(x)))
-        count(30 + 10 * n + len(pairs) * (len(pairs) + len(unknowns) / 5))
+        count_work(30 + 10 * n + len(pairs) * (len(pairs) + len(unknowns) / 5))
         for row, (i, j) in enumerate(pairs):
             minors = [J[i][a] * J[j][b] - J[i][b] * J[j][a] for a, b in pairs]
             rows.append(
