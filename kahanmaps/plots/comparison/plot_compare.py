@@ -89,7 +89,8 @@ def _order_lines(axes: Axes, ends: dict[int, tuple[float, float]], step: float) 
         y = error / 3
         end = max(axes.get_xlim()[0], x * (low / y) ** (1 / order))
         axes.plot([x, end], [y, y * (end / x) ** order], color="0.6", linestyle=":", linewidth=0.8, zorder=1)
-        write_beside(axes, str(order), (x, y), (4, -2), color="0.4", fontsize="small", va="center")
+        # At the end with small steps, where lines of different orders are apart.
+        write_beside(axes, str(order), (end, y * (end / x) ** order), (13, 0), color="0.4", fontsize="small")
     axes.set_ylim(low, high)
     axes.axvline(step, color="0.85", linewidth=0.8, zorder=0)
 
