@@ -134,7 +134,8 @@ def _wrong_call(
     for argument in () if takes_options else kwargs:
         if argument not in known:
             word = _ARGUMENT_HINTS.get(argument, "")
-            applies = not word.partition("=")[0].isidentifier() or word.partition("=")[0] in known
+            subject = word.partition("=")[0]
+            applies = bool(word) and (not subject.isidentifier() or subject in known)
             hint = f": {word}" if applies else suggestion(argument, known)
             return f"km.{name} has no argument {argument}={hint}; it has {', '.join(known)}"
     missing = _MISSING_HINTS.get(str(error).rpartition(": ")[2].strip("'"), "")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kahanmaps import FloatEnsemble, InputError, load
-from kahanmaps.plots.drifts.drift_functions import requested_axis
+from kahanmaps.plots.comparison.functions import requested_axis
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.section import crossings_of, hyperplane_of, plot_section, restricted_to, section_of
 

@@ -32,6 +32,7 @@ from kahanmaps.maps.normal_form.planar_block import Triple
 from kahanmaps.maps.normal_form.plane_heights import plane_height
 from kahanmaps.maps.normal_form.splitting import Plane, Splitting
 from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve, orbit_curve
+from kahanmaps.maps.values import as_point
 
 _ACCURACY = 1e-15  # of rotation numbers
 _HEIGHT_ACCURACY = 1e-12  # of heights that are printed without an error
@@ -190,6 +191,7 @@ def geometry(
     family, start, eps = as_map(system), either(start=start, x0=x0), resolve_eps(eps, time_step, h)
     if start is None or (eps is None and family.has_eps):
         raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
+    start = as_point(start, family.variables)
     if isinstance(family, KahanFamily) and not family.system.symbols:
         normal_form = system_normal_form(system)
         if isinstance(normal_form, SystemNormalForm):
