@@ -430,3 +430,25 @@ def test_arrays_of_residues_are_exact_or_refused(prime):
         assert np.asarray(walk, dtype=float).tolist() == rows
     else:
         refuses(f"rounds residues modulo {prime}, expected dtype=int or dtype=object", np.asarray, walk, dtype=float)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: km.map(FISH, "1/10")({2, 1}), r"found the point \{1, 2\}, expected a sequence of 2 numbers"),
+        (lambda: km.explicit_map([], []), "found no variables"),
+        (lambda: km.composed_map([km.load("lyness").map]), "expected maps for every eps"),
+        (lambda: km.composed_map(km.load("lyness").map, 5), "found '5', expected maps for every eps"),
+        (lambda: km.composed_map(km.load("lyness").map, (km.load("lyness").map, 2.5)), "the power"),
+        (lambda: km.compare(FISH, eps="1/20", methods=5, steps=10), r"found methods = 5, expected a list such as"),
+        (lambda: km.compare(FISH, eps="1/20", methods="kahan", steps=10), "found methods = 'kahan', expected a list"),
+        (lambda: km.certificate(FISH, "gp", claims="volume"), r"expected a list: claims=\['volume'\]"),
+        (lambda: km.plot.escape("riccati", eps="1/10"), "found 1 variable, expected at least 2"),
+        (lambda: km.orbit(FISH, [1, 2], "1/10", 3, max_digits=0), "found a budget of 0 digits"),
+        (lambda: km.geometry("paper_m2", [1, 2, 3, 4], 0), "found eps = 0, expected a nonzero number"),
+        (lambda: km.geometry("lyness", [0, 0]), "the map is not defined at step 0"),
+        (lambda: km.geometry("x' = 1 + x^2", [0], "1/2"), "the map is not defined at step"),
+    ],
+)
+def test_wrong_values_are_named_and_so_is_what_is_expected(call, words):
+    refuses(words, call)

@@ -111,6 +111,8 @@ def certificate(
     >>> print(certificate(load("harmonic"), "gp", ["E"]).splitlines()[-1])
     quit(!ok)
     """
+    if isinstance(claims, str):
+        raise InputError(f"found claims = {claims!r}, expected a list: claims=[{claims!r}]")
     with limited(effort):
         file = as_file(system)
         formulas, data = _prepared(file, checker)

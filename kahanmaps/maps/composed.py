@@ -15,10 +15,10 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.chance import derive_seed, random_prime_field
-from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.fields import QQ, Field, integer
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
+from kahanmaps.errors import BadPrime, InputError, SingularStep, counted, quoted
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import ImplicitMap, Map, MapFamily, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
@@ -201,6 +201,10 @@ def composed_map(
     ((1/6,), (1/6,))
     """
     powers = [entry if isinstance(entry, tuple) else (entry, 1) for entry in maps]
+    for entry in powers:
+        if len(entry) != 2 or not isinstance(entry[0], MapFamily):
+            raise InputError(f"found {quoted(str(entry[0]))}, expected maps for every eps: composed_map(f, g, (h, -1))")
+        integer(entry[1], "the power")
     if symbols is None:
         symbols = tuple(dict.fromkeys(name for map_, _ in powers for name in map_.symbols))
     context = ring(symbols)

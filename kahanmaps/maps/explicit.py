@@ -50,6 +50,8 @@ def explicit_map(
     inverse = as_point(inverse, names) if isinstance(inverse, Mapping) else inverse
     if image is None:
         raise InputError('found no functions, expected image=: explicit_map(["x", "y"], ["y", "(y + 1)/x"])')
+    if not names:
+        raise InputError("found no variables, expected at least one")
     for functions in (image, inverse or image):
         if len(functions) != len(names):
             raise InputError(

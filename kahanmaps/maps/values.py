@@ -42,7 +42,7 @@ def as_point(value: Any, variables: Sequence[str]) -> Any:
         return [named[name] for name in variables]
     if isinstance(value, _MATRICES):
         return value.entries()
-    if not hasattr(value, "__len__"):
+    if not hasattr(value, "__len__") or isinstance(value, set | frozenset):  # the order of a set is arbitrary
         raise InputError(f"found the point {value!r}, expected a sequence of {len(variables) or 'its'} numbers")
     if is_several(value):
         raise InputError(

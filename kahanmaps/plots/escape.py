@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.maps.floats.float_conversion import to_floats
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.plots.figures import drawing, label_of, legend_above, legend_height, new_figure
@@ -68,7 +68,9 @@ def survey_escape(
     if not (1 <= steps <= MAX_STEPS and 1 <= cells <= MAX_CELLS and radius > 0):
         sizes = f"{steps} steps, {cells} x {cells} cells, radius {radius:g}"
         raise InputError(f"found {sizes}, expected 1 to {MAX_STEPS} steps, 1 to {MAX_CELLS} cells, radius > 0")
-    if len(set(axes)) != 2 or map_.dim < 2 or (at is not None and len(at) != map_.dim):
+    if map_.dim < 2:
+        raise InputError(f"found {counted(map_.dim, 'variable')}, expected at least 2")
+    if len(set(axes)) != 2 or (at is not None and len(at) != map_.dim):
         raise InputError(f"found axes {axes} and a point {at}, expected two axes and {map_.dim} coordinates")
     centers = [low + (np.arange(cells) + 0.5) * (high - low) / cells for low, high in window]
     starts = np.tile(np.zeros(map_.dim) if at is None else to_floats(at), (cells * cells, 1))

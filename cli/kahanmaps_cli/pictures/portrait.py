@@ -171,11 +171,7 @@ def _is_given(value: Any) -> bool:
 
 def _require_consistent(options: dict[str, Any]) -> None:
     """Refuse contradicting options."""
-    kinds = ["random" if name == "count" else name for name in _STARTS if _is_given(options[name])]
-    if len(kinds) > 1:
-        raise click.UsageError(f"give --{kinds[0]} or --{kinds[1]}, not both")
-    if options["count"] is None and (options["box"] is not None or options["seed"] is not None):
-        raise click.UsageError("--box and --seed are for --random N")
+    require_one_kind_of_starts(options)
     if options["starts"] == "-" and options["system"] == "-":
         raise click.UsageError("found - twice, but standard input holds one input only")
     steps = options["steps"]
@@ -185,6 +181,15 @@ def _require_consistent(options: dict[str, Any]) -> None:
         raise click.UsageError("give --axes A,B,C or --3d, not both")
     if options["levels_at"] is not None and options["levels"] is None:
         raise click.UsageError("--levels-at needs --levels F")
+
+
+def require_one_kind_of_starts(options: dict[str, Any]) -> None:
+    """Refuse initial points that are requested in two ways."""
+    kinds = ["random" if name == "count" else name for name in _STARTS if _is_given(options[name])]
+    if len(kinds) > 1:
+        raise click.UsageError(f"give --{kinds[0]} or --{kinds[1]}, not both")
+    if options["count"] is None and (options["box"] is not None or options["seed"] is not None):
+        raise click.UsageError("--box and --seed are for --random N")
 
 
 def initial_points(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, options: dict[str, Any]) -> Any:

@@ -11,7 +11,7 @@ from kahanmaps.errors import counted
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import Drawing, picture, window_from, window_option
-from kahanmaps_cli.pictures.portrait import initial_points
+from kahanmaps_cli.pictures.portrait import initial_points, require_one_kind_of_starts
 from kahanmaps_cli.screen.progress import Progress
 
 
@@ -56,6 +56,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
 
     Exit status: 0 done, 2 usage error, 3 some orbits ended early, 130 interrupted.
     """
+    require_one_kind_of_starts(options)
     file = opt.load_system(options["system"], options)
     if file.dim < 3:
         raise lib.InputError(f"found {counted(file.dim, 'variable')}, expected at least 3: see kahanmaps plot portrait")

@@ -18,7 +18,7 @@ from typing import Any
 from flint import acb, arb, fmpq
 
 from kahanmaps.algebra.elliptic_curves import MAX_BITS, canonical_height, complex_roots, rotation_number
-from kahanmaps.algebra.fields import QQ, RR
+from kahanmaps.algebra.fields import QQ, RR, rational
 from kahanmaps.algebra.printing import format_number
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost
@@ -192,6 +192,8 @@ def geometry(
     if start is None or (eps is None and family.has_eps):
         raise InputError("found no initial point or no eps, expected x0=[...] and eps=, exact numbers")
     start = as_point(start, family.variables)
+    if eps is not None and rational(eps) == 0:
+        raise InputError("found eps = 0, expected a nonzero number: at 0 the map is the identity")
     if isinstance(family, KahanFamily) and not family.system.symbols:
         normal_form = system_normal_form(system)
         if isinstance(normal_form, SystemNormalForm):

@@ -153,7 +153,15 @@ def orbit(
     last_step = max(requested_steps, default=0) if requested_steps is not None else (steps or 0)
     require_steps(last_step)
     request = OrbitRequest(
-        system, start, eps, last_step, requested_steps, every, backward, max_digits or DEFAULT_MAX_DIGITS, kernel
+        system,
+        start,
+        eps,
+        last_step,
+        requested_steps,
+        every,
+        backward,
+        DEFAULT_MAX_DIGITS if max_digits is None else max_digits,
+        kernel,
     )
     if isinstance(system, Map):
         return _orbit_at_one_eps(request, field)

@@ -56,7 +56,8 @@ class OrbitCurve(PrintableResult):
     `height` is the canonical height of that point. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and
     trace = 2 for a parabolic map. `rotation` is the rotation number in (0, 1/2] up to sign; None if kappa is real.
     `steps` is 2 if that iterate exchanges two real components: then `rotation` is about its square.
-    `height_constant` is the C of height ~ C n^2 for the coordinates of the n-th iterate of the map, in bits.
+    `height_constant` is the C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits
+    (over one common denominator the integers may be longer).
     """
 
     genus: int
@@ -94,7 +95,7 @@ class OrbitCurve(PrintableResult):
             of_second = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
             lines.append(f"  rotation number\t{self.rotation.str(12)}{of_second}")
         if self.height_constant is not None:
-            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically")
+            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically, of the largest coordinate")
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
@@ -152,6 +153,10 @@ def orbit_curve(
             break
         later = image
     orbit = _first_points(map_over, point)
+    if orbit[-1] is None and (before := orbit[-2]) and map_over.integer_step(before) is None:
+        raise InputError(
+            f"the orbit ends: the map is not defined at step {len(orbit) - 2}; choose another initial point"
+        )
     if map_over.dim == 2 and family is not None:
         level = _on_level_curve(map_over, [entry.rationals() for entry in orbit if entry], family, integrals)
         if level is not None:
@@ -165,8 +170,8 @@ def orbit_curve(
     result = _on_rational_curve(map_over, orbit)
     if result is None:
         raise UnknownCurve(
-            "undecided: no curve of genus 0 or 1 was found that contains the orbit; the search covers curves on which "
-            "the coordinates have degree at most 8"
+            "undecided: no curve of genus 0 or 1 was found that contains the orbit; the search covers curves of "
+            "genus 1 on which the coordinates have degree at most 8, singular plane cubics, and rational normal curves"
         )
     return result
 
