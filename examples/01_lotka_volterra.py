@@ -11,7 +11,8 @@ from math import log
 import numpy as np
 
 import kahanmaps as km
-from kahanmaps.plots.portraits.trajectories import ensemble_for, euler_orbits, walked
+from kahanmaps.maps.floats.classical import MethodEnsemble
+from kahanmaps.plots.portraits.trajectories import ensemble_for, walked
 
 lotka_volterra = km.load("lotka_volterra")
 system = lotka_volterra.system
@@ -29,7 +30,7 @@ for k, start in enumerate(starts):
     values = [energy(*x) for x in kahan.points[:, k]]
     print(f"  from ({start[0]}, {start[1]}): {min(values):.3f} to {max(values):.3f}")
 
-euler = euler_orbits(system, "1/100", starts[:1], 20000).points[:, 0]
+euler = walked(MethodEnsemble(system, "1/100", starts[:1], "euler", kernel="numpy"), 20000).points[:, 0]
 print(f"time step 2/100, 20000 steps of Euler: from {energy(*euler[0]):.3f} to {energy(*euler[-1]):.3f}")
 
 for finding in km.check_measure(lotka_volterra).findings:

@@ -29,4 +29,4 @@ for finding in report.findings:
 print("what makes Theorem 9 fail:")
 for finding in km.verify(file, options=km.VerifyOptions(sections=(6,), controls=True)).findings:
     if finding.place.get("key") == "commutativity":
-        print(f"  {finding.verdict} if {finding.place['broken']}")
+        print(f"  {finding.verdict} if {finding.place['violation']}")
