@@ -57,6 +57,20 @@ def test_a_singular_system_has_no_solution_even_if_it_is_consistent(n, consisten
         assert divide(matrix, right, LONG_PRIME) is None
 
 
+@pytest.mark.parametrize("n", [4, 5, 6, 7, 8])
+def test_minors_that_share_a_factor_by_chance_are_eliminated_as_well(n):
+    """A diagonal block W I makes the first pivot W^2, which does not divide the later minors: gcds find what does."""
+    rng = random.Random(n)
+    W = fmpz(rng.getrandbits(400) | 1)
+    for _ in range(10):
+        matrix, right = random_integers(n, n, rng, 400), random_integers(n, 1, rng, 400)
+        for i, j in ((i, j) for i in range(3) for j in range(3)):
+            matrix[i, j] = W if i == j else fmpz(0)
+        solution = solve_fraction_free(matrix, right, W)
+        assert solution is not None
+        assert solution == by_flint(matrix, right)
+
+
 def of_rank_two_modulo(W: fmpz, n: int, rng: random.Random) -> tuple[fmpz_mat, fmpz_mat]:
     """A matrix and a right side, congruent modulo W to a matrix of rank 2 and a column of its image."""
 

@@ -21,32 +21,45 @@ def solve_fraction_free(matrix: fmpz_mat, rhs: fmpz_mat, candidate_divisor: fmpz
     modulo (nearly) every prime of the denominator W of the point, so all minors of order k are divisible by W^(k - 2),
     up to small primes. Dividing the minors of order 3 by W (`candidate_divisor`) keeps all later entries at twice the
     length of W instead of up to n times: the exact divisions by the previous pivot remove the higher powers. If the
-    minors share nothing with `candidate_divisor`, this is the usual algorithm. The algorithm assumes that the divisions
-    are exact; the solution is verified in the equation.
+    minors share nothing with `candidate_divisor`, this is the usual algorithm. If they share a factor by chance (a
+    pivot W^2 where a block of the matrix is W times the identity), the previous pivot need not divide later entries,
+    and what it shares with them is found by gcds. The divisions are not checked one by one: the solution is verified in
+    the equation.
     """
     n = matrix.nrows()
     rows = [[*row, rhs[i, 0]] for i, row in enumerate(matrix.tolist())]
-    previous = fmpz(1)
+    previous = fmpz(1)  # the previous pivot as long as it divides what Sylvester's identity says, then 1
     for k in range(0, n - 1, 2):
-        a, b, rows_below = rows[k], rows[k + 1], rows[k + 2 :]
-        pivot = (a[k] * b[k + 1] - a[k + 1] * b[k]) // previous
+        a, b, rows_below, m = rows[k], rows[k + 1], rows[k + 2 :], n - k - 2
+        # Each entry of the other rows becomes its minor of order 3 with the two pivot rows, over the previous pivot.
+        pivot, *cofactors = (
+            x[k] * y[k + 1] - x[k + 1] * y[k]
+            for x, y in [(a, b), *((row, a) for row in rows_below), *((b, row) for row in rows_below)]
+        )
+        if previous != 1:
+            quotients = [divmod(minor, previous) for minor in (pivot, *cofactors)]
+            if any(remainder != 0 for _, remainder in quotients):
+                candidate_divisor, previous = abs(previous), fmpz(1)
+            else:
+                pivot, *cofactors = (quotient for quotient, _ in quotients)
         if pivot == 0:
             return None
-        # Each entry of the other rows becomes its minor of order 3 with the two pivot rows, over the previous pivot.
-        minors = []
-        for row in rows_below:
-            of_b = (a[k + 1] * row[k] - a[k] * row[k + 1]) // previous
-            of_a = (b[k] * row[k + 1] - b[k + 1] * row[k]) // previous
-            minors.append([pivot * row[j] + of_b * b[j] + of_a * a[j] for j in range(k + 2, n + 1)])
+        minors = [
+            [pivot * row[j] + of_b * b[j] + of_a * a[j] for j in range(k + 2, n + 1)]
+            for row, of_b, of_a in zip(rows_below, cofactors[:m], cofactors[m:], strict=True)
+        ]
         divisor = previous
-        if k == 0 and minors:
-            # The divisor is found from a few entries only: the solution is verified at the end.
+        if previous == 1 and minors:
+            # The divisor is found from a few entries only.
             entries = [entry for row in minors for entry in row]
             divisor = _shared(candidate_divisor, entries[:: max(1, len(entries) // 3)])
         for row, entries in zip(rows_below, minors, strict=True):
             row[k + 2 :] = entries if divisor == 1 else [entry // divisor for entry in entries]
         b[k + 1 :] = [pivot, *((a[k] * b[j] - b[k] * a[j]) // previous for j in range(k + 2, n + 1))]
-        previous = pivot
+        if k == 0 or previous != 1:
+            previous = pivot
+        else:
+            candidate_divisor = abs(pivot)
     if any(rows[i][i] == 0 for i in range(n)):
         return None
     # Back substitution, with a single gcd of large numbers.

@@ -69,6 +69,11 @@ class IntegerPoint:
         """The largest bit length of the numerators and the denominator."""
         return max(self.denominator.bit_length(), *(entry.bit_length() for entry in self.numerators))
 
+    @property
+    def approximate_bits(self) -> int:
+        """A length that takes no long computation and grows from point to point like `bits`."""
+        return self.bits
+
     def exceeding(self, limit: int) -> int:
         """Return the bit length if it exceeds the limit, otherwise 0."""
         bits = self.bits
@@ -202,6 +207,11 @@ class FractionsPoint(IntegerPoint):
     def lowest_terms(self) -> list[Fraction]:
         """Return the reduced numerator and denominator of each coordinate."""
         return list(self._fractions)
+
+    @property
+    def approximate_bits(self) -> int:
+        """The largest bit length of a numerator or a denominator, without the common denominator."""
+        return max(max(p.bit_length(), q.bit_length()) for p, q in self._fractions)
 
     def exceeding(self, limit: int) -> int:
         """Return the bit length if it exceeds the limit, otherwise 0; usually without the common denominator."""

@@ -21,7 +21,7 @@ Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
 
 # Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
-_ELIMINATION_BITS = 4000
+_ELIMINATION_BITS = 1000
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 _SMALL_DIMENSION = 3  # eliminating constant rows pays only above this dimension
 _CRAMER_DIMENSION = 3  # up to this dimension the image of a long point is written by determinants
@@ -76,26 +76,36 @@ class IntegerSteps:
             return self._substitution.step(point)
         matrix, rhs = self._equation(point)
         _, W = point.integers
-        if self._constant is None:
-            if self.dim <= _CRAMER_DIMENSION and matrix[0, 0].bit_length() >= _CRAMER_BITS:
-                numerators, denominator = by_determinants(matrix, rhs)
-                return UnreducedPoint(numerators, denominator, point) if denominator != 0 else None
-            is_long = W.bit_length() >= _ELIMINATION_BITS
-            if self._remaining_trials and is_long and self.dim <= _ELIMINATION_DIMENSION:
-                solution = solve_fraction_free(matrix, rhs, W)
-                if solution is not None:
-                    return solution
-                self._remaining_trials -= 1
-            return _solved(matrix, rhs)
         scale = W**self._degree
-        reduced, reduced_rhs = self._constant.reduce(matrix, rhs, scale)
-        if 0 < reduced.nrows() <= _CRAMER_DIMENSION and reduced[0, 0].bit_length() >= _CRAMER_BITS:
-            numerators, denominator = by_determinants(reduced, reduced_rhs)
+        if self._constant is not None:
+            whole_rhs = rhs
+            matrix, rhs = self._constant.reduce(matrix, rhs, scale)
+        if 0 < matrix.nrows() <= _CRAMER_DIMENSION and matrix[0, 0].bit_length() >= _CRAMER_BITS:
+            numerators, denominator = by_determinants(matrix, rhs)
             if denominator == 0:
                 return None
-            return UnreducedPoint(*self._constant.extend(rhs, scale, numerators, denominator), point)
-        solution = _solved(reduced, reduced_rhs) if reduced.nrows() else IntegerPoint((), fmpz(1))
-        return solution and lowest(*self._constant.extend(rhs, scale, solution.numerators, solution.denominator))
+            if self._constant is not None:
+                numerators, denominator = self._constant.extend(whole_rhs, scale, numerators, denominator)
+            return UnreducedPoint(numerators, denominator, point)
+        solution = self._solved(matrix, rhs, W) if matrix.nrows() else IntegerPoint((), fmpz(1))
+        if self._constant is None or solution is None:
+            return solution
+        return lowest(*self._constant.extend(whole_rhs, scale, solution.numerators, solution.denominator))
+
+    def _solved(self, matrix: fmpz_mat, rhs: fmpz_mat, W: fmpz) -> IntegerPoint | None:
+        """Return the solution of matrix x = rhs in lowest terms; None where the matrix is singular."""
+        is_long = matrix[0, 0].bit_length() >= _ELIMINATION_BITS
+        if self._remaining_trials and is_long and matrix.nrows() <= _ELIMINATION_DIMENSION:
+            point = solve_fraction_free(matrix, rhs, W)
+            if point is not None:
+                return point
+            self._remaining_trials -= 1
+        try:
+            solution: fmpq_mat = matrix.solve(rhs)  # type: ignore[assignment]  # the stub promises less
+        except ZeroDivisionError:
+            return None
+        column, denominator = solution.numer_denom()
+        return IntegerPoint(tuple(column.entries()), denominator)
 
     @property
     def is_triangular(self) -> bool:
@@ -172,16 +182,6 @@ def by_determinants(matrix: fmpz_mat, rhs: fmpz_mat) -> tuple[list[fmpz], fmpz]:
         a * s_t + d * r_t + g * r_s,
         r * fourth + s * fifth + t * sixth,
     ], a * first + d * second + g * third
-
-
-def _solved(matrix: fmpz_mat, rhs: fmpz_mat) -> IntegerPoint | None:
-    """Return the solution of matrix x = rhs in lowest terms; None where the matrix is singular."""
-    try:
-        solution: fmpq_mat = matrix.solve(rhs)  # type: ignore[assignment]  # the stub promises less
-    except ZeroDivisionError:
-        return None
-    column, denominator = solution.numer_denom()
-    return IntegerPoint(tuple(column.entries()), denominator)
 
 
 def lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:

@@ -98,6 +98,7 @@ class RationalOrbit:
                 search_bits < latest_bits
                 and number > 1
                 and not image.keeps_factors
+                and image.approximate_bits < _SLOW_GROWTH * before.approximate_bits
                 and search_bits <= image.bits < min(latest_bits, _SLOW_GROWTH * before.bits)
             ):
                 try:
