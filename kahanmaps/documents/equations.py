@@ -28,21 +28,18 @@ _TOKEN = re.compile(
 _MAX_TOKENS = 16  # of a derivative other than by primes
 _NAME, _ARGUMENT = "([A-Za-z_][A-Za-z_0-9]*)", r"(?:\(t\)|\[t\])?"
 _CALL = rf"(?:diff|Diff|D|der|Derivative)[(\[{{]{_NAME}{_ARGUMENT}"  # of Maple, Mathematica, Modelica, SymPy
-# Derivatives, with blanks only between two words, and their order.
-_WRITTEN = [
-    (re.compile(pattern + _ARGUMENT), order)
-    for pattern, order in (
-        (rf"{_CALL}(?:,t|,\{{t,1\}})?[)\]]", 1),
-        (rf"{_CALL}(?:,t,t|,t\$2|,\{{t,2\}}|,\(t,2\))[)\]]", 2),
-        (rf"d ?{_NAME}{_ARGUMENT}/d ?t", 1),
-        (rf"d(?:\^2 ?|2){_NAME}{_ARGUMENT}/d ?t\^?2", 2),
-        (rf"{_NAME}_ddot", 2),
-        (rf"{_NAME}_dot", 1),
-        (rf"{_NAME}ddot", 2),
-        (rf"{_NAME}dot", 1),
-        (rf"d{_NAME}dt", 1),
-    )
-]
+# Derivatives, with blanks only between two words, and their order. (They are compiled when equations are read.)
+_WRITTEN = (
+    (rf"{_CALL}(?:,t|,\{{t,1\}})?[)\]]", 1),
+    (rf"{_CALL}(?:,t,t|,t\$2|,\{{t,2\}}|,\(t,2\))[)\]]", 2),
+    (rf"d ?{_NAME}{_ARGUMENT}/d ?t", 1),
+    (rf"d(?:\^2 ?|2){_NAME}{_ARGUMENT}/d ?t\^?2", 2),
+    (rf"{_NAME}_ddot", 2),
+    (rf"{_NAME}_dot", 1),
+    (rf"{_NAME}ddot", 2),
+    (rf"{_NAME}dot", 1),
+    (rf"d{_NAME}dt", 1),
+)
 _LATEX = ("dot", "ddot", "frac", "dfrac", "mathrm", "rm", "left", "begin", "d", "dt")
 _EXAMPLES = "x' = x*y, dx/dt = x*y, x_dot = x*y or x'' = x^2"
 
@@ -209,7 +206,7 @@ def derivative_at(tokens: Sequence[str], start: int) -> _Derivative | None:
         text, last = f"{text}{' ' * is_apart}{token}", token
         ends[len(text)] = position
     for pattern, order in _WRITTEN:
-        match = pattern.match(text)
+        match = re.match(pattern + _ARGUMENT, text)
         if match is not None and match.end() in ends:
             return _Derivative(match[1], order, ends[match.end()])
     return None

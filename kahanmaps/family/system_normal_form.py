@@ -60,7 +60,6 @@ def system_normal_form(
     >>> system_normal_form(system).text
     'a recognised member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
     """
-    from kahanmaps.family.planar import normal_form
     from kahanmaps.family.recognition import find_cubic_hamiltonian, find_family_structure, why_not_member
 
     system = as_system(system)
@@ -78,6 +77,8 @@ def system_normal_form(
         f"({factor})" + f"^{factor.multiplicity}" * (factor.multiplicity > 1) for factor in member.factors
     )
     text = f"{'a' if declared else 'a recognised'} member of the family, chi = {factors}"
+    from kahanmaps.family.planar import normal_form  # loaded for members only
+
     try:
         form = normal_form(member)
     except HypothesisError:

@@ -116,7 +116,9 @@ def command(system: str | None, output: str | None, verbose: bool, quiet: bool, 
 
     with interruptible(stop), Progress(quiet) as progress:
         in_floats = options["arithmetic"].kind == "float"
-        functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
+        functions = {}
+        if options["integrals"]:  # loads the checks
+            functions = lib.functions_along(file, options["integrals"], in_floats, ("step", *file.variables))
         trajectory = lib.orbit(
             map_,
             start,

@@ -18,7 +18,6 @@ from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
-from zipfile import ZipFile
 
 from kahanmaps.algebra.printing import csv_line, spreadsheet_safe
 from kahanmaps.atomic_files import atomic_write, open_append, write_atomically
@@ -203,6 +202,8 @@ class Npz(Writer):
         self._count, self._every = self._count + len(x), every
 
     def end(self, end: OrbitEnd, extra: Mapping[str, Any]) -> None:
+        from zipfile import ZipFile
+
         import numpy as np
 
         end_record = {**end.to_json(), **extra}
