@@ -43,8 +43,8 @@ class Census(PrintableResult):
 
     `lengths` is the number of cycles by length if all points were followed (`complete`), else the number of sampled
     points that are periodic, by their period. A point is `indeterminate` where the map is not defined,
-    `pre_indeterminate` if its orbit gets to such a point, `preperiodic` if its orbit gets to a cycle without being on
-    it, and `open` if none of this was seen in `steps` steps (samples only). Where a time limit `stopped` the work
+    `pre_indeterminate` if its orbit reaches such a point, `preperiodic` if its orbit reaches a cycle on which it does
+    not lie, and `open` if none of this happened within `steps` steps (samples only). If a time limit `stopped` the work
     before the images of all points were known, `examined` is 0.
     """
 
@@ -236,9 +236,10 @@ class _ProjectiveMap:
 
 
 def default_eps(prime: int) -> list[fmpq]:
-    """The first two of a fixed list of eps that are not 0 and not equal up to sign (the inverse map) modulo the prime.
+    """Return the first two eps of a fixed list that modulo the prime are not 0 and not equal up to sign.
 
-    For p > 5 those with eps^4 = 1 are left out: there a map may be periodic that is not periodic at other eps.
+    For p > 5 no eps has eps^4 = 1, since for such eps a map may be periodic that is not periodic otherwise. (The sign
+    of eps exchanges the map and its inverse.)
 
     >>> default_eps(101)
     [1/7, 2/11]

@@ -171,7 +171,7 @@ class Laboratory:
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
         """Return the map at values of the names in formulas: the symbols, and last eps if it enters as a symbol.
 
-        Elsewhere eps is 1, or the given number.
+        If eps is no symbol, it is 1 or the given number.
         """
         count = len(self.symbols)
         return self.map_at(prime, values[:count], values[count] if len(values) > count else 1)
@@ -262,7 +262,7 @@ class Laboratory:
         """Certify that the map, or the flow, preserves I or dx/phi, as the function `verdict_on` does; for a flow by
         expansion.
 
-        A function that is no shorter than one that was too long is not expanded.
+        A function is not expanded if one of at most its length was too long.
         """
         if self.field is not None and self.flow:
             is_kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
@@ -410,8 +410,8 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
 def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
     """Divide a nonzero polynomial in n variables, the root and eps by its factors that contain no variable.
 
-    The result has integer coefficients without a common factor. It is the shortest of its multiples by numbers of the
-    field that have a rational coefficient.
+    The result has integer coefficients without a common factor. Among the multiples of the polynomial in which some
+    coefficient is rational, it is the shortest.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()

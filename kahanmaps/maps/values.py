@@ -16,7 +16,7 @@ _MATRICES = (fmpq_mat, fmpz_mat)  # columns or rows of coordinates
 
 
 def is_float_value(value: Any) -> bool:
-    """Whether the value is a float, or a number or an array of floats of numpy."""
+    """Whether the value is a float of Python or numpy, or an array of floats."""
     return isinstance(value, float) or getattr(getattr(value, "dtype", None), "kind", "") == "f"
 
 

@@ -69,9 +69,9 @@ class DegreeGrowth(PrintableResult):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and their growth.
 
     `eps` is None for generic eps (a random residue for each line). `patterns` are the singularity patterns, None if
-    they were not computed. Degrees and patterns are measured: evidence, and no proof. `enclosure` has proved bounds of
-    the dynamical degree of a planar map, the lower one above 1, or None. `proof` is a proof of the growth, or None. The
-    degrees of monomial maps are exact, and need no primes.
+    they were not computed. Degrees and patterns are measured, which is evidence and no proof. `enclosure` has proved
+    bounds of the dynamical degree of a planar map, if a lower bound above 1 was found, else None. `proof` is a proof of
+    the growth, or None. The degrees of monomial maps are exact, and need no primes.
     """
 
     _parts = "degrees"
@@ -135,7 +135,7 @@ class DegreeGrowth(PrintableResult):
     def recurrence(self) -> Recurrence | None:
         """The linear recurrence of the degrees: the derived one, or else the fitted one if it is confirmed.
 
-        None if there is neither: a fitted one is confirmed by terms beyond the last confinement.
+        A fitted recurrence is confirmed by terms beyond the last confinement. None if there is neither.
         """
         if self.proof is None or self.derived is not None:
             return self.derived or (None if self.unconfirmed else self.fitted)
@@ -150,7 +150,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth(self) -> Growth:
-        """The kind of growth: by a proof, by the recurrence, or by the bounds of the dynamical degree; else unknown."""
+        """The kind of growth, by a proof, by the recurrence, or by the bounds of the dynamical degree; else unknown."""
         if self.proof is not None:
             return self.proof.growth
         if self.ended == Ended.CONSTANT:
@@ -161,15 +161,14 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
-        """lim d_n^(1/n) as an algebraic number, by a proof or by the recurrence, else None."""
+        """The limit of d_n^(1/n) as an algebraic number, known by a proof or by the recurrence; else None."""
         if self.proof is not None:
             return self.proof.rate
         return None if self.recurrence is None else self.recurrence.rate
 
     @property
     def estimate(self) -> str | None:
-        """An estimate of the dynamical degree, rounded: the last quotient d_n/d_{n-1} where these hardly change, else
-        d_n^(1/n) for the last n, an upper bound."""
+        """A rounded estimate of the dynamical degree: d_n/d_{n-1} if this quotient settles, else d_n^(1/n)."""
         if len(self.degrees) < 3 or self.degrees[-1] == 0:
             return None
         n = len(self.degrees) - 1
@@ -179,8 +178,8 @@ class DegreeGrowth(PrintableResult):
     def looks_exponential(self) -> bool:
         """Whether the last quotients d_n/d_{n-1} change by far less than those of a sequence of polynomial growth.
 
-        There a quotient 1 + r falls by about r/n from one step to the next; here by less than a quarter of that, over
-        two steps. An estimate, for sequences that end before a recurrence could be checked.
+        For polynomial growth a quotient 1 + r decreases by about r/n in the next step; the answer is True if the last
+        two decreases are less than a quarter of that. It is an estimate, for sequences too short for a recurrence.
         """
         d = self.degrees
         n = len(d) - 1
@@ -216,14 +215,14 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def basis(self) -> str:
-        """How the growth is known: with the proof, or with the number of steps searched for confinement."""
+        """The evidence for the growth in words: the proof, or the number of steps searched for confinement."""
         if self.proof is not None:
             return f"{self.known}: {self.proof.reason}"
         return f"{self.known}: {self.patterns.limit}" if self.patterns and self.patterns.limit else str(self.known)
 
     @property
     def known(self) -> Certainty:
-        """How the growth is known; the bounds in `enclosure` are proved in any case."""
+        """The certainty of the growth; the bounds in `enclosure` are proved in any case."""
         if self.proof is not None:
             return Certainty.PROVED
         if self.derived is not None:
@@ -376,7 +375,7 @@ class _Search:
     measured: DegreeGrowth | None = None  # all but the bounds of the dynamical degree
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
-        """Measure degree after degree until a reason to stop."""
+        """Measure degree after degree until there is a reason to stop."""
         matrix = exponent_matrix(self.map, self.eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
             period_proof = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
@@ -478,7 +477,7 @@ class _Search:
             )
 
     def _compute_patterns(self) -> None:
-        """Compute the singularity patterns, once, and unless the map is affine."""
+        """Compute the singularity patterns at the first call, unless the map is affine."""
         if self.map.root is None and self.patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
             options: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
             self.patterns = patterns_of_map(self.map, self.eps, **options)

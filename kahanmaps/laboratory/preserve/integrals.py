@@ -161,7 +161,7 @@ class IntegralSearch(Search):
 
     @property
     def codimension(self) -> int:
-        """The number of independent integrals that orbits show, theorems give or formulas prove: the largest."""
+        """The largest of the numbers of independent integrals that orbits show, theorems give or formulas prove."""
         return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.formula_count)
 
     @property
@@ -209,7 +209,7 @@ class IntegralSearch(Search):
 
     @property
     def is_complete(self) -> bool:
-        """Whether there is a closed form for every integral that is known."""
+        """Whether there are as many closed forms as independent integrals are known to exist."""
         return self.formula_count >= self.codimension
 
     def rows(self) -> list[dict[str, str]]:
@@ -508,7 +508,7 @@ class _Collected:
 
     @property
     def _has_limit(self) -> bool:
-        """Whether the limit eps -> 0 makes sense: the map approximates a flow for every eps, or it is the flow."""
+        """Whether the limit eps -> 0 makes sense: for maps that approximate a flow for every eps, and for flows."""
         laboratory = self._laboratory
         of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
         return of_flow and laboratory.eps is None and laboratory.root is None

@@ -176,10 +176,10 @@ def repeat_search(
     reference: int,
     branches: Mapping[int, Mapping[Pattern, Branches]] = NO_BRANCHES,
 ) -> SpaceSearch | None:
-    """Repeat the steps of a search on another map; return None where the spaces have another shape (a special value).
+    """Repeat the steps of a search on another map; return None if its spaces have other zero patterns (special values).
 
-    `reference` is the prime of the search. Spaces with the same zero pattern come in any order unless `branches`
-    distinguishes those of the step.
+    `reference` is the prime of the search. Spaces with the same zero pattern are in any order unless `branches`
+    distinguishes those of their step.
     """
     repeated = SpaceSearch(cofactors=original.cofactors)
     steps = list(zip(original.steps, original.spaces, strict=True))

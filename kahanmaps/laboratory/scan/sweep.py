@@ -93,7 +93,8 @@ def sweep(
 
     Args:
         map_: the family; its symbols are the parameters that vary.
-        count: the number of parameters that vary; one more than the symbols if eps is one, as the last and never 0.
+        count: the number of parameters that vary. If it is one more than that of the symbols, eps is the last
+            parameter; it is never 0.
         prime: the prime.
         eps: half the time step (exact), or None for generic eps, taken from GF(p^2).
         terms: the number of degrees.

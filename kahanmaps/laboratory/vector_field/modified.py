@@ -47,9 +47,9 @@ Field = tuple[fmpq_mpoly, ...]
 class SurvivingIntegral:
     """An integral I of the flow of f, and its continuation I + eps^2 I_2 + ... as an integral of the modified field.
 
-    `corrections` are I_2, I_4, ... up to `order`. `verdict` is "survives", up to the requested order, "lost", if there
-    is no polynomial correction of degree at most `degree` at eps^(order + 2), for any choice of the earlier ones, or
-    "not examined", if the linear equations for the next one are too large. All are exact.
+    `corrections` are I_2, I_4, ... up to `order`. `verdict` is "survives" (up to the requested order), "lost" (no
+    polynomial correction of degree at most `degree` exists at eps^(order + 2), for any choice of the earlier ones) or
+    "not examined" (the linear equations for the next correction are too large). All are exact.
     """
 
     integral: fmpq_mpoly
@@ -96,7 +96,7 @@ class ModifiedField(ResultPart):
         }
 
     def lines(self) -> list[str]:
-        """Return the series and sentences as lines of cells, separated by tabs; long polynomials are counted only."""
+        """Return the series and sentences as lines of cells separated by tabs; long polynomials are given by size."""
         lines = []
         for k in range(2, self.order + 1, 2):
             for name, component in zip(self.file.variables, self.fields[k], strict=True):
@@ -229,8 +229,8 @@ def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> lis
 def _continued(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:
     """Return how far an integral of the flow can be continued by polynomials.
 
-    All corrections up to an order are unknowns of one linear system: that at a higher order may require another choice
-    of the earlier ones, which are determined up to integrals of the flow.
+    All corrections up to an order are unknowns of one linear system, since the next correction may require another
+    choice of the earlier ones, which are determined only up to integrals of the flow.
     """
     names = fields[0][0].context().names()
     context, top = ring(names), degree(integral)

@@ -178,7 +178,7 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
     products: list[tuple[int, int]] = []
 
     def place(exponent: tuple[int, ...]) -> int:
-        """Return the index in y of a monomial."""
+        """Return the index of a monomial in the vector y."""
         if exponent not in index:
             last = max(k for k, e in enumerate(exponent) if e)
             smaller = place((*exponent[:last], exponent[last] - 1, *exponent[last + 1 :]))

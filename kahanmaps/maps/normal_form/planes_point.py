@@ -120,7 +120,7 @@ class PlanesPoint:
     def height(self) -> int:
         """The bit length of the largest of the integers over one common denominator in lowest terms; costs a gcd.
 
-        `bits` is a few bits off, and much too high where planes have denominators in common.
+        `bits` differs by a few bits, and is much too large if planes have common denominators.
         """
         if self._height is None:
             numerators, denominator = self.common()
@@ -194,7 +194,7 @@ class PlanesPoint:
         return pairs
 
     def _fractions_of(self, planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> list[tuple[fmpz, fmpz]]:
-        """Return numerators and denominators of all coordinates, from those of the planes or residues."""
+        """Return numerators and denominators of all coordinates, from those of the planes or from residues of these."""
         fractions: dict[int, tuple[fmpz, fmpz]] = {}
         rows = self._assembly.rows
         for support, (numbers, forms) in self._assembly.by_support.items():
@@ -211,7 +211,7 @@ class PlanesPoint:
 
 
 def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fmpz]:
-    """The numerators of planes, each times the W of the others, in one column; and the product of all W."""
+    """Return the numerators of the planes, each times the W of the others, in one column, and the product of all W."""
     *products_before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
     products_after = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
     others = (before * after for before, after in zip(products_before, products_after, strict=True))
@@ -220,7 +220,7 @@ def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fm
 
 
 def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
-    """Return a common factor of two numbers and the modulus: the greatest one, except for high powers of primes."""
+    """Return the greatest common factor of two numbers and the modulus, except for high powers of primes."""
     common = modulus.gcd(numerator % modulus)
     return common if common == 1 else common.gcd(denominator % common)
 

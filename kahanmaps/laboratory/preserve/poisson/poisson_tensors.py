@@ -68,11 +68,11 @@ Exponents = tuple[int, ...]
 
 @dataclass(frozen=True)
 class FoundTensor(LatexDisplay, ResultPart):
-    """A tensor that the map preserves, with the verdicts on that and on the Jacobi identity (`jacobi`).
+    """A tensor that the map preserves, with the verdicts on its invariance and on the Jacobi identity (`jacobi`).
 
     `rank` is the rank at random points. `casimirs` names the known integrals that are Casimirs and, if there are more
     Casimirs among functions of the integrals, formulas such as I1/I2. `in_involution` names a largest set of integrals
-    in involution with each other; `involution` is the verdict on that, None without any.
+    in involution; `involution` is the verdict on their brackets, None without any.
     """
 
     name: str
@@ -158,7 +158,7 @@ class PoissonSearch(Search):
 
     @property
     def note(self) -> str:
-        """A sentence on the compatibility of the tensors; empty where that was not tested."""
+        """A sentence on the compatibility of the tensors; empty if it was not tested."""
         if self.pencil is None:
             return ""
         if self.pencil.holds:
@@ -210,12 +210,13 @@ def find_poisson(
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
         denominator: a function of the variables and eps by which the entries are divided. None: no denominator; if
-            there is no such tensor, the factors of a density that is a product are tried, if that is little work.
+            there is no such tensor, the factors of a density that is a product are tried as denominators, if this is
+            little work.
         integrals: the integrals whose brackets are computed; None: they are searched for, if there is a tensor.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
-        on_result: called with the tensors so far after each, for searches that may be interrupted.
+        on_result: called with the tensors so far after each new one, for searches that may be interrupted.
 
     Returns:
         A `PoissonSearch`; formulas are exact, proved or supported. Combinations of products of polynomial integrals and

@@ -145,7 +145,7 @@ def _table(points: Rows, coordinates: Sequence[int], count: int, lag: int, prime
 
 
 def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]:
-    """Return each point with the count - 1 points before it, `lag` steps apart, nearest first."""
+    """Return each point with the `count` - 1 points before it, `lag` steps apart, nearest first."""
     first = (count - 1) * lag
     return [tuple(points[n - k * lag] for k in range(count)) for n in range(first, len(points))]
 
