@@ -171,8 +171,8 @@ def analyze(
 
     Returns:
         An `Analysis`, the same on any machine at any load. Steps that were not completed are named in `skipped`. Ctrl-C
-        and a `time_limit` end the analysis with an exception; the last argument of `on_result` then contains all
-        completed steps.
+        and a `time_limit` end the analysis with an exception; the last argument of `on_result` then has all completed
+        steps.
 
     Raises:
         InputError: for eps = 0, unknown symbols, and an effort that is no integer from -20 to 40.

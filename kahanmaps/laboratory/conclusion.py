@@ -31,11 +31,10 @@ class Conclusion(ResultPart):
     defined) or "undecided".
 
     `sense` is the precise sense of the verdict: "superintegrable" (one integral less than the dimension, proved),
-    "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable",
-    "confining and not integrable", else the kind. `ground` is the kind of evidence: "proved", "derived" (from the
-    measured singularity patterns), "measured" or "estimated"; empty where there is no verdict.
-    `integrals` is the number of independent integrals that are known or measured along orbits, `growth` the kind of
-    growth of the degrees.
+    "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable", "confining
+    and not integrable", else the kind. `ground` is the kind of evidence: "proved", "derived" (from the measured
+    singularity patterns), "measured" or "estimated"; empty where there is no verdict. `integrals` is the number of
+    independent integrals, known or measured; `growth` is that of the degrees.
     """
 
     kind: str

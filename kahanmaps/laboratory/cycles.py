@@ -1,7 +1,6 @@
 """Cycles of a map on projective space over GF(p): how many there are of each length.
 
-All points of P^n(GF(p)) are followed if they are few enough, otherwise random ones. Every count is exact, for one prime
-and one eps.
+All points of P^n(GF(p)) are followed if they are few enough, otherwise random ones. Counts are exact for one p and eps.
 
 No bound for the lengths is applied. The bound of Hasse and Weil, p + 1 + 2 sqrt p, holds for a cycle on an irreducible
 curve of genus 1 that the map sends to itself. Levels of integrals may have several components, and the map may exchange
@@ -100,12 +99,25 @@ def cycle_census(
 ) -> Census:
     """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
 
-    A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
-    examined up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
-    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends the census early. The maps
-    of a composition are applied one after the other: a point is indeterminate if one of them is not defined. Above
-    dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
-    Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
+    The maps of a composition are applied one after the other: a point is indeterminate if one of them is not defined.
+    Above dimension 6 points at which a common factor of the forms vanishes are also indeterminate.
+
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        eps: an exact number, half the time step for a Kahan map.
+        prime: a prime between 2 and 2^31.
+        time_step, h: the time step 2 eps, instead of eps.
+        samples: the number of random points; by default all points if there are at most 2,000,000 (half as many with
+            each dimension above 6), otherwise 500.
+        steps: the largest number of steps for a random point.
+        seed: the random seed.
+        progress: called with a message.
+
+    Returns:
+        A `Census`, exact. A TimeLimit ends it early.
+
+    Raises:
+        InputError: for a wrong prime, number or dimension; BadPrime if eps or the map has no reduction.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)

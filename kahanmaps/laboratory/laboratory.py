@@ -259,8 +259,7 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Certify that the map, or the flow, preserves I or dx/phi, as the function `verdict_on` does; for a flow by
-        expansion.
+        """Certify that the map preserves I or dx/phi, as the function `verdict_on` does; for a flow, by expansion.
 
         A function is not expanded if one of at most its length was too long.
         """
@@ -371,8 +370,7 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
     """Call `reconstruct`, where the first of the names stands for the root if there is one.
 
     The black box is evaluated at all roots modulo primes at which the minimal polynomial of the root splits. The
-    functions are polynomials in the first name, of degree less than that of the field. `options` are those of
-    `reconstruct`.
+    functions are polynomials in the first name, of degree less than that of the field. `options` are for `reconstruct`.
     """
     if root is None:
         return reconstruct(black_box, names, **options)
@@ -482,8 +480,8 @@ def is_kept_by_flow(
     """Return whether f . grad I = 0; for a density phi, whether f . grad phi = phi div f: then dx/phi is invariant.
 
     With a factor c, a function of the symbols, return whether f . grad I = c I: then exp(-c t) I is a time-dependent
-    integral. The identity is expanded, for every value of the symbols; the function is in (variables, symbols, eps).
-    Exact.
+    integral. The identity is expanded for all values of the symbols; exact. The function is in (variables, symbols,
+    eps).
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem

@@ -91,7 +91,7 @@ class Equation:
     def explicit(self) -> Equation | None:
         """Numerators and common denominator of an explicit map (rows Q_i x~_i = P_i), as the only row of an equation.
 
-        They have no common factor. None if the map is not explicit or they are long, and over fields other than QQ and
+        They have no common factor. None if the map is not explicit or they are long, and over fields other than QQ,
         GF(p).
         """
         if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):

@@ -29,8 +29,7 @@ def explicit_map(
 
     Args:
         variables: the names of the n coordinates; or a dict {variable: function}, without `image`.
-        image: n rational functions of the variables, then symbols (if any), then eps; or texts, or expressions of
-            SymPy.
+        image: n rational functions of the variables, then symbols (if any), then eps; or texts, or SymPy expressions.
         inverse: the functions of the inverse map, if known; they are not tested here.
 
     Returns:

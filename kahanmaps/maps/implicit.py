@@ -4,7 +4,7 @@ M is a matrix and r a vector of polynomials. For Kahan's method M = I - eps f' a
 map given by rational functions M is the diagonal matrix of their denominators; other discretizations that are linear in
 the new point already have this form. There are three kinds of objects:
 
-* `MapFamily` is the map over Q, with eps as a parameter. A new discretization is a function that returns an
+* `MapFamily` is the map over Q, with eps as a parameter. New discretizations are functions that return an
   `ImplicitMap`.
 * `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is a composition of factors
   (usually one), each an `ElementaryMap` with an equation.

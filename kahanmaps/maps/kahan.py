@@ -8,8 +8,7 @@ which is linear in x~; explicitly Phi(x, eps) = x + 2 eps (I - eps f'(x))^{-1} f
 Jacobi matrix (I - eps f'(x))^{-1} (I + eps f'(x~)). Source: petrera-suris-2016, eqs. (eq: Kahan gen), (eq: Phi
 gen), (Jac).
 
-Like every map (implicit.py) it is given by an equation M(x) x~ = r(x), here with M = I - eps f' and r = (I + eps B) x +
-2 eps c.
+Like every map (implicit.py) it has an equation M(x) x~ = r(x): M = I - eps f' and r = (I + eps B) x + 2 eps c.
 """
 
 from __future__ import annotations

@@ -290,17 +290,30 @@ def degree_growth(
     enclosed: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DegreeGrowth:
-    """Measure the degrees of the iterates of a map, for one exact `eps` (or `time_step` = 2 eps), or for generic eps.
+    """Measure the degrees of the iterates of a map, for one exact eps or for generic eps.
 
     The search stops when a recurrence is confirmed by at least 6 terms and by as many as its order, and either it is
-    derived from the singularity patterns or there are enough terms beyond the last confinement; with `max_terms` it
-    stops after d_1, ..., d_max_terms instead. It stops in any case when the budget is spent, which doubles with each
-    increase of `effort` by 1, or before a degree above `max_degree`. A TimeLimit ends it with the degrees measured so
-    far; if `effort` is a Budget, the TimeLimit is raised to the caller. `patterns` are the singularity patterns; by
-    default they are computed here, for `steps` steps. Unless `enclosed` is false, exponential growth in the plane is
-    proved. The computation is modulo random primes of 61 bits, so that degrees are measured and not proved, except for
-    the bounds of the dynamical degree of planar maps. The same `seed` gives the same result. Raises InputError for
-    wrong values.
+    derived from the singularity patterns or there are enough terms beyond the last confinement.
+
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        eps: half the time step, an exact number; None for generic eps.
+        time_step, h: the time step 2 eps, instead of eps.
+        effort: each increase by 1 doubles the work limit. A Budget means that this is a stage of another computation.
+        max_terms: if given, the degrees d_1, ..., d_max_terms are measured instead.
+        max_degree: the search stops before a degree above this one.
+        seed: the random seed.
+        steps: the number of steps for which singularities are followed.
+        patterns: the singularity patterns, if known; by default they are computed.
+        enclosed: whether exponential growth in the plane is to be proved.
+        progress: called with a message at each stage.
+
+    Returns:
+        A `DegreeGrowth`, measured modulo random primes of 61 bits; only bounds of the dynamical degree of planar maps
+        are proved. A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised.
+
+    Raises:
+        InputError: for eps = 0, and for other values out of range.
 
     Source: bellon-viallet-1999.
 
@@ -335,8 +348,7 @@ def dynamical_degree(
 ) -> GrowthRate | DynamicalDegreeBounds | None:
     """Return the dynamical degree lim d_n^(1/n) of a map, with the arguments of `degree_growth`.
 
-    It is an algebraic number, or proved bounds, or None if it is undecided; `degree_growth(system).known` says how it
-    is known.
+    Returns an algebraic number, proved bounds, or None if undecided; `degree_growth(system).known` is its certainty.
 
     >>> dynamical_degree("euler_top")
     <GrowthRate: 1>

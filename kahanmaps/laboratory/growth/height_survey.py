@@ -139,8 +139,7 @@ def height_survey(
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step (exact), or None for 1/10 and 3/11.
         time_step, h: the time step 2 eps, instead of eps.
-        starts: the initial points, or the number of random ones; a random point whose orbit meets a singular point is
-            replaced by another.
+        starts: the initial points, or the number of random ones, whose orbits do not meet a singular point.
         steps: the length of the orbits.
         max_digits: orbits end at a number with more digits; None for no limit.
         effort: each increase by 1 doubles the work limit, at which the current orbit ends and no other is started.

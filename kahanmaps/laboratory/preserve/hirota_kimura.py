@@ -210,8 +210,7 @@ def orbit_profile(
 
     Returns:
         The `Profile`, measured. The search ends when the codimension is dim - 1, so that orbits lie on curves (dim if
-        orbits close), or at `max_degree`. It ends earlier, and is not complete, if there are too many monomials or the
-        budget is spent.
+        orbits close), or at `max_degree`. It ends early, and is not complete, for too many monomials or a spent budget.
 
     Raises:
         NoPoint: where orbits meet the singular set.
@@ -269,8 +268,7 @@ class Basis:
     """A Hirota-Kimura basis: the set of functions, and the null space of a generic orbit.
 
     `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; the other
-    entries are integrals. `agree`: all orbits gave the same dimension. `period` is the number of points of orbits that
-    close, else None.
+    entries are integrals. `agree`: all orbits gave the same dimension. `period` is that of closed orbits, else None.
     """
 
     functions: tuple[str, ...]
@@ -355,7 +353,7 @@ class SparseRelation:
 
     `terms` are pairs of a monomial and its coefficient. A coefficient is the text of a number, perhaps with a power of
     eps, or a name such as "c3" for an integral and "e1" for a function of eps; `integrals` and `functions_of_eps` list
-    these names.
+    them.
     """
 
     terms: tuple[tuple[str, str], ...]

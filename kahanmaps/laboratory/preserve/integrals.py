@@ -183,8 +183,7 @@ class IntegralSearch(Search):
     def is_exact(self) -> bool:
         """Whether there can be no more than `codimension` integrals; otherwise it is a lower bound.
 
-        Relations of higher degrees could show more integrals, unless orbits already lie on curves (or, for a periodic
-        map, on points).
+        Relations of higher degrees could show more integrals, unless orbits lie on curves (on points, if they close).
         """
         dim, measured = self.profile.dim, bool(self.profile.nullities)
         closes = self.profile.period is not None or self.period_at_values is not None

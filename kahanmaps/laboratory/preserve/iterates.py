@@ -153,8 +153,7 @@ def verdict_on_ratio(
 ) -> tuple[Certainty, Evidence]:
     """Decide whether I has the same value one step later, as an identity for the map of the laboratory.
 
-    `too_long` collects the lengths of orbit segments that cannot be expanded; expansion is not tried again for these
-    lengths and longer ones.
+    `too_long` collects the lengths of orbit segments that are too long to be expanded; longer ones are not tried.
     """
     map_, eps = laboratory.map, laboratory.eps
     n, too_long = map_.dim, too_long if too_long is not None else set[int]()

@@ -389,8 +389,7 @@ def _assembled(
 ) -> Products:
     """Build the result from exponent vectors.
 
-    `constant_one` are the vectors with constant 1; `of_densities` are those allowed for a density, by its constant (1
-    first, then -1).
+    `constant_one` are the vectors with constant 1; `of_densities` are those for a density with the constant 1 or -1.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []

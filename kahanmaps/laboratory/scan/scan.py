@@ -110,8 +110,7 @@ def scan(
         jobs: the number of threads, which need numba; by default the number of processors.
         analysis: the effort of an analysis of one member on each component whose degrees do not grow exponentially;
             of several points with the same degrees, only one is analyzed. None: no analyses.
-        progress: called repeatedly with a message; if it raises TimeOver, the scan ends with the result so far, as it
-            does at a TimeLimit.
+        progress: called repeatedly with a message; a TimeOver that it raises, or a TimeLimit, ends the scan early.
 
     Returns:
         A `Scan`. Conditions are found modulo primes and confirmed at members; this is evidence, not proof.

@@ -99,8 +99,7 @@ def sweep(
         eps: half the time step (exact), or None for generic eps, taken from GF(p^2).
         terms: the number of degrees.
         max_length: as for `Family.degrees`.
-        on: the number and the dimension of random affine subspaces of parameter space whose members are measured, or
-            None for all members.
+        on: number and dimension of the random affine subspaces whose members are measured; None for all members.
         units: the units of work that are counted for one member.
         seed: the random seed.
         jobs: as for `Family.degrees`.

@@ -72,8 +72,7 @@ def components(
     """The components of the zero sets of forms on the surface curve(t) + u direction, in projective space over GF(p).
 
     Each form over Q has a flag, whether it is evaluated at the image of the point under the map of the equation.
-    `direction` must be a random vector, so that degrees are those of hypersurfaces. Exact for the surface. Raises
-    BadPrime.
+    `direction` must be random, so that degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
     """
     field = GF(equation.over.characteristic)
     ring = nmod_mpoly_ctx.get(("t", "u"), modulus=field.prime, ordering=Ordering.degrevlex)
@@ -173,8 +172,7 @@ class _Curve:
 
     @cached_property
     def key(self) -> Key:
-        """The key of its hypersurface: whether it is contracted, which forms vanish there, and the first
-        `rows`.
+        """The key of its hypersurface: is it contracted, which forms vanish there, and the first `rows`.
 
         Raises OrbitDataUnknown where there is no first step.
         """

@@ -2,8 +2,7 @@
 
 A curve through a generic point of the hypersurface is a power series in t. After each step a power of t is divided out:
 its exponent mu is the multiplicity with which the image lies in the indeterminacy locus. The multiplicities nu with
-which it lies in the critical hypersurfaces are their orders along the image. Series are followed until the pattern is
-known for all steps.
+which it lies in the critical hypersurfaces are their orders along the image. Series are computed until it has settled.
 """
 
 from __future__ import annotations

@@ -172,8 +172,7 @@ class Hypersurface(ResultPart):
     It was followed for `followed` steps in all. From the step `settled_at` on, the pattern follows from its earlier
     rows: it is zero, periodic, or given by a linear recurrence. `settled_at` is None if the pattern has not settled.
     `orbit_data` is this pattern. In a composition that is followed map by map all steps are those of single maps, and
-    the map of number `stage`, from 0, contracts it; otherwise `stage` is None. `generic` is its polynomial over Q[eps],
-    empty if it is not known.
+    the map of number `stage`, from 0, contracts it; otherwise `stage` is None. `generic` is its polynomial over Q[eps].
     """
 
     polynomial: str = "?"
@@ -238,8 +237,7 @@ class Hypersurface(ResultPart):
 class HypersurfaceForm:
     """An irreducible form, whether it is a pole, and its exponent in the Jacobian determinant (None: unknown).
 
-    `minor_exponent` is its exponent in the common factor of the minors of an equation, and `stage` the number of that
-    map in a word, from 0.
+    `minor_exponent` is its exponent in the common factor of the minors of an equation; `stage` is the index of its map.
     """
 
     form: Any

@@ -180,15 +180,26 @@ def singularities(
 ) -> SingularityRun:
     """Compute the exceptional hypersurfaces and poles of a Kahan map at one exact eps, and their singularity patterns.
 
-    Without eps two values are tried, and the result at the first of them is returned if their patterns agree.
+    Args:
+        system: a map, or a system, which stands for its Kahan map; of dimension at most 6.
+        eps: half the time step, an exact number; None: two values are tried, and their patterns must agree.
+        time_step, h: the time step 2 eps, instead of eps.
+        steps: the number of steps for which hypersurfaces are followed: by default 1000 in the plane, 500 in dimension
+            3, 250 in dimension 4 and 100 above, fewer if series are needed at all steps.
+        seed: the random seed.
+        effort: each increase by 1 doubles the work limit.
+        progress: called with a message for each hypersurface.
 
-    Hypersurfaces are followed for `steps` steps: by default 1000 in the plane, 500 in dimension 3, 250 in dimension 4
-    and 100 above, fewer if series are needed at all steps. Hypersurfaces are exact; their outcome is measured at two
-    random points modulo two random primes, and "not confined" refers to this number of steps. The computation stops at
-    a TimeLimit or when the work limit is reached, which doubles with each increase of `effort` by 1; if `effort` is a
-    Budget, the TimeLimit is raised to the caller. Returns a SingularityRun. Raises InputError for dimensions above 6, a
-    wrong number of steps, and an eps or coefficients of more than 10,000 digits or too long for the budget. Source:
-    grammaticos-ramani-papageorgiou-1991, zander-2021.
+    Returns:
+        A `SingularityRun`, without eps that of the first value. Hypersurfaces are exact; their outcome is measured at
+        two random points modulo two random primes, and "not confined" refers to this number of steps. A TimeLimit ends
+        the computation early; if `effort` is a Budget, it is raised.
+
+    Raises:
+        InputError: for dimensions above 6, a wrong number of steps, numbers too long for the budget, and different
+            patterns.
+
+    Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, str(run.verdict)
@@ -528,8 +539,7 @@ def _range(dim: int, steps: int | None, budget: Budget) -> Range:
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
     """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
 
-    Exact. None above dimension 4, where the determinant may be long, for compositions too large to be expanded, and if
-    a variable is called eps.
+    Exact. None above dimension 4, for compositions too large to be expanded, and if a variable is called eps.
 
     >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
     [('12*x*eps^2 - 1', 1)]

@@ -5,8 +5,7 @@ have long polynomials. Map by map the polynomials are short. Curves through the 
 word of the maps, one map a step, starting with the map that contracts the hypersurface. Powers of a word repeat it.
 
 For every eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
-Hilbert's irreducibility theorem its factors stay irreducible at all but few eps, so that those at one eps are their
-values there.
+Hilbert's irreducibility theorem its factors stay irreducible for most eps, so that those at one eps are their values.
 """
 
 from __future__ import annotations

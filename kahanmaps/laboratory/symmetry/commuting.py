@@ -6,8 +6,7 @@ conditions are necessary, so no solution is discarded. Third, every solution is 
 proved, or supported at random points.
 
 A quadratic system in n variables over a number field K of degree m is one in n m variables over Q, and its Kahan map is
-that over K (docs/beyond.md). So the g over K whose maps commute with that of f are among the rational ones for this
-larger system.
+that over K (docs/beyond.md). So the g over K whose maps commute with that of f are among its rational g.
 """
 
 from __future__ import annotations

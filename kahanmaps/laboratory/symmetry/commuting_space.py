@@ -79,8 +79,7 @@ def commutator_equations(
     rng: random.Random,
     budget: Budget,
 ) -> list[fmpq_mpoly]:
-    """Return equations that hold for b if the Kahan maps of f and g = sum `weights[i]` `basis[i]` commute for every
-    eps.
+    """Return equations that hold for b if the Kahan maps of f and g = sum weights[i] basis[i] commute for every eps.
 
     `weights` are polynomials in b. Exact: coefficients of eps^2, ..., eps^order of the commutator at small random
     integer points, until two consecutive points give no new equation or the `budget` is spent. Returns linearly
@@ -160,10 +159,9 @@ def unknowns(system: QuadraticSystem, shape: str) -> int:
 
 
 def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat | None = None) -> CommutingSpace:
-    """Compute all g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"). Exact; f is not
-    zero.
+    """Compute all g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"); exact.
 
-    With a matrix C such that C f' = f' C, only the g with C g' = g' C are computed.
+    f is not 0. With a matrix C such that C f' = f' C, only the g with C g' = g' C are computed.
 
     The conditions are taken at random integer points, and the result is verified as an identity of polynomials.
     Source: petrera-suris-2016.

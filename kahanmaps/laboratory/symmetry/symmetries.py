@@ -70,8 +70,7 @@ class Symmetry(ResultPart):
 class Infinitesimal(ResultPart):
     """A field S x + s with f'(x)(S x + s) - S f(x) = weight f(x).
 
-    Its flow T_t satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps), so that T_t is a symmetry if the weight
-    is 0.
+    Its flow T_t satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps): a symmetry if the weight is 0.
     """
 
     variables: tuple[str, ...]
@@ -185,9 +184,16 @@ def linear_symmetries(
 
     The search covers the Lie algebra of affine symmetries, a scaling, and signed permutations, also of scaled
     variables, with a translation where needed (dimension at most 12). In dimension at most 3 it covers all rational
-    matrices, if the Lie algebra has no linear element. The result is exact and proved. Each increase of `effort` by 1
-    doubles the work limit. `on_result` is called once, with the result, to which the later stages add. Source:
-    cmoq-2013.
+    matrices, if the Lie algebra has no linear element.
+
+    Args:
+        system: a quadratic system over Q.
+        effort: each increase by 1 doubles the work limit.
+        progress: called with a message at each stage.
+        on_result: called once, with the result, to which the later stages add.
+
+    Returns:
+        A `Symmetries`, exact and proved. Source: cmoq-2013.
 
     >>> symmetries = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
     >>> symmetries.order, [t.text for t in symmetries.generators]

@@ -3,8 +3,8 @@
 With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's method is equivariant under affine changes of
 variables: the map of f at eps is that of g at eps/c. Only some P are tried: permutations of the variables, scaled up to
 dimension 5, after a change to a frame that f determines (invariant hyperplanes, lines of fixed points), and in the
-plane all P. Parameters of g are unknowns too. An equivalence that is found is verified exactly; if none is found, one
-may still exist.
+plane all P. Parameters of g are unknowns too. Every equivalence is verified exactly; if none is found, one may still
+exist.
 """
 
 from __future__ import annotations

@@ -138,8 +138,7 @@ class FixedPointSearch(ResultPart):
 def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSearch:
     """Compute all equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
 
-    Each increase of `effort` by 1 doubles the work limit; above dimension 6 there is no search. `undecided` says what
-    may be missing.
+    Each increase of `effort` by 1 doubles the work limit; there is no search above dimension 6. See `undecided`.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> print(fixed_points(pendulum))

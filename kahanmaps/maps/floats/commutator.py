@@ -28,8 +28,7 @@ class Commutator:
 
     `by_step` are pairs (n, size) for n = 1, 2, 4, ... and the last step, `largest` is the largest of all steps.
     `by_eps` are pairs (eps, size) at n = 1 for eps and its halves; `slope` is the slope of log size against log eps
-    between the last two sizes above rounding error, None without two. `message` says why the orbit ended early; it is
-    empty for a complete one.
+    between the last two sizes above rounding error, None without two. `message` says why the orbit ended early.
     """
 
     by_step: tuple[tuple[int, float], ...]

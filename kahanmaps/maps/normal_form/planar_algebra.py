@@ -201,8 +201,7 @@ class ShortElements:
     ) -> Triple:
         """Return the sum of scale times term times lift, times `inverse` and a number that makes it integral.
 
-        Terms and result have coefficients in Z[t]; the coefficients of the result and the remaining denominator are
-        coprime.
+        Terms and result have coefficients in Z[t]; those of the result are coprime to the remaining denominator.
         """
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]

@@ -4,8 +4,8 @@ h and the initial point are scaled such that h is a primitive integer form and (
 factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k, and its content must be removed: otherwise the
 numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level) the content of
 Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
-lifts of `tau`. Single steps remove the content by gcds; they are used for short orbits, and on singular cubics, where
-numbers hardly grow.
+lifts of `tau`. Single steps remove it by gcds; they are used for short orbits, and on singular cubics, where numbers
+hardly grow.
 """
 
 from __future__ import annotations

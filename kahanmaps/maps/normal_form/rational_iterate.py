@@ -6,8 +6,7 @@ or over the budget) is determined as follows.
 * Heights are computed at a few steps, at increasing distances. Up to O(1) they are convex functions of the step
   (a polynomial of degree 2, or linear). So if the height is within the budget at two steps, it is within the budget in
   between, and a rise shows where the budget is exceeded at the latest; later steps are irrelevant.
-* Poles up to there are found modulo random primes of 61 bits and verified over Q: a pole over Q is a pole modulo every
-  prime.
+* Poles up to there are found modulo random primes of 61 bits (a pole over Q is one modulo every prime), and verified.
 * The poles of a plane that is periodic, or whose level is parabolic, are known for all steps at once, and its numbers
   stay short. If this holds for all planes, any n can be reached.
 """

@@ -103,8 +103,7 @@ class UnreducedPoint(IntegerPoint):
     The gcds of long numbers take most of the time of an orbit whose heights grow exponentially, and usually have a few
     bits only. A factor that is not removed costs little: its share of the length of the integers stays the same from
     step to step. So only small primes are divided out at once, and other common factors after the numbers have become
-    `_LONGER` times as long, or when the coordinates are read. If a long common factor is found, all later points of the
-    orbit are reduced.
+    `_LONGER` times as long, or when the coordinates are read. After a long common factor all later points are reduced.
     """
 
     def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous: IntegerPoint) -> None:

@@ -81,15 +81,14 @@ def orbit(
     Args:
         system: the map; a quadratic system stands for its Kahan map. A map at a fixed eps, such as phi @ psi, is
             iterated in its own field.
-        start, x0: the initial point: exact numbers, by variable in a dict, or text such as "1/2,-1/3"; for float orbits
-            also floats.
+        start, x0: the initial point: exact numbers, a dict by variable, or text "1/2,-1/3"; or floats for float orbits.
         eps: an exact number, for Kahan maps half the time step; None for a map that does not depend on it. For float
             orbits a float stands for the decimal that Python prints.
         time_step, h: the time step 2 eps, instead of eps.
         steps, n: the number of steps; instead of it:
         at: the requested iterates.
-        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field: QQ, GF(p), RR(bits), CC(bits), a
-            number field.
+        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or QQ, GF(p), RR(bits), CC(bits), a number
+            field.
         exact: True for "exact", False for "float", instead of `arithmetic`.
         method: "generic", "normal-form" or "doubling"; by default chosen automatically.
         backward: step by the inverse map.

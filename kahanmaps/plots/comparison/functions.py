@@ -30,7 +30,7 @@ _EFFORT = -2  # of the search for integrals: it takes at most a few seconds
 
 
 class OfTheImage:
-    """An integral that depends on x and its image x~ under the Kahan map: the modified H, or one of the commutant."""
+    """An integral that depends on x and its image x~ under the Kahan map: the modified H, or x^T M x~/eps."""
 
     def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
         self.name, self.label = function.name, label
@@ -70,8 +70,7 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     """Return the known integrals of the Kahan map of a system by name, and H of the differential equation.
 
     These are the integrals claimed in the file; the modified H of a cubic Hamiltonian; for a member of the family the
-    integrals of the commutant; and last the plain H, which the Kahan map does not conserve. `eps` is half the time step
-    (exact).
+    integrals of the commutant; and last H itself, which the Kahan map does not conserve. `eps` is half the time step.
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))

@@ -56,8 +56,7 @@ class Cofactor:
     """A candidate cofactor: a function of x formed from a polynomial g in the variables, symbols and eps, by `kind`.
 
     "reversed": g(x~, -eps)/g(x, eps); "factor": g(x, eps); "pole": 1/g(x, eps); "denominator": g(x~, eps)/g(x, eps).
-    Without a polynomial the cofactor is det dPhi. `weight` approximates the least degree of a polynomial with this
-    cofactor.
+    Without a polynomial the cofactor is det dPhi. `weight` approximates the least degree of a P with this cofactor.
     """
 
     name: str
@@ -346,8 +345,7 @@ class SpaceSearch:
     """The result of a search on one map: a list of spaces for each step.
 
     The products in the steps refer to `cofactors`, which were tried up to `cofactor_degree`; `searched` are the degrees
-    of relations along orbits whose span was searched. `cut` says which cofactors were skipped because the budget was
-    spent.
+    of relations along orbits whose span was searched. `cut` says which cofactors the budget did not allow.
     """
 
     steps: list[SearchStep] = field(default_factory=list)

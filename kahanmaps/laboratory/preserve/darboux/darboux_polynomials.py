@@ -53,8 +53,7 @@ Law = tuple[CofactorProduct, int]  # a product of cofactors and its numerical fa
 class DarbouxPolynomials(LatexDisplay, ResultPart):
     """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
 
-    For a flow it is K in P' = K P. The verdict concerns the identity for all P: proved by expansion, or supported at
-    random points.
+    For a flow it is K in P' = K P. The verdict on the identity for all P is proved (expanded) or supported.
     """
 
     cofactor: str

@@ -7,8 +7,8 @@ the matrix has a smaller rank there than at random points, and P divides its min
 conjugate zeros in one irreducible factor, and P vanishes along the solutions from all of them. So, for each choice of
 factors whose degrees add up to d, the search computes the space of polynomials that vanish along the solutions from
 their zeros; P lies in one of these spaces. Several lines give smaller spaces, by intersection. If all spaces are 0,
-there is no P. If a space has dimension 1, its element is lifted to Q, and whether it divides f . grad P is decided
-exactly.
+there is no P. If a space has dimension 1, its element P is lifted to Q, and an exact division shows whether P divides f
+. grad P.
 
 Lifting uses Newton's iteration: P and K modulo p solve f . grad P = K P, usually as a simple solution, so that they are
 determined modulo powers of p. If the coefficients are residues of rational numbers there, P is found. If they are
@@ -18,8 +18,7 @@ polynomial modulo some prime is lifted or irrational.
 
 Weights w of the variables form a grading if all terms x^a of all x_i' have the same w . a - w_i. Then the cofactor K of
 a P is homogeneous, and it is the cofactor of every homogeneous part of P. The quotients of these parts are integrals,
-so a P that belongs to no integral is homogeneous in every grading. Hence there is a separate search for the monomials
-of each weight.
+so a P that belongs to no integral is homogeneous in every grading. Hence the monomials of each weight are searched.
 """
 
 from __future__ import annotations
@@ -147,8 +146,7 @@ def gradings(field: PolynomialField) -> list[tuple[int, ...]]:
 def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
     """Return the possible supports of an irreducible polynomial of this degree, as lists of indices of monomials.
 
-    The monomials of a support have one weight in each grading and no common variable, and at least one of them has the
-    full degree.
+    The monomials of a support have one weight in each grading, no common variable, and one of them has the full degree.
     """
     exponents, by_weight = exponents_up_to(n, degree), dict[tuple[int, ...], list[int]]()
     for k, exponent in enumerate(exponents):

@@ -212,8 +212,8 @@ def flow_and_map(
 
     Args:
         search: the integrals of the map, for every eps.
-        densities: the densities of the map, if known: the limit of one of them is preferred to a density of the flow
-            that a search finds.
+        densities: the densities of the map, if known: the limit of one of them is preferred to a density that a search
+            finds.
         flow: the integrals of the flow. By default they are searched for up to a low degree, unless the limits of the
             integrals of the map are already the largest possible number.
         known: the number of integrals that the map is known to have, if `search` shows fewer.

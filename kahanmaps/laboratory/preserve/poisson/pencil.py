@@ -67,8 +67,7 @@ class BasePoints:
 class Pencil:
     """The curves I = c of a planar map for generic c (measured), where I is the integral of this name.
 
-    `components` is the number of components of a curve; `degree`, `genus` and `base_points` are those of the pencil of
-    components.
+    `components` is the number of components of a curve; `degree`, `genus` and `base_points` are those of components.
     """
 
     integral: str
@@ -248,8 +247,7 @@ class _Reduced:
     def _resolve(self, K: Any, f: _Local, g: _Local, max_intersection: int, *, exact: bool, near: bool) -> None:
         """Count the common point of two curves over K, if it is one, and their common points infinitely near to it.
 
-        The intersection number is at most `max_intersection`, or equal to it if `exact`; so terms of higher degree are
-        not needed.
+        The intersection number is at most `max_intersection`, or equal to it if `exact`; this bounds degrees.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())

@@ -80,8 +80,7 @@ def points_needed(size: int) -> list[int]:
 def curve(points: Rows, prime: int, known_sections: Sections | None = None) -> Curve | None:
     """Search for the elliptic curve of an orbit whose points have last coordinate 1; return None if there is none.
 
-    Raises ArithmeticError if the dimensions are those of a curve, but the sequences are not: then the prime or the
-    initial point is special.
+    Raises ArithmeticError if only the dimensions are those of a curve: the prime or the initial point is special.
     """
     constructions = [known_sections] if known_sections else list(_constructions(points, prime))
     for sections in constructions:
