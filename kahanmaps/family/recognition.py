@@ -113,7 +113,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     """
     if J is None:
         J = standard_structure(len(names_of(H)))
-    reason = _reason_against(CubicHamiltonian(H, J))
+    reason = _unsupported_reason(CubicHamiltonian(H, J))
     if reason:
         raise InputError(reason)
     _require_size(J.nrows())
@@ -152,7 +152,7 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     >>> find_family_structure(CubicHamiltonian(H, standard_structure(4))) is None
     True
     """
-    if _reason_against(hamiltonian):
+    if _unsupported_reason(hamiltonian):
         return None
     _require_size(hamiltonian.dim)
     T = QQ.identity(hamiltonian.dim) if hamiltonian.is_standard else darboux_coordinates(hamiltonian.J)
@@ -207,7 +207,7 @@ def why_not_member(hamiltonian: CubicHamiltonian | None) -> str:
     """Return a sentence that says why a system is not a member; pass None for a system without a Hamiltonian."""
     if hamiltonian is None:
         return "x' is not J grad H with J = [[0, I], [-I, 0]]"
-    return _reason_against(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
+    return _unsupported_reason(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
 
 
 def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
@@ -395,7 +395,7 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
     return [fmpq_mat(*shape, primitive_integers(tuple(map(fmpq, row)))) for row in lattice.lll().tolist()]
 
 
-def _reason_against(hamiltonian: CubicHamiltonian) -> str:
+def _unsupported_reason(hamiltonian: CubicHamiltonian) -> str:
     """Return why the search for A does not apply to a system; empty if it does."""
     if hamiltonian.dim % 2:
         return f"the dimension is {hamiltonian.dim}, expected an even one"

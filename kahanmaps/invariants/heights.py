@@ -328,7 +328,7 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     least_rise, spread = min(rises), max(rises) - min(rises)
     if least_rise > 0 and spread <= least_rise / 4 and (spread <= _NOISE or spread <= least_rise / 32):
         return Growth.LINEAR, f"{rises_text}, about the same each time"
-    return Growth.UNDECIDED, f"{rises_text}, which fits no rule; more steps may tell"
+    return Growth.UNDECIDED, f"{rises_text}, which fits no rule; more steps may decide"
 
 
 def _too_few(heights: Sequence[int]) -> str:

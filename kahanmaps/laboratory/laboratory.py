@@ -126,8 +126,8 @@ class Laboratory:
         if algebraic and isinstance(file.map, AlgebraicMap):
             self.root, self.map = file.map.root, file.map.given
             if symbols or self.root.degree > MAX_DEGREE:
-                found = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
-                raise InputError(f"found {found}, expected no other symbols and a degree of at most {MAX_DEGREE}")
+                given = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
+                raise InputError(f"found {given}, expected no other symbols and a degree of at most {MAX_DEGREE}")
             self.symbols = self.map.symbols
         else:
             self.map = map_with_symbols(file, self.symbols)

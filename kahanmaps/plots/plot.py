@@ -135,12 +135,12 @@ class Plot(AttributeHints):
         file = as_file(system)
         value = file.real_approximation.at(resolve_eps(eps, None, floats=True)).eps
         hyperplane = hyperplane_of(file, value, plane)
-        found = section_of(
+        section = section_of(
             ensemble_for(file.map, value, start_rows(x0, file.variables), n), hyperplane, n, direction=direction
         )
-        names = axes or [file.variables[k] for k in found.widest_axes(hyperplane)]
+        names = axes or [file.variables[k] for k in section.widest_axes(hyperplane)]
         functions = [requested_axis(file, value, name) for name in names]
-        return _axes(plot_section(found, functions, curves=curves_on(file, value, hyperplane, functions)))
+        return _axes(plot_section(section, functions, curves=curves_on(file, value, hyperplane, functions)))
 
     def escape(
         self,

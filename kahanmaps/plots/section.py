@@ -100,7 +100,7 @@ def section_of(
     """
     if direction not in (UP, DOWN, BOTH):
         raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")
-    found: list[list[FloatArray]] = [[] for _ in range(ensemble.n)]
+    crossings_by_orbit: list[list[FloatArray]] = [[] for _ in range(ensemble.n)]
     skipped, last = 0, np.empty((0, ensemble.n, ensemble.system.dim))
     for portion in ensemble.records(steps, 1, progress=progress):
         points = np.concatenate([last, portion])
@@ -108,9 +108,9 @@ def section_of(
         values = hyperplane(points)
         for k in range(ensemble.n):
             crossings, left_out = crossings_of(points[:, k], values[:, k], direction)
-            found[k].append(crossings)
+            crossings_by_orbit[k].append(crossings)
             skipped += left_out
-    return Section(tuple(np.concatenate(pieces) for pieces in found), skipped)
+    return Section(tuple(np.concatenate(pieces) for pieces in crossings_by_orbit), skipped)
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
@@ -225,8 +225,8 @@ def plot_section(
             levels = levels_through(function, np.concatenate([points[:1] for points in section.crossings]))
             plane = [axis.variable for axis in axes if axis.variable is not None]
             dim = len(function.function.names) - 1
-            found = level_curves(function, plane, dim, levels[:MAX_LEVELS], window)
-            pieces = [piece for level in found for piece in level]
+            curves_by_level = level_curves(function, plane, dim, levels[:MAX_LEVELS], window)
+            pieces = [piece for level in curves_by_level for piece in level]
             if pieces:
                 look: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5, "linestyles": LINES[k % len(LINES)]}
                 drawn.add_collection(LineCollection(pieces, zorder=1, **look), autolim=False)

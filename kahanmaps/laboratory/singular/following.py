@@ -147,7 +147,7 @@ class Tracked:
 
     `minor_exponents` are the exponents of the functions in the common factor of the minors of the equation, which does
     not belong to the map; `initial_orders` are the orders on the hypersurface: 1 for its own form, 0 for others. The
-    first `critical` of them are those of contracted hypersurfaces.
+    first `critical` of them are those of exceptional hypersurfaces.
     """
 
     functions: tuple[Function, ...] = ()

@@ -92,7 +92,7 @@ class SingularityRun(PrintableResult):
 
     `denominator` is det(I - eps f'(x)) as text, or "?" for a composition if it is too large. `critical_degree` is the
     degree of the Jacobian determinant of the homogeneous map; it is None if the determinant is too large to expand, and
-    contracted hypersurfaces are then represented by random points. If the determinant vanishes identically, the map is
+    exceptional hypersurfaces are then represented by random points. If the determinant vanishes identically, the map is
     not dominant: its image lies in a hypersurface, and no hypersurface is followed. `word` are the maps of a
     composition that is followed map by map; steps of hypersurfaces are then single maps.
     """

@@ -92,7 +92,7 @@ class ModifiedField(ResultPart):
             "variables": list(self.file.variables),
             "field": [{"order": k, "rhs": plain(self.fields[k])} for k in even],
             "hamiltonian": [{"order": k, "term": plain(self.hamiltonian[k])} for k in even if self.hamiltonian],
-            "flow_integrals": [attributes(found, *names) for found in self.integrals],
+            "flow_integrals": [attributes(integral, *names) for integral in self.integrals],
         }
 
     def lines(self) -> list[str]:
@@ -103,7 +103,7 @@ class ModifiedField(ResultPart):
                 lines.append(f"eps^{k}\t{name}'\t{_short(component)}")
         for k in range(0, self.order + 1 if self.hamiltonian else 0, 2):
             lines.append(f"eps^{k}\tmodified H\t{_short(self.hamiltonian[k])}")
-        lines += [f"proved\t{_short(found.integral)}\t{found.sentence}" for found in self.integrals]
+        lines += [f"proved\t{_short(integral.integral)}\t{integral.sentence}" for integral in self.integrals]
         nothing = [] if self.integrals else ["no polynomial integral of the flow is known, or found by a search"]
         return lines + nothing
 
@@ -210,7 +210,7 @@ def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> lis
         candidates.append(file.hamiltonian.H)
     functions = [normalized(function, file.dim).leading for function in measured_integrals(file).values()]
     progress("searching for integrals of the flow")
-    functions += [found.function for found in find_integrals(file, flow=True, effort=_EFFORT).integrals]
+    functions += [integral.function for integral in find_integrals(file, flow=True, effort=_EFFORT).integrals]
     for function in functions:
         if function is not None and function.denominator.is_constant():
             candidates.append(function.numerator.project_to_context(context))

@@ -108,9 +108,9 @@ def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any])
     for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
         numerator, denominator = plane.block.level((U, V, W))
         if plane.block.is_zero or (U == 0 and V == 0):
-            return f"the start is at rest in the plane {plane.name}"
+            return f"the initial point is fixed in the plane {plane.name}"
         if denominator == 0 or numerator == 0 or plane.block.discriminant == 0:
-            return f"the start is on a singular level in the plane {plane.name}"
+            return f"the initial point is on a singular level in the plane {plane.name}"
         if plane.block.discriminant * numerator * numerator == denominator * denominator:
-            return f"the start is on three lines in the plane {plane.name}"
+            return f"the initial point is on three lines in the plane {plane.name}"
     return ""

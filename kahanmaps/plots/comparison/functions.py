@@ -105,18 +105,18 @@ def watched_functions(
     >>> watched_functions(load("euler_top"), fmpq(1, 10))[1]
     {'(-F1 + 1)/eps^2': 'declared', 'x2^2 + 2*x3^2': 'flow', '(-F2/2 + 1/2)/eps^2': 'declared', 'x1^2 - x3^2': 'flow'}
     """
-    found: list[WatchedFunction]
+    known: list[WatchedFunction]
     if file.hamiltonian is None and not measured_integrals(file):
         progress("searching for integrals")
         search = find_integrals(file, effort=_EFFORT)
-        found = [PointFunction(I.name, normalized(I.function, file.dim).function, eps) for I in search.integrals]
+        known = [PointFunction(I.name, normalized(I.function, file.dim).function, eps) for I in search.integrals]
     else:
-        found = known_functions(file, eps)
+        known = known_functions(file, eps)
     declared, hamiltonian = measured_integrals(file), file.hamiltonian
     of_flow = [] if hamiltonian is None else [_as_function(hamiltonian, primitive_part(hamiltonian.H)[1])]
     functions: list[WatchedFunction] = []
     origins: dict[str, str] = {}
-    for function in found:
+    for function in known:
         functions.append(function)
         name = function.name
         of_theorem = "theorem" if hamiltonian else "found"

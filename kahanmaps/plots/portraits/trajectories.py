@@ -70,8 +70,8 @@ def ensemble_of_file(
     file: SystemFile, eps: fmpq | None, starts: FloatArray, steps: int, *, backward: bool = False
 ) -> FloatEnsemble:
     """Return the ensemble for the map of a file, in normal form if it has one; `eps` is None for a map without eps."""
-    found = float_normal_form(file)
-    form = None if isinstance(found, NoNormalForm) else found.form
+    normal_form = float_normal_form(file)
+    form = None if isinstance(normal_form, NoNormalForm) else normal_form.form
     return ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
 
 
