@@ -45,7 +45,7 @@ def double_root_parameter(C, H, D):
 
 
 def class_of(field):
-    """The kind of the roots of C, and the invariants that tell the classes of this kind apart."""
+    """The kind of the roots of C, and the invariants that distinguish the classes of this kind."""
     (a1, b1, c1), (a2, b2, c2) = field
     a, b, c, d = C = (a2, b2 - a1, c2 - b1, -c1)
     D = (2 * a1 + b2, b1 + 2 * c2)
@@ -98,8 +98,8 @@ def main():
         if str(growth.growth) == "exponential":
             fast[growth.dynamical_degree.text] += 1
             continue
-        found = km.find_integrals(system)
-        integral = found.integrals[0].text if found.integrals else "none found"
+        search = km.find_integrals(system)
+        integral = search.integrals[0].text if search.integrals else "none found"
         closed = growth.recurrence.closed_form.split(";")[0]
         equations = f"({', '.join(map(polynomial, (fields[0][:3], fields[0][3:])))})"
         slow.append((str(growth.growth), closed, equations, roots, len(fields), integral))

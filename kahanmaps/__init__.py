@@ -10,7 +10,7 @@ True
 >>> km.check_commute(km.SystemFile.from_member(member)).verdict
 <Certainty.PROVED: 'proved'>
 
-Names are imported when they are first used, so that `import kahanmaps` costs next to nothing.
+Names are imported when they are first used, so that `import kahanmaps` is fast.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ from typing import IO, Any
 def atomic_write(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
     """Open a temporary file that replaces `path` at the end of the block, or is removed if the block raises.
 
-    At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced: it gets
-    everything at the end. Raises OSError that names `path`.
+    At any time `path` is the complete old file or the complete new one. A pipe or a device cannot be replaced; all
+    content is written to it at the end. Raises OSError that names `path`.
     """
     with named(path):
         if os.path.exists(path) and not os.path.isfile(path):

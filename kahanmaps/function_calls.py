@@ -166,7 +166,7 @@ def _in_notebook() -> bool:
 def _interrupt_ends_search() -> Iterator[Callable[[], bool]]:
     """Within the block let Ctrl-C, or the button of a notebook, end a search like a time limit: its results are kept.
 
-    A second interrupt is raised as usual. A handler of the caller is left alone.
+    A second interrupt is raised as usual. A handler that the caller has installed stays in place.
     """
     interrupts: list[bool] = []
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -187,7 +187,7 @@ def _interrupt_ends_search() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def _shown_progress(name: str) -> Iterator[Callable[[str], None]]:
-    """Show the last message below a cell of a notebook, once the block has taken two seconds, and remove it after."""
+    """Show the last message below a cell of a notebook, from two seconds on to the end of the block."""
     if not _in_notebook():
         yield lambda _: None
         return

@@ -22,9 +22,9 @@ class TimeLimit(KeyboardInterrupt):
 def time_limit(seconds: float | None) -> Iterator[Callable[[], bool]]:
     """Raise TimeLimit within the block after this number of seconds; None means no limit.
 
-    Completed work is kept, and the running computation is lost. The block gets a function that says whether the limit
-    has expired. Works in the main thread only, and not on Windows. Raises InputError elsewhere, and unless the time is
-    positive.
+    `seconds` is positive. Completed work is kept, and the running computation is lost. The block gets a function that
+    returns whether the limit has expired. Raises InputError for other limits, in other threads than the main one, and
+    on Windows.
 
     >>> with time_limit(60) as is_over:
     ...     print(is_over())

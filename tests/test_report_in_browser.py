@@ -54,7 +54,7 @@ def html():
 
 def test_nothing_is_fetched_and_nothing_complained_of(tmp_path, html):
     dom, requested, console = dumped(tmp_path, html)
-    assert "How to make this page again" in dom
+    assert "How to reproduce this page" in dom
     assert (requested, console) == ([], [])
 
 

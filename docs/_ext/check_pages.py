@@ -39,20 +39,20 @@ def mistakes(folder: Path) -> list[str]:
     for path, page in pages.items():
         for tag, address in page.addresses:
             parts = urlsplit(address)
-            said = f"{path.relative_to(folder)}: {address}"
+            link = f"{path.relative_to(folder)}: {address}"
             if parts.scheme or parts.netloc:
                 if tag not in VISITED and parts.scheme != "data":
-                    result.append(f"{said} has to be fetched")
+                    result.append(f"{link} has to be fetched")
                 continue
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
             if not target.is_file():
-                result.append(f"{said} is not there")
+                result.append(f"{link} is not there")
             elif parts.fragment and target in pages and unquote(parts.fragment) not in pages[target].anchors:
-                result.append(f"{said} is no place on that page")
+                result.append(f"{link} is no place on that page")
     return result
 
 
 if __name__ == "__main__":
-    told = mistakes(Path(sys.argv[1]))
-    print(*told, sep="\n", end="\n" if told else "", file=sys.stderr)
-    sys.exit(bool(told))
+    messages = mistakes(Path(sys.argv[1]))
+    print(*messages, sep="\n", end="\n" if messages else "", file=sys.stderr)
+    sys.exit(bool(messages))

@@ -92,7 +92,7 @@ class BoundField(Field):
         return Bound(self, CoefficientSize(1, 0.0), 1, {})
 
     def polynomial(self, degree: int, bits: float) -> Bound:
-        """Return the bound of an integer polynomial with this degree and this log2 of the sum of |coefficients|."""
+        """Return the bound of integer polynomials of this degree whose |coefficients| have a sum of at most 2^bits."""
         return Bound(self, CoefficientSize(degree, bits), 1, {})
 
     @property

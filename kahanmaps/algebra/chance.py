@@ -1,9 +1,9 @@
-"""Random seeds that depend on the claim: random choices come from a hash of the claim together with the user's seed.
+"""Random seeds that depend on the claim: random choices are drawn from a hash of the claim and the user's seed.
 
 A seed alone is public, and anyone who knows the primes and points in advance can write a false claim that passes at all
-of them, as with primality tests at fixed bases (albrecht-2018). If the claim is hashed as well, they are known only
-after it is written, and change with each letter of it (fiat-shamir-1987). docs/mathematics.md explains what an error
-bound then means: the hash is modeled as a random function (bellare-rogaway-1993), which is an assumption
+of them, as with primality tests at fixed bases (albrecht-2018). If the claim is hashed as well, the points are known
+only after the claim is written, and change with each of its letters (fiat-shamir-1987). docs/mathematics.md explains
+what an error bound then means: the hash is modeled as a random function (bellare-rogaway-1993), an assumption
 (canetti-2004).
 """
 
@@ -26,8 +26,8 @@ def derive_seed(seed: int, *subject: Any) -> int:
 
     Args:
         seed: the seed that the user chose.
-        subject: the data that determine the claim: text, integers, fmpq, None, fmpq_mpoly, RationalFunction, fmpq_mat,
-            and sequences of these.
+        subject: data that determine the claim: text, integers, fmpq, None, fmpq_mpoly, RationalFunction, fmpq_mat,
+            lists of these.
 
     Returns:
         An integer, the SHA-256 hash of these data.

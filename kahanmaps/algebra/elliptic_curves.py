@@ -119,9 +119,10 @@ def by_doublings(add: Callable[[Any, Any], Any], zero: Any, n: int, P: Any) -> A
 def canonical_height(curve: EllipticCurve, P: AffinePoint) -> arb:
     """Return the canonical height of a point over Q, half of that of its x-coordinate, as a ball.
 
-    Tate's series: the height of x changes by a bounded amount from P to 2P, of which a real number is the archimedean
-    part and the common factor of both forms of degree 4 the others. These factors divide the resultant R of the forms,
-    so that coordinates modulo a power of R determine them. The remainder is bounded by the sizes of the forms and of R.
+    The height is computed by Tate's series. In a doubling, the height of x differs from 4 times that of P by a bounded
+    amount: its archimedean part is a real number, the other parts come from the common factor of two forms of degree 4.
+    This factor divides the resultant R of the forms, so that coordinates modulo a power of R determine it. The
+    remainder is bounded by the sizes of the forms and of R.
 
     Raises PrecisionLost if 32768 bits do not suffice.
 
@@ -222,7 +223,7 @@ def _depressed(curve: EllipticCurve) -> tuple[Any, Any, Any]:
 def rotation_number(curve: EllipticCurve, P: AffinePoint, has_oval: bool) -> tuple[arb, int]:
     """Return the rotation number of the translation by P on the real curve, in (0, 1/2] up to sign, and 1 or 2.
 
-    For a translation that exchanges two real components it is that of its square, and the second number is 2.
+    If the translation exchanges two real components, the number is that of its square, and the second result is 2.
 
     Args:
         curve, P: with coefficients and coordinates in arb.

@@ -160,7 +160,7 @@ class EtaleElement(Element):
 def _product(first: fmpq_poly, second: fmpq_poly) -> fmpq_poly:
     """Multiply polynomials with few long coefficients.
 
-    FLINT multiplies each coefficient by each other one, two products for each pair; with
+    FLINT multiplies all pairs of coefficients, with two products for each pair i < j; by
 
         a_i b_j + a_j b_i = (a_i + a_j)(b_i + b_j) - a_i b_i - a_j b_j
 

@@ -167,8 +167,7 @@ class Field(ABC):
 
 
 def operand(field: Field, value: Any) -> Any:
-    """Convert an operand of an operator to an element of `field`, or return None (for text, matrices and other
-    objects).
+    """Convert an operand to an element of `field`, or return None (for text, matrices and other objects).
 
     Raises `InexactNumber` and `BadPrime` as `convert` does.
     """
@@ -387,8 +386,7 @@ class PrimeField(Field):
 class _Balls(Field):
     """The common base of real and complex balls: every result encloses the true number.
 
-    A ball that contains zero but other numbers as well is neither zero nor invertible: `is_zero` raises
-    `PrecisionLost`.
+    A ball that contains zero and other numbers is neither zero nor invertible: `is_zero` raises `PrecisionLost`.
     """
 
     exact = False
@@ -458,7 +456,7 @@ class ComplexBallField(_Balls):
     _letters, _ball, _matrix = "CC", acb, acb_mat
 
     def convert(self, value: Any) -> acb:
-        """The element that an exact number, a real ball or a complex one stands for."""
+        """Convert an exact number, a real ball or a complex ball to an element."""
         if isinstance(value, acb):
             return value
         return acb(RR(self.bits).convert(value))

@@ -206,7 +206,7 @@ class FunctionField(Field):
 class Function(Element):
     """A quotient of two polynomials in a `FunctionField`, not reduced.
 
-    The value of a polynomial also knows its denominator as a product of powers, which cancel in a quotient of values.
+    The value of a polynomial also stores its denominator as a product of powers, which cancel in quotients of values.
     """
 
     __slots__ = ("denominator", "numerator", "powers")

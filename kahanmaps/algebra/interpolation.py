@@ -6,10 +6,9 @@ functions of s symbols with these values. Modulo one prime:
     axes    On each axis through a random point (the anchor), every entry is a fraction of two polynomials; the
             fraction of least degrees that fits the values is computed, with one value more than needed. It gives
             the exponents of each symbol, so that functions of eps^2 are recognized at once.
-    stages  Symbols are added one by one, while the others stay at the anchor. The possible monomials are those of
-            the previous stage times the exponents of the new symbol, up to a total degree known from a line. A
-            linear system N(s_k) - v_k D(s_k) = 0 gives the coefficients, hence the monomials that do occur. One
-            further value must agree.
+    stages  Symbols are added one by one, while the others stay at the anchor. The possible monomials are those of the
+    previous stage times the exponents of the new symbol, up to a total degree known from a line. A linear system N(s_k)
+    - v_k D(s_k) = 0 gives the coefficients, hence the monomials. One further value must agree.
 
 All values taken so far are reused as equations, and entries with the same denominator share its unknowns. Modulo
 further primes the monomials are known. Coefficients follow by the Chinese remainder theorem, and the functions must
@@ -60,7 +59,7 @@ class Unlucky(Exception):
 
 @dataclass
 class Samples:
-    """The limits of the calls of the black box, how many values were `taken`, and the length of their vectors."""
+    """The limits of the calls of the black box, the number of values `taken` so far, and the length of each vector."""
 
     max_samples: int
     budget: Budget | None
@@ -370,7 +369,7 @@ def _along_line(
 
 
 def _least_fraction(interpolant: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
-    """Find N/D = through modulo `vanishing` with deg N + deg D <= n - 2, D monic, by the Euclidean algorithm."""
+    """Find N/D = `interpolant` modulo `vanishing` with deg N + deg D <= n - 2, D monic, by the Euclidean algorithm."""
     p = interpolant.modulus()
     before, after = (vanishing, nmod_poly([0], p)), (interpolant, nmod_poly([1], p))
     while True:
@@ -513,7 +512,7 @@ def _lift(
     primes: list[int],
     rng: random.Random,
 ) -> tuple[RationalFunction, ...]:
-    """Lift the functions to Q. Raises Unlucky if values modulo other primes do not fit."""
+    """Lift the functions to Q. Raises Unlucky if values modulo other primes disagree."""
     modulus = primes[-1]
     shapes = {i: quotient.shape for i, quotient in enumerate(at_first_prime)}
     residues = [[*quotient.numerator, *quotient.denominator] for quotient in at_first_prime]

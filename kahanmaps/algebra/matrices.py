@@ -197,9 +197,7 @@ class EntryMatrix(ABC):
 
 
 def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
-    """Multiply each row by its own denominator: rank and null space stay, and entries are smaller than with a common
-    one.
-    """
+    """Multiply each row by its own denominator, which preserves rank and null space and keeps entries short."""
     rows = [over_common_denominator(row)[0] for row in matrix.tolist()]
     return fmpz_mat(rows) if rows else fmpz_mat(0, matrix.ncols())
 

@@ -4,7 +4,7 @@
     point       1/2,-1/3,0
     expression  + - * / ^ ** ( ) with names and numbers, for instance (x^2 + y^2)/(1 - eps^2*z^2)
 
-Text is exact: a decimal means the rational number that it spells. The reader computes values from the bottom up while
+Text is exact: a decimal means the rational number that it denotes. The reader computes values from the bottom up while
 it reads the text; it keeps no tree and runs nothing as code. (Python's `ast` fails for sums of some thousand terms, and
 for integers of 4300 digits.) FLINT ends the process when memory runs out and does not react to Ctrl-C, so the size of
 every result is compared with `ExpressionLimits` before FLINT is called.
@@ -29,8 +29,7 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError, Unknown
 class ExpressionLimits:
     """Bounds on the size of a text and of its value, large enough for ordinary use.
 
-    The limits apply to results and to all intermediate values. The number of digits is estimated from above before
-    anything is computed.
+    The limits apply to results and to all intermediate values. The number of digits is bounded before a computation.
     """
 
     number_digits: int = 1_000_000  # of one number read by parse_number or parse_point
@@ -136,7 +135,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: ExpressionLi
 
 
 def require_text(text: object, expected: str, hint: str) -> None:
-    """Raise `InputError` (for a float `InexactNumber`) unless `text` is a str."""
+    """Raise `InputError` unless `text` is a str; for a float `InexactNumber`."""
     if not isinstance(text, str):
         raise wrong_kind(text, f"{expected} as text", hint)
 
@@ -729,7 +728,7 @@ class _Arithmetic:
 
 
 def _constant(value: _Quotient) -> fmpq | None:
-    """The number that a value is, or None where variables are left in it."""
+    """Return the number that a value equals, or None if it contains variables."""
     numerator = value.numerator.element
     if not numerator:
         return fmpq(0)

@@ -36,9 +36,7 @@ def minpoly_units(length: int) -> float:
 
 
 def roots_units(length: int, roots: int = 0) -> float:
-    """Return the units of computing the roots modulo a prime of 61 bits: powers of t modulo the polynomial, then
-    modulo its factors.
-    """
+    """Return the units for the roots modulo a prime of 61 bits: powers of t modulo the polynomial and its factors."""
     return 150 * (product_units(length, length) + product_units(roots, roots) * roots.bit_length())
 
 

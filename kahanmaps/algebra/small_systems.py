@@ -3,8 +3,8 @@
 The solver branches on the factors of an equation and substitutes linear equations; if nothing factors, it computes a
 Groebner basis of bounded size. For a finite set of solutions it then uses the matrix of multiplication by a linear form
 in the quotient ring: its rational eigenvalues are the values of the form at the rational solutions. The result also
-contains linear families with free variables, equations that could not be solved, and the numbers of solutions that are
-not rational. No step discards a rational solution.
+contains linear families with free variables, equations that could not be solved, and descriptions of the solutions that
+are not rational. No step discards a rational solution.
 
 FLINT cannot be interrupted, so single operations are bounded in size: Groebner bases are computed one S-polynomial
 after the other, and polynomials in several variables are factored only up to a number of terms. Everything counts as
@@ -40,8 +40,7 @@ MAX_QUOTIENT = 130  # dimension of the quotient ring: the number of complex solu
 class SolutionComponent:
     """A set of solutions: `values` are the variables as polynomials of degree at most 1 in the free variables.
 
-    `equations` are conditions on the free variables; without any it is a linear family, or a single point if no
-    variable is free.
+    `equations` are conditions on the free variables; without any it is a linear family, or a point.
     """
 
     values: tuple[fmpq_mpoly, ...]

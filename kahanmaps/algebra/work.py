@@ -4,8 +4,8 @@ Work is counted in units of about a microsecond of field operations on a laptop 
 `count_work` in advance, with an estimate from the sizes of their arguments. A `Budget` is a number of units; all work
 that is counted after its creation is charged to it. `benchmarks/units.py` compares units with seconds.
 
-Trap: a result from a module-level cache costs no work the second time, so budgets would depend on earlier calls. For
-functions that count work use `counted_cache`, which counts it again. Caches within a single search are harmless.
+Trap: a result from a module-level cache costs no work the second time, so the outcome would depend on earlier calls.
+For functions that count work use `counted_cache`, which counts it again. Caches within a single search are harmless.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def counted() -> int:
 
 
 class Budget:
-    """A limit on the work counted from now on, in the thread that created it.
+    """A limit on the units of work counted after its creation in the thread that created it.
 
     >>> budget = Budget(100)
     >>> stages = budget.share([1, 3])

@@ -1,4 +1,4 @@
-"""The certificate of a system: which claims are proved, and the script for the program that is to check them."""
+"""The certificate of a system: the choice of the claims, and the script for the program that checks their proofs."""
 
 from __future__ import annotations
 
@@ -84,17 +84,17 @@ def certificate(
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
             (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for
-            positive entropy of a map of the plane, for gp and sympy. None for all that need no search, or for the
-            following alone if these are given.
+            positive entropy of a map of the plane (gp and sympy only). None: only the claims of the following arguments
+            or, without any, all claims that need no search.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         density: phi, as `check_measure` takes it.
         tensor: a Poisson tensor, as `check_poisson` takes it.
-        everything: also search, for all of these.
+        everything: whether to search for all of these claims, too.
         commute: another system or map, in the same variables: certify that the two maps commute. For members of the
-            commuting family this is written in coordinates in which the planes separate; "associates" stands for all
-            pairs of rational associated systems.
+            commuting family the proof uses coordinates in which the planes separate; "associates" stands for all pairs
+            of rational associated systems.
         period: certify that this iterate of the map is the identity.
-        effort: the limit for the length of the identities; each increment by 1 doubles it.
+        effort: each increase by 1 doubles the limit for the length of the identities.
         command: the command line that writes this script, for the comment on top.
 
     Returns:
@@ -103,7 +103,7 @@ def certificate(
 
     Raises:
         FalseClaim: for a claim that is not true.
-        InputError: where no claim is known, for a name that is none, and for identities that are too long.
+        InputError: if no claim is known, for unknown names, and for identities that are too long.
 
     Source: docs/mathematics.md, section "Certificates".
 
@@ -174,7 +174,7 @@ def certificate(
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
-    """The names of the claims of a certificate that a check is about: integrals, measure or poisson.
+    """Return the names of the claims of a certificate that a check covers: integrals, measure or poisson.
 
     >>> from kahanmaps.documents.catalog import load
     >>> known_claims(load("euler_top"), "integrals")
@@ -189,11 +189,11 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
 
 
 def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
-    """Write a proof that another program checks, of what a search has found and proved.
+    """Write a proof, checked by another program, of the results that a search has found and proved.
 
     Args:
-        result: what `find_integrals`, `find_density`, `find_poisson`, `darboux_polynomials` or `find_symmetry` returns,
-            for every eps.
+        result: a result, for every eps, of `find_integrals`, `find_density`, `find_poisson`, `darboux_polynomials` or
+            `find_symmetry`.
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         command: the command line that writes this script, for the comment on top.
 
@@ -201,8 +201,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
         The text of the script, exact, as that of `certificate`. Symbols of the search stay symbols.
 
     Raises:
-        InputError: where nothing is proved, for results at one eps or about the flow, and for identities that are too
-            long.
+        InputError: if nothing is proved, for results at one eps or about the flow, and for too long identities.
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])
@@ -239,7 +238,7 @@ def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tu
 
 
 def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim]:
-    """The claims that maps commute, in separate coordinates if there are any."""
+    """The claims that two maps commute, in coordinates in which the planes separate if there are any."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
@@ -268,7 +267,7 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim
 
 
 def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
-    """What the file claims, or theorems give: by name the functions that find the identities."""
+    """The claims of the file and those that theorems give: functions, by name, that find the identities."""
     H, file, data = formulas.H, formulas.file, planes.data
 
     def one(find: Callable[..., Claim], *arguments: Any) -> Callable[[], list[Claim]]:
@@ -301,7 +300,7 @@ class _Planes:
 
     @cached_property
     def separate(self) -> tuple[Separated, AffineSymmetry] | None:
-        """The system in these coordinates and the claim that T takes its map to the given one, if they are shorter."""
+        """The system in these coordinates, if it is shorter, and the claim that T takes its map to the given one."""
         file, n = self.file, self.data.dim
         has_symbols = len(self.data.names) > n + 1
         separate = None if file.member is None or has_symbols else separated(file.system)
@@ -311,7 +310,7 @@ class _Planes:
         return separate, affine_symmetry(in_planes, "coordinates", separate.T, [fmpq(0)] * n, target=self.data)
 
     def claims(self, prove: Callable[..., Claim], name: str, function: RationalFunction) -> list[Claim]:
-        """What `prove` finds about the function, in its plane if it depends on one plane only."""
+        """The claims that `prove` finds about the function, in its plane if it depends on one plane only."""
         if self.separate is not None:
             separate, way = self.separate
             moved = separate.function(function)
@@ -323,7 +322,7 @@ class _Planes:
 
 
 def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> list[Claim]:
-    """What the result of a search proves about the map."""
+    """The claims about the map that the result of a search proves."""
     proved = Certainty.PROVED
     if isinstance(result, IntegralSearch):
         planes = planes or _Planes(result.file, data)

@@ -51,8 +51,8 @@ class RationalPoint:
 class Chain(EquationClaim):
     """Points x = point 0, point 1, ..., each the image of an earlier one; two of them are equal.
 
-    `maps` are the maps by a letter; `arrows` are, for each point but x, the letter of the map, the number of its
-    preimage, and its index in `values`, which begin with x. `says` are the numbers of the two equal points.
+    `maps` are the maps by their letters; `arrows` give for each point but x the letter of the map, the number of the
+    preimage, and the index of the point in `values`, which begin with x. `says` are the two equal points.
     """
 
     maps: Mapping[str, MapData]
@@ -70,7 +70,7 @@ def commuting(name: str, f: MapData, g: MapData) -> Chain:
 
     Raises:
         FalseClaim: if they do not.
-        InputError: if one of them is the identity, as for the zero field, or if the identities have too many terms.
+        InputError: if one of the maps is the identity, as for f = 0, or if the identities have too many terms.
     """
     x = _identity(f)
     y, z = apply(f, x), apply(g, x)
@@ -89,7 +89,7 @@ def periodic(f: MapData, period: int) -> Chain:
     """The identities that prove that an iterate of the map is the identity.
 
     Raises:
-        FalseClaim: if it is not: a random point modulo a prime is refuted first, before anything is multiplied out.
+        FalseClaim: if it is not; random points modulo a prime are tried first, before products are expanded.
         InputError: for a period above 1000, or if the identities have too many terms.
     """
     if period > MAX_PERIOD:
@@ -109,10 +109,10 @@ def periodic(f: MapData, period: int) -> Chain:
 
 
 def _moved_point(f: MapData, period: int) -> str | None:
-    """A random point modulo the prime that the iterate moves, or None.
+    """A random point modulo a prime that the iterate moves, or None.
 
-    The rows of the equation are over Z, so that x~ modulo the prime is the image of x modulo the prime where det M is
-    not 0 there: an iterate that is the identity moves no such point.
+    The equation is over Z, so that x~ modulo the prime is the image of x modulo the prime if det M is not 0 there. So
+    an iterate that is the identity moves no such point.
     """
     n, rng = f.dim, random.Random(f"period {derive_seed(0, period, f.rows)}")
     values = [rng.randrange(_PRIME) for _ in f.names]

@@ -1,8 +1,8 @@
-"""Claims that follow from the equation of a map by a linear combination: nothing is solved for x~.
+"""Claims that follow from the equation of a map by linear combinations, without solving for x~.
 
-Let e(x, y) = M(x) y - r(x), which is 0 where y is the image of x. A claim G = 0 is proved by polynomials c with
-G = c . e, an identity for any points whatsoever. With three points x, y, z of an orbit and a symmetric trilinear form T
-with H(x) = T(x, x, x) in (x, 1), let g(a, b) = T(a, b, .). For f = J grad H, J constant and skew,
+Let e(x, y) = M(x) y - r(x), which is 0 where y is the image of x. A claim G = 0 is proved by polynomials c with G = c .
+e, an identity that holds for any points. With three points x, y, z of an orbit and a symmetric trilinear form T with
+H(x) = T(x, x, x) in (x, 1), let g(a, b) = T(a, b, .). For f = J grad H, J constant and skew,
 
     T(y, y, z) - T(x, x, y) = g(x, y) . (e(x, y) + e(y, z)) + g(y, z) . e(x, y),
 
@@ -45,8 +45,8 @@ class OrbitIntegral(EquationClaim):
 class AffineSymmetry(EquationClaim):
     """T(x) = `image`/`divisor`: `multiple` e(T x, T y) = `matrix` e(x, y), e(T y, T x) if `reversing`.
 
-    The left e is that of `target`, the right one that of `data`: the same map for a symmetry, else T takes one map to
-    the other.
+    The left e belongs to the map `target`, the right one to `data`. For a symmetry these are the same map; otherwise T
+    takes the map `data` to `target`.
     """
 
     target: MapData
@@ -73,7 +73,7 @@ def three_points(data: MapData) -> tuple[str, ...]:
 
 
 def row_multiples(data: MapData) -> list[fmpq]:
-    """The numbers by which the rows of I - eps f' of a Kahan map were multiplied: M at x = 0 and eps = 0."""
+    """The numbers by which the rows of I - eps f' of a Kahan map were multiplied, read off M at x = 0 and eps = 0."""
     return [row[i][(0,) * len(data.names)] for i, row in enumerate(data.rows)]
 
 
@@ -89,7 +89,7 @@ def modified_hamiltonian(data: MapData, name: str, H: fmpq_mpoly) -> OrbitIntegr
     constants = gens[3 * n : -1]
 
     def gradient(a: int, b: int) -> list[fmpq_mpoly]:
-        """The vector g of the points that begin at these letters, by polarization of grad H/3."""
+        """The vector g(a, b) by polarization of grad H/3; a and b are indices of the first letters of two points."""
         points = (
             [(gens[a + i] + gens[b + i]) / 2 for i in range(n)],
             gens[a : a + n],
@@ -120,7 +120,7 @@ def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
     gens = context.gens()
 
     def times(a: int) -> list[fmpq_mpoly]:
-        """B^T x for the point x whose letters begin at a."""
+        """B^T x for the point x whose first letter has the index a."""
         return [sum((gens[a + i] * B[i, j] for i in range(n)), gens[0] * 0) for j in range(n)]
 
     def form(a: int, b: int) -> fmpq_mpoly:
@@ -132,7 +132,7 @@ def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
 def affine_symmetry(
     data: MapData, name: str, S: fmpq_mat, shift: Sequence[fmpq], reversing: bool = False, target: MapData | None = None
 ) -> AffineSymmetry:
-    """The identity for T(x) = S x + shift, which takes the map to the target, by default to itself, or its inverse.
+    """The identity by which T(x) = S x + shift takes the map to the target (by default itself) or to its inverse.
 
     Raises:
         FalseClaim: if it does not.
@@ -162,7 +162,7 @@ def affine_symmetry(
 def changed_function(
     way: AffineSymmetry, name: str, function: RationalFunction, moved: RationalFunction, letters: tuple[str, ...]
 ) -> ChangedFunction:
-    """The identity that the function of x is the other one, `moved`, of z, x = T z, which has only these letters.
+    """The identity that the function at x = T z is `moved`, a function of z that contains only these letters.
 
     Raises:
         FalseClaim: if it is not.
@@ -191,7 +191,7 @@ def _orbit_integral(
     first: Sequence[fmpq_mpoly],
     second: Sequence[fmpq_mpoly],
 ) -> OrbitIntegral:
-    """The claim with integral coefficients, after its identity was multiplied out."""
+    """The claim with integral coefficients, after its identity was verified by expansion."""
     n, names = data.dim, three_points(data)
     rows = [fmpq(1) / c for c in row_multiples(data)]
     multipliers = [[c * s for c, s in zip(side, rows, strict=True)] for side in (first, second)]

@@ -1,8 +1,8 @@
-"""Darboux polynomials in factored form, with cofactors in factored form, so that no large product is multiplied out.
+"""Darboux polynomials and their cofactors in factored form, so that no large product is expanded.
 
-P is a Darboux polynomial of degree k if D^k P(N/D) = C P. If P is a product of Darboux polynomials P_i, C is that of
-their cofactors C_i and a power of D; and the C_i often share their factors c_1, c_2, ... So the identities that are
-multiplied out are D^(k_i) P_i(N/D) = C_i P_i, and all others are equal as monomials in D and the c_j.
+P is a Darboux polynomial of degree k if D^k P(N/D) = C P. If P is a product of Darboux polynomials P_i, C is the
+product of their cofactors C_i and a power of D; and the C_i often share their factors c_1, c_2, ... So only the
+identities D^(k_i) P_i(N/D) = C_i P_i are expanded; all others compare monomials in D and the c_j.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Monomial:
         return Monomial(self.constant, tuple(a - b for a, b in zip(self.powers, common, strict=True)))
 
     def at(self, values: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
-        """The polynomial, D, c_1, ... being the values. Raises InputError where it has too many terms."""
+        """The polynomial with these values of D, c_1, ... Raises InputError if it has too many terms."""
         total = values[0] ** 0 * self.constant
         for value, power in zip(values, self.powers, strict=True):
             for _ in range(power):
@@ -69,7 +69,7 @@ class Monomial:
 class DarbouxFactor:
     """P with D^k P(N/D) = C P, polynomials over Z, and its exponent in a product.
 
-    k is `degree`, that of P in the variables, or larger where P has a factor of D.
+    k is `degree`: the degree of P in the variables, or more if P has a factor of D.
     """
 
     polynomial: fmpq_mpoly
@@ -144,8 +144,8 @@ class DarbouxPolynomial(Claim):
 class InvariantVolume(Claim):
     """phi = P/Q with P(x~) Q(x) det M = P(x) Q(x~) det L.
 
-    `fraction` are P and Q as products of Darboux polynomials, or None where the identity holds for any two points, also
-    if x~ is not the image of x, as for Hamiltonian systems.
+    `fraction` are P and Q as products of Darboux polynomials. It is None if the identity holds for any two points x and
+    x~, as for Hamiltonian systems.
     """
 
     numerator: fmpq_mpoly
@@ -204,7 +204,7 @@ def darboux_polynomial(data: MapData, name: str, function: RationalFunction) -> 
 
 
 def invariant_volume(data: MapData, name: str, function: RationalFunction) -> InvariantVolume:
-    """The identity that proves that the map leaves the volume form dx/phi invariant, phi the function.
+    """The identity that proves that the map preserves the volume form dx/phi, phi the function.
 
     Raises:
         FalseClaim: if it does not.
@@ -230,12 +230,12 @@ def invariant_volume(data: MapData, name: str, function: RationalFunction) -> In
 
 
 def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: bool = True) -> DarbouxProducts | None:
-    """The polynomials over Z as products of Darboux polynomials of the map, or None if one of them is none.
+    """The polynomials over Z as products of Darboux polynomials of the map; None if one of them is no such product.
 
     Args:
         data: the map.
         polynomials: polynomials over Z, not 0, in the names of the map.
-        splits: whether factors of the polynomials are looked at one by one, where these are Darboux polynomials too.
+        splits: whether the polynomials are split into factors that are Darboux polynomials, too.
     """
     known, k = list[fmpq_mpoly](), max(degree_in(P, data.dim) for P in polynomials)
     pieces = []
@@ -271,7 +271,7 @@ def _factored(P: fmpq_mpoly, dim: int) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpol
 def _with_cofactors(
     data: MapData, factored: tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int]]], most: int
 ) -> tuple[fmpq_mpoly, list[tuple[fmpq_mpoly, int, int, fmpq_mpoly]]] | None:
-    """The factors with k, their exponents and cofactors, or None if one of them has none.
+    """The factors with their k, exponents and cofactors; None if a factor has no cofactor.
 
     A factor f that has a factor of D may divide D^k f(N/D) for a larger k than its degree: up to `most`, that of P and
     Q, if P/Q is an integral, and n + 1 more if dx/phi is invariant, phi = P/Q.
@@ -293,7 +293,7 @@ def _with_cofactors(
 
 
 def _monomial(C: fmpq_mpoly, D: fmpq_mpoly, known: list[fmpq_mpoly]) -> tuple[int, list[int]]:
-    """C as a monomial in D and known polynomials, which new ones are added to."""
+    """C as a monomial in D and the `known` polynomials, to which new factors are added."""
     power, rest = 0, C
     if not D.is_constant() and gcd(*(int(c.p) for c in D.coeffs())) == 1:  # so that the quotients are over Z
         while (smaller := quotient(rest, D)) is not None:

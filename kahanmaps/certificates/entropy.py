@@ -1,8 +1,8 @@
-"""Positive algebraic entropy of a map of the plane: degrees that another program computes again.
+"""Positive algebraic entropy of a map of the plane, proved by degrees that another program recomputes.
 
 The criterion is the theorem of docs/mathematics.md, section "Positive entropy, proved in the plane": for a birational f
 with D_n = deg f^n and the dynamical degree lambda, 2 cosh(n log lambda) + 2 >= (D_2n - 1)/(D_n - 1). Here f is the map
-over Q(eps), and D_n is needed from above, D_2n from below:
+over Q(eps); an upper bound of D_n and a lower bound of D_2n are needed:
 
 * forms F_1, ..., F_n over Z[eps] with F_1(F_k) = c F_(k+1) show D_n <= deg F_n;
 * modulo a prime and at a residue eps, the image of a line under 2n steps, without its common factor, has a degree of
@@ -51,7 +51,7 @@ def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
     """The degrees that prove that the dynamical degree is more than 1, for a map of the plane and its inverse.
 
     Raises:
-        InputError: if they are not found within the limits, which proves nothing.
+        InputError: if such degrees are not found within the limits, which proves nothing.
     """
     first, factor = _without_common_factor(_forms(data))
     iterates, factors = [first], [factor]
@@ -83,7 +83,7 @@ def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
 
 
 def homogenizing(names: Sequence[str]) -> str:
-    """A name of the letter that makes forms homogeneous, which is none of the names of the map.
+    """A name for the variable that makes forms homogeneous, different from the names of the map.
 
     >>> homogenizing(["x", "h", "eps"])
     'xhepsh'
@@ -104,14 +104,14 @@ def _forms(data: MapData) -> list[fmpq_mpoly]:
 
 
 def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpoly, ...], fmpq_mpoly]:
-    """The forms over Z without their primitive common factor, which leaves them over Z, and that factor."""
+    """The forms over Z divided by their primitive common factor, and this factor."""
     common = reduce(fmpq_mpoly.gcd, forms)
     common *= common_denominator(common)
     return tuple(form / common for form in forms), common
 
 
 def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly]) -> list[nmod_poly]:
-    """The image of a curve modulo the prime, without its common factor. Raises InputError where it is 0."""
+    """The image of a curve modulo the prime, without its common factor. Raises InputError if it is 0."""
     powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], PRIME)} for _ in curve]
 
     def power(k: int, exponent: int) -> nmod_poly:

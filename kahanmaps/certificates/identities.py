@@ -9,10 +9,9 @@ C (the cofactor of the Darboux polynomials P and Q) with
 
 These two identities are far shorter than the expanded difference, and they are what a certificate states and another
 program multiplies out. The volume form dx/phi, phi = P/Q, is invariant if phi(x~) = phi(x) det dPhi(x); differentiating
-M x~ = r gives M dPhi = L(x, x~), L_ij = d/dx_j (r_i - sum_k M_ik x~_k), so that the identity is
-P(x~) Q(x) det M = P(x) Q(x~) det L. Likewise dPhi T dPhi^T = T(x~), T = (P_ij)/Q, becomes
-Q(x~) L P(x) L^T = Q(x) M P(x~) M^T. Where such an identity of x and x~ does not hold for any two points, x~ = N/D is
-inserted, and both sides are multiplied by a power of D.
+M x~ = r gives M dPhi = L(x, x~), L_ij = d/dx_j (r_i - sum_k M_ik x~_k), so that the identity is P(x~) Q(x) det M = P(x)
+Q(x~) det L. Likewise dPhi T dPhi^T = T(x~), T = (P_ij)/Q, becomes Q(x~) L P(x) L^T = Q(x) M P(x~) M^T. If such an
+identity does not hold for all x and x~, then x~ = N/D is inserted, and both sides are multiplied by a power of D.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ _MULTIPLE: ContextVar[float] = ContextVar("multiple of the limits", default=1.0)
 
 @contextmanager
 def limited(effort: int) -> Iterator[None]:
-    """Limits for the identities of a certificate: doubled for each step of the effort above 1."""
+    """Return limits for the identities of a certificate; each increase of the effort by 1 doubles them."""
     token = _MULTIPLE.set(units_at(effort, 1.0))
     try:
         yield
@@ -53,7 +52,7 @@ def limited(effort: int) -> Iterator[None]:
 
 
 def check_limits(terms: int, products: int = 0) -> None:
-    """Refuse a side of an identity that has so many terms, or takes so many products of terms.
+    """Check the size of one side of an identity: its number of terms, and the products of terms that it takes.
 
     Raises:
         InputError: if these are too many.
@@ -74,8 +73,8 @@ class FalseClaim(InputError):
 class MapData:
     """A map by its equation: `rows` of (M | r), polynomials over Z in `names`: the variables, the symbols and eps.
 
-    `new` are names for the coordinates of x~. Its solution x~ = N/D is computed when it is needed; InputError is raised
-    where that has too many terms.
+    `new` are names for the coordinates of x~. The solution x~ = N/D is computed on demand. Raises InputError if it is
+    long.
     """
 
     variables: tuple[str, ...]
@@ -126,7 +125,7 @@ class MapData:
         return (*self.variables, *self.new, *self.names[self.dim :])
 
     def residual(self, names: Sequence[str], first: int, second: int) -> list[fmpq_mpoly]:
-        """M(x) y - r(x) in the ring of the names, x beginning at the letter `first` and y at `second`."""
+        """M(x) y - r(x) in the ring of the names, where x begins at the letter with index `first`, y at `second`."""
         n, context = self.dim, ring(names)
         letters = context.gens()
         constants = letters[len(names) - len(self.names) + n :]
@@ -166,12 +165,12 @@ class Claim:
 
     @property
     def is_at_image(self) -> bool:
-        """Whether the proof inserts x~ = N/D: not where the identity is free, as it holds for any two points."""
+        """Whether the proof inserts x~ = N/D; False if the identity holds for any two points."""
         return not getattr(self, "is_free", False)
 
 
 class EquationClaim(Claim):
-    """A claim that follows from the equation of the map as a relation, which is not solved for x~."""
+    """A claim that follows from the equation of the map without solving it for x~."""
 
     is_free = True
 
@@ -229,7 +228,7 @@ def map_data(
 
 
 def restricted(data: MapData, function: RationalFunction) -> MapData:
-    """The map of those variables alone that determine the function along orbits, like those of one plane."""
+    """The map of the least set of variables that determines the function along orbits, such as those of one plane."""
     n, names = data.dim, data.names
     used = (occurring(function.numerator) | occurring(function.denominator)) & set(names[:n])
     while True:
@@ -297,7 +296,7 @@ def _sandwich(A: Sequence[Row], P: Sequence[Row], factor: fmpq_mpoly) -> list[fm
 
 
 def derivative_at_image(data: MapData) -> list[list[fmpq_mpoly]]:
-    """D L(x, N/D), polynomials as L is of degree at most 1 in x~."""
+    """D L(x, N/D), a matrix of polynomials, since L has degree at most 1 in x~."""
     n, context = data.dim, ring(data.names)
 
     def at_image(entry: fmpq_mpoly) -> fmpq_mpoly:
@@ -372,7 +371,7 @@ def coprime(function: RationalFunction, names: tuple[str, ...]) -> tuple[fmpq_mp
 
 
 def quotient(product: fmpq_mpoly, factor: fmpq_mpoly) -> fmpq_mpoly | None:
-    """product/factor, or None where it is no polynomial."""
+    """product/factor, or None if it is not a polynomial."""
     quotient, remainder = divmod(product, factor)
     return None if remainder else quotient
 

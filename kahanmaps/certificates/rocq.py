@@ -1,7 +1,7 @@
 """A certificate for Coq 8.16 or newer (Rocq), with the standard library alone.
 
 The theorems are stated for real numbers: for every point x, every x~ with M x~ = r and det M not 0, and all parameters
-and eps. Cramer's rule gives (det M) x~ = N, and `ring` proves identities of polynomials; no step searches.
+and eps. Cramer's rule gives (det M) x~ = N, and `ring` proves identities of polynomials; no step is a search.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class _Script:
 
     @property
     def cramer(self) -> str:
-        """The rewriting by Cramer's rule, as often as a coordinate of x~ occurs."""
+        """The tactic that rewrites every coordinate of x~ by Cramer's rule."""
         return ", ".join(f"?cramer{i + 1}" for i in range(self.data.dim))
 
     def text(self, polynomial: fmpq_mpoly) -> str:
@@ -66,7 +66,7 @@ class _Script:
         return polynomial_text(polynomial, letters)
 
     def image_letters(self, at_n: bool) -> list[str]:
-        """What stands for det x~: N, or this product, which Cramer's rule rewrites to N."""
+        """The text of det x~: N, or the product itself, which Cramer's rule rewrites to N."""
         return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.new)]
 
     @property
@@ -76,7 +76,7 @@ class _Script:
         return [f"Variables {' '.join(letters)} : R."] if letters else []
 
     def functions(self, arguments: str, /, **polynomials: fmpq_mpoly) -> list[str]:
-        """Definitions of functions of these arguments."""
+        """Return definitions of functions of these arguments."""
         return [f"Definition {name} ({arguments} : R) : R := {self.text(P)}." for name, P in polynomials.items()]
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
@@ -204,7 +204,7 @@ class _Script:
         return " + ".join(pieces), " * ".join(f"{q} ^ {power}" for q, power in powers.items() if power) or "1"
 
     def hypothesis(self, letter: str) -> str:
-        """The pattern that takes the hypothesis `maps` apart: (A1 & A2)."""
+        """The pattern that splits the hypothesis `maps` into its parts: (A1 & A2)."""
         names = [f"{letter}{i + 1}" for i in range(self.data.dim)]
         return f"({' & '.join(names)})" if len(names) > 1 else names[0]
 
@@ -323,7 +323,7 @@ class _Script:
     def moved(self, label: str, polynomial: fmpq_mpoly, degree: int, value: str = "", *also: str) -> list[str]:
         """The lemma det^degree P(x~) = value for the function `label` = P; `also` are definitions in the value.
 
-        Without a value it is P made homogeneous, at N and det.
+        The default of the value is the homogenized P at N and det.
         """
         n = self.data.dim
         constants = [self.letters[name] for name in self.data.names[n:]]
@@ -409,7 +409,7 @@ class _Script:
         ]
 
     def derivative(self) -> tuple[list[str], str]:
-        """The definitions of l11, l12, ..., the entries of L, and all these names."""
+        """The definitions of l11, l12, ..., the entries of L, and the list of these names."""
         lines = ["(* The derivative of the map is M^-1 L with L the derivative of r - M x~ in x at fixed x~. *)"]
         names = [name for row in entries("l", self.data.dim) for name in row]
         flat = [entry for row in self.data.derivative for entry in row]
@@ -452,7 +452,7 @@ class _Script:
         names = " ".join(functions)
 
         def sandwich(letter: str, i: int, j: int, point: str, times: str = "{}", form: str = "{}") -> str:
-            """The entry i, j of A T A^T den, where A has these letters, each in the form `times`, T in another."""
+            """The entry i, j of A T A^T den; entries of A are its letter in the form `times`, those of T in `form`."""
             a = [[times.format(f"{letter}{row + 1}{column + 1}") for column in range(n)] for row in (i, j)]
             minors = ((a[0][s], a[1][t], a[0][t], a[1][s], name) for (s, t), name in pairs.items())
             return " + ".join(
@@ -575,7 +575,7 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
 
     Args:
         claims: the statements to be proved, each in a section of its own.
-        header: lines of the comment on top.
+        header: the lines of the initial comment.
     """
     # Nothing in a comment may end it, or begin another one or a string.
     safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
@@ -624,7 +624,7 @@ _PROOFS: dict[type[Claim], tuple[Any, str]] = {
 
 
 def _not_yet_known(lines: Sequence[str], known: dict[str, str], ending: str) -> list[str]:
-    """The statements that are not `known` by name; those with the name of another one get the ending.
+    """The statements that are not `known`; a statement whose name is taken by another one gets the ending.
 
     A statement uses earlier ones only, so that a new name is known before it is used.
     """
@@ -716,7 +716,7 @@ def _homogeneous_text(
 
 
 def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
-    """det times an entry of L, with det x~, or N, for x~: of degree at most 1 in x~."""
+    """det times an entry of L, which has degree at most 1 in x~, with det x~ (or N) in place of x~."""
     letters, image = [script.letters[name] for name in names_of(entry)], slice(dim, 2 * dim)
     letters[image] = script.image_letters(at_n)
     return _homogeneous_text(entry, letters, 1, image, "det")

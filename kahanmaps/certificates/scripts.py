@@ -1,8 +1,8 @@
-"""Certificates for PARI/GP and for SymPy: each identity is multiplied out, and `true` printed for it.
+"""Certificates for PARI/GP and for SymPy: each identity is expanded, and `true` is printed if it holds.
 
-The script states M and r, and where it is needed N and D with M N = D r, so that x~ = N/D where det M is not 0. Then it
-computes D^k P(N/D), a polynomial, and compares it with C P. It ends with status 1 if an identity does not hold. Both
-programs are given functions of the same names, so that the checks are the same text but for the sign of powers.
+The script states M and r and, if needed, N and D with M N = D r, so that x~ = N/D where det M is not 0. Then it
+computes the polynomial D^k P(N/D) and compares it with C P. It ends with status 1 if an identity does not hold. Both
+languages get functions with the same names, so that the text of the checks differs only in the sign of powers.
 """
 
 from __future__ import annotations
@@ -219,7 +219,7 @@ PYTHON = Language(
 
 
 class _Script:
-    """The lines of a script about one map; `define` and `check` add some."""
+    """The lines of a script about one map; `define` and `check` append to them."""
 
     def __init__(self, to: Language, data: MapData) -> None:
         self.to, self.data, self.lines = to, data, list[str]()
@@ -227,7 +227,7 @@ class _Script:
         self.letters = letters_of(data, r"[hijknpqrst]|c\d+") | {homogenizing(data.names): "h"}
 
     def text(self, polynomial: fmpq_mpoly) -> str:
-        """The polynomial; a long sum in parts, as Python reads no expression that is nested a thousand times."""
+        """The text of a polynomial; a long sum is split, since Python does not parse expressions of a great depth."""
         letters = [self.letters[name] for name in names_of(polynomial)]
         text = polynomial_text(polynomial, letters, "*", self.to.power)
         terms = re.split(r" (?=[+-] )", text)
@@ -249,7 +249,7 @@ class _Script:
         return self.matrix([[self.text(entry) for entry in row] for row in rows])
 
     def define(self, name: str, text: str) -> None:
-        """A definition; of a polynomial if the text is one."""
+        """A definition; the text is a polynomial or any other expression."""
         self.lines.append(self.to.definition.format(name, text))
 
     def polynomial(self, name: str, polynomial: fmpq_mpoly) -> None:
@@ -263,7 +263,7 @@ class _Script:
         self.lines.append(f'check("{label}", {identity})' + ";" * (self.to is GP))
 
     def begin(self, claim: Claim, count: int) -> None:
-        """The map that the claim is about, unless it is that of the claim before, and letters of points."""
+        """The map of the claim, unless the previous claim has the same map, and the letters of points."""
         if claim.data is not self.data or not self.has_points:
             self.data, self.has_points, self.has_equation, self.is_solved = claim.data, True, False, False
             self.points(count)
@@ -297,7 +297,7 @@ class _Script:
         self.check("M N = D r", "act(M, N) == scale(D, r)")
 
     def claim(self, claim: Claim) -> None:
-        """What a claim says, and its proof."""
+        """The statement of a claim, and its proof."""
         label = re.sub(r"[^\w ~^*/+(),>-]", "_", claim.name)
         self.lines.append(f"{self.to.comment}{label}: {_SAYS[type(claim)]}")
         self.prove(claim, label)
@@ -351,7 +351,7 @@ class _Script:
     def products(self, fraction: DarbouxProducts, label: str, names: str, powers: Sequence[int]) -> list[str]:
         """Each product with its identities, factor by factor; returns D^power P(N/D)/P for these powers.
 
-        The exponents of a product are stated once, so that what is checked depends on them.
+        The exponents of a product are stated once, so that the checks depend on them.
         """
         for j, letter in enumerate(fraction.letters, 1):
             self.polynomial(f"c{j}", letter)
@@ -503,12 +503,12 @@ class _Script:
 
 
 def script_certificate(to: Language, claims: Sequence[Claim], header: Sequence[str] = ()) -> str:
-    """Write a script that multiplies out the identities of the claims.
+    """Write a script that expands the identities of the claims and compares both sides.
 
     Args:
-        to: GP, for `gp -q FILE`, or PYTHON, for SymPy.
+        to: the language: GP, for `gp -q FILE`, or PYTHON, for SymPy.
         claims: the statements to be checked.
-        header: lines of the comment on top.
+        header: the lines of the initial comment.
     """
     data = max((claim.data for claim in claims), key=lambda data: data.dim)
     script = _Script(to, data)

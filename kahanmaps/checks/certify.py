@@ -133,7 +133,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
 
 
 def try_expand(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
-    """Decide by expansion a claim that random points support; return `decision` if it is not, or not possible."""
+    """Decide by expansion a claim that random points support; return `decision` for other claims and if this fails."""
     if decision.verdict is not Certainty.SUPPORTED:
         return decision
     try:

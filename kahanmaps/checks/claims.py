@@ -17,10 +17,10 @@ from kahanmaps.display_protocols import HtmlDisplay, PrintableResult, ResultPart
 
 
 class Certainty(HtmlDisplay, WithoutTruthValue, StrEnum):
-    """How certain a claim is. Its truth value is `holds`; `bool` of a certainty is an error.
+    """The certainty of a claim. `holds` is its truth value; `bool` of a certainty is an error.
 
-    Checks give one of the first four. DERIVED: the statement follows exactly from the measured singularity patterns.
-    NOTE: a remark, which has no certainty.
+    Checks return one of the first four. DERIVED means that the statement follows exactly from the measured singularity
+    patterns; NOTE marks a remark, which has no certainty.
     """
 
     PROVED = "proved"

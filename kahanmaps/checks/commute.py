@@ -92,9 +92,8 @@ def check_commute(
         system, other: the two systems or maps; a system stands for its Kahan map. Without `other`, `system` must be a
             member of the family, and its associated maps are checked pairwise. Then the maps of H_0 and H_1, with
             grad H_1 = A grad H_0, serve as a control: in general they do not commute.
-        settings: eps, seed, error bound and orbit.
-        eps2: the eps of the second map, if it differs (then eps must be given as well).
-        eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
+        settings: eps, seed, error bound and orbit. eps2: the eps of the second map, if it differs; then eps must be
+            given, too. eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
         The report.

@@ -167,7 +167,7 @@ def check_integrals(
         extra: the claimed integrals, rational functions of the variables and eps: one, a list, or a mapping by name, as
             functions, text or SymPy expressions; or names of integrals of the file. By default the integrals that
             follow from theorems and those of the file.
-        known: check those integrals in addition to `extra`.
+        known: whether to check these default integrals in addition to `extra`.
         eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:
@@ -233,9 +233,9 @@ def check_integrals(
 
 
 def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:
-    """Return whether an integral is constant at this eps, like the modified H of 3 q^2 + p^2 at eps = 1/2; exact.
+    """Return whether an integral is constant at this eps, like the modified H of 3 q^2 + p^2 at eps = 1/2.
 
-    False also where that is too long to expand.
+    True is exact; False is also returned if the function is too long to expand.
     """
     if isinstance(integral, ClaimedIntegral):
         return integral.is_constant

@@ -2,10 +2,10 @@
 
 With denominators cleared, the identity is a polynomial equation P(x, eps) = 0 over the integers. For each trial a prime
 p is drawn from [2^62, 2^63), and then a point over GF(p), by a hash of the identity and a seed, so that no identity can
-be constructed for given points (algebra/chance.py). If P is not the zero polynomial, the trial passes only if p divides
-all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a root (probability at most
-degree/(p - 1), and p - 1 >= 2^62). Points where a denominator vanishes are drawn again; since their probability is
-below 1/2, the sum of both probabilities is doubled. Trials are independent, so the bounds multiply.
+be constructed for given points (algebra/chance.py). If P is not the zero polynomial, the trial succeeds only if p
+divides all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a root (probability at most
+degree/(p - 1), and p - 1 >= 2^62). A point where a denominator vanishes is replaced by another; since such points have
+a probability below 1/2, the sum of both probabilities is doubled. Trials are independent, so the bounds multiply.
 Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
 
 A trial that fails refutes the identity; then a small rational point at which both sides differ is searched for.
@@ -68,7 +68,7 @@ class Identity:
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
     def seed(self, seed: int) -> int:
-        """Return the seed of everything that is drawn at random for this identity."""
+        """Return the random seed for this identity."""
         return derive_seed(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
 
     @cached_property
@@ -160,7 +160,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Trial:
-    """The result at one random point modulo `prime` (None: not defined there); `decision` if the trial refutes."""
+    """The result at one random point modulo `prime` (None: not defined there), with a `decision` if it refutes."""
 
     prime: int | None = None
     decision: Decision | None = None

@@ -67,8 +67,8 @@ def density_identity(system: QuadraticSystem | MapFamily, density: PhaseFunction
 def _image(map_at_eps: Map, point: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return x~, after a test that it satisfies the defining equation.
 
-    The formula for dPhi follows from this equation. A wrong x~ would not be noticed otherwise: the laws hold at any two
-    points x and x~ for phi = det(I - eps f') with Hamiltonian f, and for Pi of the family.
+    The formula for dPhi follows from this equation. Without the test a wrong x~ would not be noticed, since for phi =
+    det(I - eps f') with Hamiltonian f, and for Pi of the family, the identities hold at any two points x and x~.
     """
     image = map_at_eps.step(point)
     field = map_at_eps.field
@@ -99,7 +99,7 @@ def check_measure(
         settings: eps, seed, error bound and orbit; may be omitted, so that `extra` is the second argument.
         extra: phi, as a function, text or SymPy expression. By default det(I - eps f') for Hamiltonian systems, and the
             [density] of the file.
-        known: check those densities in addition to `extra`.
+        known: whether to check these default densities in addition to `extra`.
         eps, time_step, h: eps (half the time step) or the time step, instead of `settings.eps`.
 
     Returns:

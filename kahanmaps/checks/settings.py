@@ -37,11 +37,11 @@ MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
 class Settings:
     """The settings of a check.
 
-    `eps` is half the time step, None for every eps. Claims are also tried along `steps` steps of an exact orbit from
-    the initial point `start` (None: a random one), within `max_digits` digits (None: by dimension). `eps` and the
-    coordinates may be any exact numbers: 1, Fraction(1, 10), "1/10"; coordinates also elements of one number field.
-    `orbit_is_requested` is true if the user gave the initial point or the number of steps: then the report must say
-    whether the orbit was completed.
+    `eps` is half the time step, None for every eps. Claims are also tested along `steps` steps of an exact orbit from
+    the initial point `start` (None: a random one), up to numbers of `max_digits` digits (None: a default that depends
+    on the dimension). `eps` and the coordinates may be any exact numbers: 1, Fraction(1, 10), "1/10"; coordinates also
+    elements of one number field. `orbit_is_requested` is true if the user gave the initial point or the number of
+    steps: then the report must say whether the orbit was completed.
     """
 
     eps: fmpq | None = None
@@ -199,7 +199,7 @@ def _orbit_data(run: OrbitRun, tried: int, undefined: int) -> Mapping[str, Any]:
 def settings_and_claim(
     settings: Settings | Any, extra: Any, eps: Any = None, time_step: Any = None, h: Any = None
 ) -> tuple[Settings, Any]:
-    """Return (settings, claim), also if the claim was given in place of the settings; replace eps if given."""
+    """Return (settings, claim), also if the claim was passed as settings; a given eps replaces that of the settings."""
     if settings is None or isinstance(settings, Settings):
         return Settings.of(settings, eps, time_step, h), extra
     if extra is not None:
@@ -210,8 +210,7 @@ def settings_and_claim(
 def claimed_function(file: SystemFile, claim: Any) -> RationalFunction:
     """Convert a claim to a function of the variables of a file and eps (and iterates, if it contains x~).
 
-    The claim is a function, a result of a search, a formula in the variables, parameters and eps, or the name of an
-    integral of the file.
+    The claim is a function, a result of a search, a formula in variables, parameters and eps, or an integral's name.
     """
     claim = getattr(claim, "function", claim) if isinstance(claim, ResultPart) else claim
     if isinstance(claim, RationalFunction):

@@ -1,4 +1,4 @@
-"""The table of all checks: the question, the options and the function of each.
+"""The table of all checks, each with its question, its options and its function.
 
 The commands check-..., the tasks of experiments, the pages of reports and the schemas are derived from this table. The
 functions are imported only when a check is run.

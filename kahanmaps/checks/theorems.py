@@ -51,7 +51,7 @@ def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> 
 
 
 def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
-    """Return rational associated systems, f_0 first; with more than 8 factors those with at most one minus sign."""
+    """Return rational associated systems, f_0 first; for more than 8 factors only those with at most one minus sign."""
     count = len(member.factors)
     if count <= MAX_FACTORS:
         return list(member.associated())
@@ -70,9 +70,9 @@ def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
 def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
     """The maps of f and g commute if g = C f with a constant C, C^3 = C, C f'(x) = f'(x) C for every x.
 
-    The space is the sum of the eigenspaces of C to 1, -1 and 0, on which f is three separate systems and g is f, -f
-    and 0: so Phi_g is Phi_f, its inverse and the identity there. Holds for inhomogeneous f as well; no Hamiltonian
-    structure is needed.
+    The space is the sum of the eigenspaces of C for 1, -1 and 0. On these f splits into three separate systems, and g
+    is f, -f and 0: so Phi_g is Phi_f, its inverse and the identity there. The lemma also holds for inhomogeneous f and
+    needs no Hamiltonian structure.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
     >>> commuting_by_splitting(f, QuadraticSystem.from_text(["x", "y"], ["0", "-y^2"])).data["hypotheses"][1]
@@ -187,7 +187,7 @@ def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember
 
 
 def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
-    """A constant matrix C with g = C f: the only one if the components of f are independent, else +-I for g = +-f."""
+    """The constant matrix C with g = C f if the components of f are independent; otherwise I or -I if g is f or -f."""
     if f.dim != g.dim:
         return None
     n = f.dim

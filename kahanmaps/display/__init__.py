@@ -1,1 +1,1 @@
-"""Display: LaTeX, HTML, lines of text. A file knows the values of the folder it is named for, or of several."""
+"""Display of values as LaTeX, HTML and lines of text: a file for the values of each folder, or of several."""

@@ -85,7 +85,7 @@ def counts(findings: Iterable[Finding]) -> str:
 
 
 def eps_sentence(report: Report) -> str:
-    """Return for which eps the report holds, with the time step."""
+    """Return a sentence on the eps for which the report holds, with the time step."""
     context = report.context
     if "eps" not in context:
         return ""
@@ -94,7 +94,7 @@ def eps_sentence(report: Report) -> str:
 
 
 def ending_sentence(report: Report) -> str:
-    """Return that and why a requested orbit ended early; empty where none did."""
+    """Return a sentence on why a requested orbit ended early; empty if none did."""
     if not report.ended_early:
         return ""
     return f"The requested orbit ended early: {report.context.get('orbit', {}).get('message', 'no reason given')}."

@@ -102,7 +102,7 @@ def result_text(result: object) -> str:
 
 
 def result_html(result: Any, map_: MapFamily | None = None) -> str:
-    """The lines of a result as a table; give `map_` where the result does not know its map."""
+    """Return the lines of a result as a table; `map_` is needed if the result does not contain its map."""
 
     def shown(cell: object) -> str:
         if isinstance(cell, HtmlCell):
@@ -151,7 +151,7 @@ def analysis_text(analysis: Analysis) -> str:
 
 @html_form.register
 def analysis_html(analysis: Analysis) -> str:
-    """The verdict first, then the statements."""
+    """Return the verdict, then the statements, as HTML."""
     final = analysis.conclusion
     statements = [(title, line) for title, lines in analysis.sections for line in lines]
     rows = [(_text(title), markup.verdict(line.status), _text(line.text)) for title, line in statements[:_ROWS]]
@@ -176,7 +176,7 @@ def _integrals(search: IntegralSearch) -> Iterator[Line]:
 
 @lines_of.register
 def _densities(search: DensitySearch) -> Iterator[Line]:
-    """The formula with its verdict and evidence, then further densities, or the reason why there is none."""
+    """Yield the formula with its verdict and evidence, then further densities, or the reason why there is none."""
     return _formulas([("phi", density, "") for density in search.shown], (search.further, search.note, search.reason))
 
 
@@ -204,7 +204,7 @@ def _brackets(tensor: Any) -> HtmlCell:
 
 @lines_of.register
 def _darboux(search: DarbouxSearch) -> Iterator[Line]:
-    """The equation of a Darboux polynomial, then the polynomials found for each cofactor, or that there are none."""
+    """Yield the equation of a Darboux polynomial, then the polynomials for each cofactor, or that none were found."""
     meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(search.cofactors) else ""
     equation = f"P(x~) = C P(x){meaning}; without the spaces that products of others span"
     yield ("P' = K P, irreducible; integrals left out" if search.flow else equation,)
@@ -219,7 +219,7 @@ def _darboux(search: DarbouxSearch) -> Iterator[Line]:
 
 @lines_of.register
 def _structures(structures: ConstantStructures) -> Iterator[Line]:
-    """The Hamiltonian form, or why there is none."""
+    """Yield the Hamiltonian form, or the reason why there is none."""
     if structures.hamiltonian is None:
         yield (f"not Hamiltonian with a constant J: {structures.reason}",)
         return
@@ -321,7 +321,7 @@ def _symmetries(symmetries: Symmetries) -> Iterator[Line]:
 
 @lines_of.register
 def _commuting(systems: CommutingSystems) -> Iterator[Line]:
-    """The g that commute, except 0, f and -f, each written as options of a command."""
+    """Yield the g that commute, except 0, f and -f, each written as options of a command."""
     if systems.dimension is not None:
         yield "bracket", f"the g with [f, g] = 0 have dimension {systems.dimension}"
     if systems.every_g_commutes:
@@ -357,7 +357,7 @@ def _commuting(systems: CommutingSystems) -> Iterator[Line]:
 
 
 def _as_options(g: CommutingField, root: str) -> HtmlCell:
-    """The system as options of a command, and B below it where g = B f; in a notebook its equations."""
+    """Yield a system as options of a command, and B if g = B f; in a notebook, its equations."""
     texts = [f"--rhs='{text}'" for text in g.rhs]
     text = f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
     if root:

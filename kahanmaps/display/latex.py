@@ -99,8 +99,7 @@ def latex_rational_function(function: RationalFunction) -> str:
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
-    r"""Return a polynomial as LaTeX, or its beginning and number of terms if it has more than about this number of
-    characters.
+    r"""Return a polynomial as LaTeX; beyond about this number of characters, its beginning and number of terms.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))

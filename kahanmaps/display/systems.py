@@ -296,7 +296,7 @@ def geometry_text(geometry: LevelGeometry | OrbitCurve) -> str:
 
 @html_form.register
 def geometry_html(geometry: LevelGeometry | OrbitCurve) -> str:
-    """Return the same as a list."""
+    """Return the curves, translations and rotation numbers in the planes of an orbit as an HTML list."""
     lines = (
         markup.escape(markup.shortened(line.strip(), 200)) for line in geometry.text.replace("\t", ": ").split("\n")
     )

@@ -150,7 +150,7 @@ def read_equations(
 
     Args:
         pieces: the tokens of each equation.
-        variables: names for the velocities of equations of second order, beside those of the variables, if any.
+        variables: the names of the variables and of the velocities of equations of second order, if they are given.
         parameters: names that are taken.
 
     Returns:
@@ -289,7 +289,7 @@ def _with_plain_names(pieces: Sequence[list[str]], taken: Collection[str]) -> tu
 
 
 def _hint(left_side: Sequence[str], piece: Sequence[str]) -> str:
-    """Return a hint what to type instead of an unsupported statement."""
+    """Return a hint at what to type instead of an unsupported statement."""
     if "\\" in left_side:  # of LaTeX: \\dot{x}, \\dot x, \\frac{dx}{dt}
         name = next((token for token in left_side if is_name(token) and token not in _LATEX), "x")
         name, primes = name.removeprefix("d" if "dt" in left_side else ""), "''" if "ddot" in left_side else "'"

@@ -15,8 +15,8 @@ _NUMBERS = (int, float, complex)
 def formula_text(value: Any) -> str:
     """Convert a right-hand side or a claim to text, exactly.
 
-    Raises InexactNumber for floats, also inside expressions of SymPy, where 1/3*x silently becomes one;
-    InputError for irrational numbers there.
+    Raises InexactNumber for floats, also inside expressions of SymPy, where Python evaluates 1/3*x with a float;
+    InputError for irrational numbers in such expressions.
 
     >>> formula_text("x*y"), formula_text(2)
     ('x*y', '2')

@@ -4,10 +4,9 @@ The Bogoyavlenskij-Itoh systems LV(n, k) are Lotka-Volterra systems:
 
     x_i' = x_i sum_j a_ij x_j,    a_ij = -a_ji,    a_ij = 1 for 0 < j - i < n - k and -1 for j - i >= n - k,
 
-with 2k + 1 <= n. For n = 2k + 1 each species eats the k that come after it on a circle. For larger n the species
-k + 1, ..., n - k have the same interactions with all others: with their sum m in their place, LV(n, k) is
-LV(2k + 1, k). The partial sums of these species solve one Riccati equation, for the map too, so that their cross-ratios
-are integrals.
+with 2k + 1 <= n. For n = 2k + 1 each species preys on the next k on a circle. For larger n the species k + 1, ..., n -
+k have the same interactions with all others: if their sum replaces them, LV(n, k) becomes LV(2k + 1, k). The partial
+sums of these species solve one Riccati equation, also for the map, so that their cross-ratios are integrals.
 docs/mathematics.md has the proofs. Sources: itoh-1987, bogoyavlenskij-1988, damianou-2017.
 """
 

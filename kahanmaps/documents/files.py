@@ -70,7 +70,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
     @property
     def label(self) -> str:
-        """The title in pictures and pages: the name, or the equations of a system from the command line, if short."""
+        """The title in pictures and pages: the name or, for an inline system, its equations if they are short."""
         if self.name != "inline" or not self.is_quadratic:
             return self.name
         rhs = zip(self.variables, self.system.rhs, strict=True)
@@ -78,7 +78,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return equations if len(equations) <= _LONGEST_LABEL else self.name
 
     def labelled(self, letter: str) -> str:
-        """Return the system with a letter for it: f = euler_top, or f: (x' = y, y' = -x)."""
+        """Return the name or the equations of the system after a letter: f = euler_top, or f: (x' = y, y' = -x)."""
         return f"{letter} = {self.name}" if self.label == self.name else f"{letter}: ({self.label})"
 
     @property
@@ -102,7 +102,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return self.system.f(*point, **named)
 
     def jacobian(self, *point: Any, **named: Any) -> Any:
-        """Return the Jacobi matrix f'(x) at a point, as `f` takes it; without a point, its entries as polynomials."""
+        """Return the Jacobi matrix f'(x) at a point, given as in `f`; without a point its entries are polynomials."""
         rows = self.system.jacobian(self.variables)
         if not point and not named:
             return rows
@@ -156,7 +156,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
         return self.system.rhs
 
     def at(self, eps: Any = None) -> Map:
-        """Return the map at an exact eps, half the time step; it is callable. Raises InputError if eps is missing."""
+        """Return the map at an exact eps, half the time step, as a callable. Raises InputError if eps is missing."""
         if hasattr(eps, "__len__") and not isinstance(eps, str):
             raise InputError("found a point, expected eps: system.at(eps)(x) is the image of x, system.f(x) the field")
         if eps is None and self.map.has_eps:
@@ -166,7 +166,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
     __call__ = at
 
     def save(self, path: str | Path) -> None:
-        """Write the file."""
+        """Write the system to a file in TOML."""
         write_atomically(str(path), self.to_toml().encode())
 
     @property
@@ -276,7 +276,7 @@ class SystemFile(HtmlDisplay, LatexDisplay):
 
 
 def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form in which floats can step, or why there is none; none for the method "generic"."""
+    """Return the normal form for float orbits, or the reason why there is none, as for the method "generic"."""
     normal_form = NoNormalForm("generic, as requested") if method == "generic" else file.normal_form
     if not isinstance(normal_form, NoNormalForm) and normal_form.T is not None:
         return NoNormalForm("in floating point only J = [[0, I], [-I, 0]] has a normal form")
@@ -286,7 +286,7 @@ def float_normal_form(file: SystemFile, method: str | None = None) -> SystemNorm
 def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
     """Read a system from a TOML file; `parameters` replace those of the file.
 
-    Raises SystemFileError with every mistake of the file, InputError where it cannot be read.
+    Raises SystemFileError with every mistake of the file, InputError if it cannot be read.
     """
     data = _TOML.read(path)
     with reading(path):

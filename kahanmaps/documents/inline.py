@@ -56,11 +56,10 @@ def System(
     Args:
         equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
             of SymPy, or a list of its equations Eq(x(t).diff(t), ...).
-        variables: for a list of right-hand sides, their names in this order; otherwise also a dict of parameters. For a
-            Hamiltonian the positions, then the momenta in the same order.
+        variables: for a list of right-hand sides, the names of the variables in this order; otherwise also a dict of
+            parameters. For a Hamiltonian the positions, then the momenta in the same order.
         hamiltonian: H, instead of equations: q' = dH/dp, p' = -dH/dq.
-        parameters: the values of other names, a=2 or parameters={"a": 2}, exact numbers, among them algebraic numbers
-            of SymPy.
+        parameters: the values of other names, a=2 or parameters={"a": 2}: exact numbers, also algebraic ones of SymPy.
 
     Returns:
         A `SystemFile`, as if read from a file.

@@ -1,4 +1,4 @@
-"""System files of maps that were made in Python: the functions that need the claims of a file take maps as well."""
+"""System files of maps constructed in Python, so that functions of system files also accept maps."""
 
 from __future__ import annotations
 

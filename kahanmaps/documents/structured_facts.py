@@ -49,10 +49,10 @@ class ClaimedRelations(NamedTuple):
 
 
 def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[ClaimedRelations, ...]:
-    """The relations of a [catalog] section, their functions as exact polynomials in `variables`.
+    """Return the relations of a [catalog] section, their functions as exact polynomials in `variables`.
 
-    `section` is `SystemFile.catalog`. Empty where the section has none. Raises InputError for functions that cannot be
-    read. Source: petrera-pfadler-suris-2009.
+    `section` is `SystemFile.catalog`. The result is empty if the section states no relations. Raises InputError for
+    functions that cannot be read. Source: petrera-pfadler-suris-2009.
 
     >>> [result] = relations({"relations": [{"monomials": "degree <= 1", "dimension": 1}]}, ["x", "y"])
     >>> result.functions, result.dimension
@@ -69,7 +69,7 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Cla
 
 
 def relation_functions(texts: str | Sequence[str], variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
-    """The functions that "degree <= d" or a list of polynomials stands for, as exact polynomials in `variables`.
+    """Return the functions given by "degree <= d" or by a list of polynomials, as exact polynomials in `variables`.
 
     Raises InputError for anything else, for more than 100000 monomials, and for functions that are 0 or occur twice.
     Source: petrera-pfadler-suris-2009.

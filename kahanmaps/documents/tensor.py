@@ -19,8 +19,9 @@ from kahanmaps.maps.kahan import SystemLike
 def tensor_file(system: SystemLike, chi: fmpq_poly) -> SystemFile:
     """Convert the system of a file over K = Q[t]/(chi) to a file over Q; a parameter t of the file generates K.
 
-    The integrals and the density are converted as well, unless the file has a parameter t, on which they may depend, or
-    the results are too large. Raises InputError if the file contains no quadratic system.
+    The integrals and the density are converted as well, unless the results are too large or the file has a parameter t,
+    on which they may depend. `chi` is not constant and may have repeated roots. Exact. Raises InputError if the file
+    contains no quadratic system.
 
     >>> from kahanmaps.documents.catalog import load
     >>> result = tensor_file(load("euler_top"), fmpq_poly([-2, 0, 1]))

@@ -67,7 +67,7 @@ def read_ode(text: str, where: str) -> tuple[dict[str, Any], list[str]]:
     document = {"parameters": reader.parameters, "system": {"rhs": equations}}
     notes = list(reader.notes)
     if reader.has_capitals:
-        notes.append("names are in lower case: XPP does not tell upper from lower case")
+        notes.append("names are in lower case: XPP does not distinguish upper and lower case")
     if reader.initial:
         start = ", ".join(f"{name} = {value}" for name, value in reader.initial.items())
         notes.append(f"the initial values {start} are left out: --start gives them, in the order of the variables")

@@ -141,9 +141,9 @@ class Grid:
     """
 
     def __init__(self, axes: Mapping[str, Sequence[Any]], zips: Sequence[Sequence[str]] = ()) -> None:
-        together = (next((tuple(names) for names in zips if name in names), (name,)) for name in axes)
+        group_of_axis = (next((tuple(names) for names in zips if name in names), (name,)) for name in axes)
         self.axes = axes
-        self.groups: list[tuple[str, ...]] = list(dict.fromkeys(together))
+        self.groups: list[tuple[str, ...]] = list(dict.fromkeys(group_of_axis))
         self._lengths = [len(axes[group[0]]) for group in self.groups]
 
     @property

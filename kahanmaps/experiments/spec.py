@@ -62,8 +62,8 @@ class Spec:
 def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS, skip_bad: bool = False) -> Spec:
     """Read the spec in a TOML file; paths of systems in it are relative to its folder.
 
-    With `skip_bad` systems that cannot be read, or are of the wrong kind for the task, are left out and listed.
-    Raises SpecError with all mistakes, and InputError if the file cannot be read.
+    With `skip_bad`, systems that cannot be read or are of the wrong kind for the task are skipped and listed. Raises
+    SpecError with all mistakes, and InputError if the file cannot be read.
     """
     data = _TOML.read(path)
     with reading(path):

@@ -30,14 +30,14 @@ def new(
     """Return a random member of the family.
 
     Args:
-        m: half the dimension; rational eigenvalues are drawn, or with `generic` an integer polynomial chi.
+        m: half the dimension; then rational eigenvalues are random or, with `generic`, an integer polynomial chi.
         eigenvalues: the eigenvalues of A, m exact numbers.
         chi: the characteristic polynomial in t, as text such as "(t - 1)*(t^2 - 2)".
         size: a bound for the random integer coefficients.
         seed: the random seed.
 
     Raises:
-        InputError: unless one of m, eigenvalues and chi is given.
+        InputError: unless exactly one of m, eigenvalues and chi is given.
 
     >>> new(eigenvalues=[1, -2, 3], seed=7).m
     3

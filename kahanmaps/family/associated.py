@@ -28,7 +28,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 @dataclass(frozen=True, eq=False)
 class AssociatedSystem(HtmlDisplay, ResultPart):
-    """An associated system f_s = B^T f_0: the signs, B with its coefficients as a polynomial in A, and the cubic K."""
+    """An associated system f_s = B^T f_0: its signs, B, the coefficients of B as a polynomial in A, and the cubic K."""
 
     signs: tuple[int, ...]
     coefficients: tuple[fmpq, ...]
@@ -96,8 +96,8 @@ class ConjugateAssociate:
 class FamilyMember(HtmlDisplay, ResultPart):
     """A member of the family: a skew-Hamiltonian A, a cubic H with A Hess(H) = Hess(H) A^T, and signs.
 
-    The signs choose an associated system (all positive: f_0 itself). Raises HypothesisError if A is not
-    skew-Hamiltonian, or A Hess(H) is not Hess(H) A^T.
+    The signs determine an associated system, `chosen`; if all are positive it is f_0 itself. Raises HypothesisError if
+    A is not skew-Hamiltonian, or A Hess(H) is not Hess(H) A^T.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> A = fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2])
@@ -187,9 +187,9 @@ class FamilyMember(HtmlDisplay, ResultPart):
     def conjugate_associates(self) -> Iterator[ConjugateAssociate]:
         """Return the associated systems with the opposite sign at one root t of a factor g of degree 2 or more.
 
-        There is one over Q[t]/g for every such factor with multiplicity 1 and every choice of signs of the others, up
-        to an overall sign. Conjugates of B belong to other roots, and the product of two of them has the opposite sign
-        at both: together with the rational ones they generate all B_s if no root is repeated.
+        There is one over Q[t]/g for every such factor with multiplicity 1 and every choice of the signs at the other
+        factors, up to an overall sign. The conjugates of its B belong to other roots, and the product of two conjugates
+        has the opposite sign at both roots: with the rational ones they generate all B_s if no root is repeated.
 
         >>> from kahanmaps.algebra.parsing import parse_polynomial
         >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])

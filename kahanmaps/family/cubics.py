@@ -42,7 +42,7 @@ def default_variables(dim: int) -> tuple[str, ...]:
 
 
 def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicSpace:
-    """Compute the space of cubics for a skew-Hamiltonian A, generic or not; exact.
+    """Compute the space of homogeneous cubics H with A Hess(H) = Hess(H) A^T, for any skew-Hamiltonian A; exact.
 
     >>> space = cubic_space(fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2]))
     >>> space.dimension, space.rank, space.unknowns

@@ -9,8 +9,8 @@ map, with the Hessian determinant D = h_XX h_YY - h_XY^2,
 
     X~ = (X + 2 eps dh/dY) / (1 + eps^2 D(X, Y)),     Y~ = (Y - 2 eps dh/dX) / (1 + eps^2 D(X, Y)).
 
-At a rational root r of chi, X, Y and h take the values u, v and h_r, and u' = dh_r/dv, v' = -dh_r/du is a planar
-system over Q by itself. If chi splits there are m of them, and H = sum of h_r(u, v)/chi'(r), for l(a) = sum of
+At a rational root r of chi, X, Y and h take the values u, v and h_r, and u' = dh_r/dv, v' = -dh_r/du is a separate
+planar system over Q. If chi splits there are m of them, and H = sum of h_r(u, v)/chi'(r), for l(a) = sum of
 a(r)/chi'(r) (Euler, Jacobi). Elements of K are polynomials of degree < m.
 """
 
@@ -261,9 +261,9 @@ class NormalForm(HtmlDisplay, ResultPart):
 def normal_form(member: FamilyMember) -> NormalForm:
     """Return the normal form of the associated system given by the signs of the member.
 
-    (If a sign is negative, `H` of the result is K.) e1 is a unit vector or a small combination of unit vectors, e2 a
-    short vector with W(e1, e2) = 1 found by LLL; among 2m such choices the one with the shortest numbers is used.
-    Raises HypothesisError if chi has repeated roots.
+    If a sign is negative, `H` of the result is K. The vector e1 is a unit vector or a small combination of unit
+    vectors, and e2 a short vector with W(e1, e2) = 1, found by LLL; among 2m such choices the one with the shortest
+    numbers is used. Exact. Raises HypothesisError if chi has repeated roots.
     """
     if not isinstance(member, FamilyMember):
         raise wrong_kind(member, "a member of the family", "km.load(...).member is one, of a file of kind [family]")
@@ -311,8 +311,8 @@ def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
     """Return S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
 
     The integers (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1, those with s = 0 one of rank m.
-    With weights beyond the bounds of LLL for short vectors of either, the first m vectors of a reduced basis have
-    s = 0 and the next one the least s > 0, up to sign: then e2 = y/s.
+    With weights beyond the bounds of LLL for short vectors of both lattices, the first m vectors of a reduced basis
+    have s = 0 and the next one has the least s > 0, up to sign; then e2 = y/s.
     """
     n = t.nrows()
     m = n // 2

@@ -58,8 +58,8 @@ def random_member_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: 
 def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
     """Return a random member whose A has the characteristic polynomial chi(t)^2, with chi of degree m.
 
-    `size` bounds the integer coefficients of the cubic form over Q[t]/chi. Where chi has repeated roots A is not
-    diagonalisable.
+    `size` bounds the integer coefficients of the cubic form over Q[t]/chi. If chi has repeated roots, A has Jordan
+    blocks.
 
     >>> random_member_with_chi(fmpq_poly([-2, 0, 1]), seed=7).factors[0].degree
     2
@@ -96,7 +96,7 @@ def random_member_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMe
 
 
 def random_member(m: int, seed: int, size: int = 1) -> FamilyMember:
-    """Return a member with a random integer chi without repeated roots, typically irreducible.
+    """Return a member of dimension 2m with a random integer chi without repeated roots, typically irreducible.
 
     >>> random_member(3, seed=7).is_generic
     True

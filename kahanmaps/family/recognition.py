@@ -5,9 +5,9 @@ x' = J grad H(x) with a homogeneous cubic H and a constant invertible skew J bel
     A^T J = J A   and   A Hess(H) = Hess(H) A^T.
 
 These are linear conditions on the skew matrix S = J A: S T_l J is symmetric for each l, where T_l is the derivative of
-Hess(H) along x_l. The multiples of I always solve them. Where H depends on all variables the solutions are a
-commutative algebra, and the factors of that algebra are the finest splitting of H; where it does not, solutions need
-not commute, and idempotents are split off one after the other. docs/mathematics.md, "Hidden members", has the proofs.
+Hess(H) along x_l. The multiples of I always solve them. If H depends on all variables, the solutions form a commutative
+algebra, and the factors of this algebra give the finest splitting of H; otherwise solutions need not commute, and
+idempotents are split off one after the other. docs/mathematics.md, "Hidden members", has the proofs.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class FamilyStructure(ResultPart):
     """The structure of a Hamiltonian system as a member: `member` is the system in the coordinates y with x = T y.
 
     T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of
-    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `find_family_structure`; that `member` is the system is
-    verified at construction, exactly. Raises HypothesisError otherwise.
+    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. It is constructed by `find_family_structure`, and the
+    constructor verifies exactly that `member` is the system. Raises HypothesisError otherwise.
     """
 
     hamiltonian: CubicHamiltonian
@@ -99,8 +99,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     H is a homogeneous cubic. The result is a reduced lattice basis of all integer solutions; the identity lies in its
     span. Exact.
 
-    Raises InputError if H is not a homogeneous cubic, J not an invertible skew matrix of the same size, or the
-    dimension larger than 32.
+    Raises InputError unless H is a homogeneous cubic, J an invertible skew matrix, and the dimension at most 32.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> names = ["x1", "x2", "x3", "x4"]
@@ -114,7 +113,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     """
     if J is None:
         J = standard_structure(len(names_of(H)))
-    reason = _reason_against(CubicHamiltonian(H, J))
+    reason = _unsupported_reason(CubicHamiltonian(H, J))
     if reason:
         raise InputError(reason)
     _require_size(J.nrows())
@@ -135,10 +134,10 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
 def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | None:
     """Search for a matrix A that makes the system a member of the family, with as many distinct roots as possible.
 
-    Returns None if H is not a homogeneous cubic or J not invertible, and if only the multiples of I satisfy
-    A Hess(H) = Hess(H) A^T. (In dimension 2 the result is A = I, for every H.) If chi of A splits over Q, its roots are
-    1, 2, ..., r. The member is verified exactly. That no other A has more distinct roots is certain if H depends on all
-    variables; otherwise it is only the result of trying many small combinations.
+    Returns None if H is not a homogeneous cubic or J not invertible, and if only the multiples of I satisfy A Hess(H) =
+    Hess(H) A^T. (In dimension 2 the result is A = I, for every H.) If chi of A splits over Q, its roots are 1, 2, ...,
+    r. The member is verified exactly. No other A has more distinct roots if H depends on all variables (proved);
+    otherwise the A is the best of many small combinations.
 
     Raises InputError beyond dimension 32.
 
@@ -153,7 +152,7 @@ def find_family_structure(hamiltonian: CubicHamiltonian) -> FamilyStructure | No
     >>> find_family_structure(CubicHamiltonian(H, standard_structure(4))) is None
     True
     """
-    if _reason_against(hamiltonian):
+    if _unsupported_reason(hamiltonian):
         return None
     _require_size(hamiltonian.dim)
     T = QQ.identity(hamiltonian.dim) if hamiltonian.is_standard else darboux_coordinates(hamiltonian.J)
@@ -205,10 +204,10 @@ def find_family_structure_of(system: QuadraticSystem | Any) -> FamilyStructure |
 
 
 def why_not_member(hamiltonian: CubicHamiltonian | None) -> str:
-    """Return a sentence that says why the system is not a member; None stands for a system without a Hamiltonian."""
+    """Return a sentence that says why a system is not a member; pass None for a system without a Hamiltonian."""
     if hamiltonian is None:
         return "x' is not J grad H with J = [[0, I], [-I, 0]]"
-    return _reason_against(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
+    return _unsupported_reason(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
 
 
 def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
@@ -314,7 +313,7 @@ def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
 
 
 def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
-    """The idempotents that X = E X E splits E into, one for each irreducible factor; E itself where there is one."""
+    """The idempotents into which X = E X E splits E, one for each irreducible factor; E itself if there is only one."""
     factors = _factors_on(X, E)
     if len(factors) == 1:
         return [E]
@@ -396,7 +395,7 @@ def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
     return [fmpq_mat(*shape, primitive_integers(tuple(map(fmpq, row)))) for row in lattice.lll().tolist()]
 
 
-def _reason_against(hamiltonian: CubicHamiltonian) -> str:
+def _unsupported_reason(hamiltonian: CubicHamiltonian) -> str:
     """Return why the search for A does not apply to a system; empty if it does."""
     if hamiltonian.dim % 2:
         return f"the dimension is {hamiltonian.dim}, expected an even one"

@@ -27,7 +27,7 @@ _MAX_DIMENSION = 32
 class SystemNormalForm(ResultPart):
     """A normal form with x = T S z; `T` is None where the form is in the system's own coordinates.
 
-    `declared` says whether the system came as a member of the family, `text` the membership that was found.
+    `declared` says whether the system was given as a member of the family; `text` describes the membership.
     """
 
     form: NormalForm
@@ -53,7 +53,9 @@ class NoNormalForm(ResultPart):
 def system_normal_form(
     system: QuadraticSystem | Any, hamiltonian: CubicHamiltonian | None = None, member: FamilyMember | None = None
 ) -> SystemNormalForm | NoNormalForm:
-    """Compute the normal form of a system, given its structure as a member or its Hamiltonian, if known.
+    """Compute the normal form of a system, or the reason why there is none; exact.
+
+    The structure as a member of the family, or the Hamiltonian, may be given, so that it need not be searched for.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> system = random_member_with_eigenvalues([1, -2, 3], seed=7).chosen.system

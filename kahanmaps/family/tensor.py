@@ -63,8 +63,7 @@ def split_names(variables: Sequence[str], m: int) -> tuple[str, ...]:
 def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[RationalFunction, ...]:
     """Return the m components over Q of a rational function of the variables and eps over K, t^0 first.
 
-    If the Kahan map over K conserves the function, the map over Q conserves all components. Raises BudgetExceeded if
-    they are too large.
+    If the Kahan map over K conserves the function, the map over Q conserves them. Raises BudgetExceeded.
 
     >>> x, eps = ring(["x", "eps"]).gens()
     >>> for integral in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
@@ -132,9 +131,9 @@ class TensorStructure(ResultPart):
 def tensor_structure(system: QuadraticSystem | Any) -> TensorStructure | None:
     """Search for the largest algebra K = Q[C] over which a system is defined.
 
-    Returns None if it is Q, or no single C generates it. All C with C f'(x) = f'(x) C are computed by linear algebra
-    over Q, up to dimension 12; the result is also None if they do not commute with each other (f does not depend on all
-    variables, or is linear). Exact.
+    All C with C f'(x) = f'(x) C are computed by linear algebra over Q, up to dimension 12; exact. Returns None if the
+    algebra is Q or has no single generator, or if the C do not commute (f is linear or does not depend on all
+    variables).
 
     >>> f = over_algebra(QuadraticSystem.from_text(["x", "y"], ["y^2", "x^2"]), fmpq_poly([0, 0, 1]))
     >>> print(tensor_structure(f).text)

@@ -1,1 +1,1 @@
-"""What Kahan maps preserve: integrals, densities, Poisson tensors, and how large the expressions for them are."""
+"""The functions and tensors that Kahan maps preserve, as exact expressions; heights of orbits and their growth."""

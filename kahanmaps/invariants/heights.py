@@ -1,8 +1,8 @@
 """Heights h_0, h_1, ... of the points of an exact orbit, their kind of growth, and its constant.
 
 The height of a rational point x = (p_1 : ... : p_d : q), with integers without a common factor, is here the bit length
-of the largest of them, floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: the logarithmic projective height up to less than
-one bit.
+of the largest of them, floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: within one bit of the logarithmic projective
+height.
 
 Over a number field Q[t]/g of degree m it is the height of the rational point of all coefficients of 1, t, t^2, ... Up
 to a constant this lies between the height of the point and m times it (denominators are ideals, and the least positive
@@ -15,8 +15,8 @@ periodic. On an elliptic curve of degree d in projective space that the map tran
 
     h_n = c n^2 + b n + O(1),        c = d hhat(T)/log 2,
 
-by the theory of Neron and Tate, where hhat is the canonical height of the divisor (O). In a plane of the normal form
-d = 3, and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of an infinite orbit are unbounded
+by the theory of Neron and Tate, where hhat is the canonical height of the divisor (O). In a plane of the normal form d
+= 3, and T is the point (0, 0) of the Jacobian in docs/mathematics.md. Heights of infinite orbits are unbounded
 (Northcott).
 
 There is a formula for c up to a bounded error. Over Q(gamma) the height pairing <T, T> of that point is 1/12
@@ -70,18 +70,18 @@ class HeightGrowth(ResultPart):
     """The heights of an orbit at the steps 0, every, 2 every, ..., and how the orbit ended.
 
     The kind of growth is decided with exact numbers. Let w be a quarter of the number of heights, and r_1, ..., r_4 the
-    rises over the last four intervals of w steps: each is w times the slope of the line of least squares, since single
+    increases over the last four intervals of w steps: each is w times the slope of a least-squares line, since single
     heights fluctuate by a few bits, some by the logarithm of n. Let e_j = r_{j+1} - r_j. The first matching rule holds:
 
-    * periodic: the orbit returned to its initial point;
-    * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2, and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 =
-      e_2^2; powers of n stay below 0.9 e_2^2 as long as e_2 >= 2 e_1: tried up to n^8.)
+    * periodic: the orbit returned to its initial point; * exponential: e_1 > 0, e_2 >= 2 e_1, 10 e_1 e_3 >= 9 e_2^2,
+      and e_1 + e_2 + e_3 >= 8 bits. (C g^n has e_1 e_3 = e_2^2; for powers of n up to 8 with e_2 >= 2 e_1, e_1 e_3 is
+      less than 0.9 e_2^2.)
     * quadratic: all e_j > 0, none more than 5/3 of another, and e_1 + e_2 + e_3 >= 8 bits. (c n^2 + b n has equal e_j,
       wherever its minimum is; n^3 has 1 : 2 : 3, and at least 1 : 1.8 if the last four intervals leave steps out.)
     * logarithmic: at least 32 heights, the largest of the last interval above that of the first, and from the second
-      interval on a rise or fall of less than 1/8 bit from one height to the next. (Linear growth is not so slow: a
-      Moebius map of infinite order with two fixed points raises heights by at least 1/2 bit for each step, since its
-      multiplier has a Mahler measure of 2 or more.)
+      interval on a change of less than 1/8 bit from one height to the next. (Linear growth is faster: a Moebius map of
+      infinite order with two fixed points increases heights by at least 1/2 bit in each step, since its multiplier has
+      a Mahler measure of at least 2.)
     * bounded: the second half has neither a larger nor a smaller height than the first;
     * linear: all r_j > 0, and they differ by at most a quarter of the least, and by at most 4 bits or 1/32 of the
       least, whichever is more;
@@ -175,7 +175,7 @@ class HeightGrowth(ResultPart):
 
 
 def height(point: Sequence[Any]) -> int:
-    """Return the height in bits of a point with exact coordinates; over Q[t]/g that of all coefficients.
+    """Return the height in bits of a point with exact coordinates (over Q[t]/g, of the point of all coefficients).
 
     >>> height(["3/4", "-1/6", 0])  # (9 : -2 : 0 : 12)
     4
@@ -210,12 +210,19 @@ def height_growth(
 ) -> HeightGrowth:
     """Measure the heights of an orbit of a map over Q at the steps 0, every, 2 every, ... up to `steps`.
 
-    The orbit ends earlier where it cannot be continued, or after the current step once the `budget` is spent.
+    Args:
+        kahan_map: a map over Q at one eps.
+        start: the initial point, exact.
+        steps: the number of steps.
+        normal_form: the normal form of the system, if known (family.system_normal_form). It is faster, and for large
+            `every` points are computed directly. Each height then costs a gcd: three planes take about 0.2 s for 100
+            steps and 8 s for 300, but 0.8 s with `every` = 15, which is nearly as informative.
+        every: the number of steps between heights.
+        max_digits: the orbit ends at a number with more digits; None for no limit.
+        budget: the work limit, at which the orbit ends after the current step.
 
-    With a `normal_form` (family.system_normal_form) the orbit is computed in normal form, and for large `every` its
-    points are computed directly; the heights are the same. Each height then costs a gcd of large numbers, which is most
-    of the work for long orbits: three planes take about 0.2 s for 100 steps, 2 s for 200 and 8 s for 300, but 0.8 s
-    with `every` = 15, which is nearly as informative.
+    Returns:
+        The heights, exact, up to the end of the orbit, and their measured kind of growth.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -321,7 +328,7 @@ def _decide(heights: Sequence[int]) -> tuple[Growth, str]:
     least_rise, spread = min(rises), max(rises) - min(rises)
     if least_rise > 0 and spread <= least_rise / 4 and (spread <= _NOISE or spread <= least_rise / 32):
         return Growth.LINEAR, f"{rises_text}, about the same each time"
-    return Growth.UNDECIDED, f"{rises_text}, which fits no rule; more steps may tell"
+    return Growth.UNDECIDED, f"{rises_text}, which fits no rule; more steps may decide"
 
 
 def _too_few(heights: Sequence[int]) -> str:

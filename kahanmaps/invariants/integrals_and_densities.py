@@ -72,8 +72,7 @@ class PhaseFunction(ABC):
 class ClaimedFunction(PhaseFunction):
     """A rational function of the variables and eps (its last variable) in a claim of a file or of the user.
 
-    With a `root`, the variable before eps represents it. If the function contains x~, the image of x, the map is
-    required.
+    With a `root`, the variable before eps represents it. The map is required if the function contains x~.
     """
 
     def __init__(
@@ -356,7 +355,7 @@ class ClaimedDensity(ClaimedFunction):
 
 
 def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
-    """Return the hypothesis that phi is defined and not 0: for phi = 0 every law for dx/phi would hold trivially.
+    """Return the hypothesis that phi is defined and not 0, since for phi = 0 the law for dx/phi holds trivially.
 
     Args:
         phi: a function of `dim` variables, then of symbols and eps.
@@ -436,10 +435,9 @@ def normalized(function: RationalFunction, dim: int) -> Normalized:
     """Normalize an integral I: return (alpha I + beta)/gamma that tends to a nonconstant function of x as eps -> 0.
 
     If a map conserves I, it conserves (alpha I + beta)/gamma for all functions alpha, beta, gamma of eps and the
-    parameters, and a computation returns an arbitrary one of these. If its limit is a constant, like that of the
-    published integrals (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top, its values hide how well it is conserved,
-    since errors of H are multiplied by a power of eps. So the constant is subtracted, and the result divided by that
-    power.
+    parameters, and a search returns an arbitrary one of these. If its limit is a constant, like that of the published
+    integrals (1 - eps^2 x^2)/(1 - eps^2 y^2) of the Euler top, its values hide how well it is conserved, since errors
+    of H are multiplied by a power of eps. So the constant is subtracted, and this power divided out.
 
     Args:
         function: an integral I of a map that approximates a flow, for every eps; a rational function of the variables,

@@ -1,4 +1,4 @@
-"""Poisson tensors P(x), and the law that a map preserves one.
+"""Poisson tensors P(x), and the transformation law by which a map preserves one.
 
 A map Phi is Poisson for P if dPhi(x) P(x) dPhi(x)^T = P(x~). If M(x) x~ = r(x) defines the map, then dPhi = M^{-1} N,
 and the law becomes, without denominators except those of x~ and P,
@@ -89,7 +89,7 @@ class HamiltonianTensor(PoissonTensor):
 
 
 class MatrixPoissonTensor(PoissonTensor):
-    """A skew matrix of rational functions of the variables, perhaps symbols, and eps (their last variable).
+    """A skew matrix of rational functions of the variables, symbols (if any) and, as their last variable, eps.
 
     Raises InputError for a matrix that is not square or not skew.
 
@@ -223,7 +223,7 @@ class MatrixPoissonTensor(PoissonTensor):
 
 
 def tensor_condition(tensor: MatrixPoissonTensor, eps: fmpq | None) -> str:
-    """Return the hypothesis that P is defined and not 0: for P = 0 every law for tensors would hold trivially.
+    """Return the hypothesis that P is defined and not 0, since for P = 0 the laws for tensors hold trivially.
 
     Args:
         tensor: P, a matrix of functions of the variables, symbols and eps.
@@ -258,8 +258,7 @@ def transformation_sides(
     """Return both sides of the transformation law of this module, at x = `point` and x~ = `image`.
 
     `values` are those of the symbols. Returns None at a pole of the tensor, and if it is 0 at both points, where the
-    law is trivial. For a map with several factors it is the law of the last factor, with P(x) transformed by the other
-    ones.
+    law is trivial. For several factors of a map it is the law of the last one, with P(x) transformed by the others.
     """
     field, eps = map_.field, map_.eps
     P, P_image = (tensor.value(field, eps, (*x, *values)) for x in (point, image))

@@ -1,9 +1,9 @@
 """The analysis of one map: what it preserves, how fast its iterates grow in complexity, and a verdict.
 
-The analysis uses the map only, and ignores what a file claims about its system. Every statement carries how it is
-known: proved or supported (formulas, as identities in x and eps), derived (from the measured singularity patterns), or
-measured (modulo primes, or along orbits). The number of integrals and the growth are determined independently of each
-other: a map may have many integrals and grow exponentially.
+The analysis uses the map only, and ignores what a file claims about its system. Every statement has a certainty: proved
+or supported (formulas, as identities in x and eps), derived (from the measured singularity patterns), or measured
+(modulo primes, or along orbits). The number of integrals and the growth are determined independently of each other: a
+map may have many integrals and grow exponentially.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _MAX_UNITS = 150e6
 
 @dataclass
 class Analysis(AnalysisResult, PrintableResult):
-    """The result of `analyze`, with the statements about it."""
+    """The result of `analyze`: the results of all steps, with the statements and the verdict that follow from them."""
 
     analyses: tuple[AnalysisStep, ...] = ANALYSES
     interrupted: bool = False
@@ -74,7 +74,7 @@ class Analysis(AnalysisResult, PrintableResult):
 
     @property
     def integrable(self) -> bool | None:
-        """True, False or None (undecided), as the verdict says; `conclusion.ground` is how that is known."""
+        """Whether the map is integrable; None if this is undecided. `conclusion.ground` names the kind of evidence."""
         return {"not integrable": False, "singular": None, "undecided": None}.get(self.conclusion.kind, True)
 
     @property
@@ -158,21 +158,21 @@ def analyze(
     Args:
         system: the map; a differential equation stands for its Kahan map. Claims and facts of a file are ignored. With
             an algebraic parameter, steps that do not apply over a number field are named in `skipped`.
-        symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
-        eps: an exact number, to analyse the map at that eps only; None for every eps. eps is half the time step.
-        time_step, h: the time step 2 eps, in its place.
+        symbols: names of parameters that stay symbols in integrals and densities; other results use their values.
+        eps: half the time step, an exact number: the analysis is then at this eps only. None: it is for every eps.
+        time_step, h: the time step 2 eps, instead of eps.
         effort: an integer; each increase by 1 doubles the work that searches may take.
         seed: the random seed.
         progress: called with a message at the beginning of each step, and in steps that take longer.
         on_result: called with the results so far, at the beginning and after each step.
         analyses: the steps to run, in this order; the verdict rests on their results only.
-        processes: 1, or more: then a forked copy of this process runs the independent steps, where there is a second
+        processes: with more than 1, a forked copy of this process runs the independent steps, if there is a second
             processor (on Linux only; other threads must tolerate a fork). The results are the same.
 
     Returns:
-        An `Analysis`, the same on any machine at any load. Steps that were not completed are named in `skipped`.
-        Ctrl-C and a `time_limit` end it with an exception; the last argument of `on_result` then has all that was
-        completed.
+        An `Analysis`, the same on any machine at any load. Steps that were not completed are named in `skipped`. Ctrl-C
+        and a `time_limit` end the analysis with an exception; the last argument of `on_result` then has all completed
+        steps.
 
     Raises:
         InputError: for eps = 0, unknown symbols, and an effort that is no integer from -20 to 40.
@@ -231,13 +231,13 @@ def analyze(
 
 
 class _Account:
-    """The units of work that several steps share, one after the other: what one leaves goes to those after it."""
+    """The units of work of several successive steps: units that one step does not use go to the later ones."""
 
     def __init__(self, context: AnalysisContext, steps: Sequence[AnalysisStep], units: float) -> None:
         self.context, self.waiting, self.units = context, list(steps), units
 
     def run(self, step: AnalysisStep) -> tuple[Any, str, int]:
-        """The result of a step, or None and the reason why there is none; and the units that it took."""
+        """Run a step; return its result or None, the reason if there is none, and the units that it took."""
         if self.units <= 0:
             return None, SPENT, 0
         budget = Budget(self.units * self.context.weight(step) / sum(map(self.context.weight, self.waiting)))

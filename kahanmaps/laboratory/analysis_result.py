@@ -31,7 +31,7 @@ from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch
 
 @dataclass(frozen=True)
 class Statement(ResultPart):
-    """One line of a report, and how it is known."""
+    """One line of a report, with its certainty."""
 
     status: Certainty
     text: str
@@ -85,7 +85,7 @@ class AnalysisResult:
 
     @property
     def centre(self) -> tuple[fmpq, ...] | None:
-        """The origin of the coordinates of `normal_form`; None where H has no centre, or that step has not run."""
+        """The origin of the coordinates of `normal_form`; None if H has no centre, or before that step has run."""
         if self.hamiltonian is not None and self.hamiltonian.hamiltonian is not None:
             return self.hamiltonian.hamiltonian.centre
         return None if self.normal_form is None else (fmpq(0),) * self.dim

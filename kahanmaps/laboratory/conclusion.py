@@ -31,11 +31,10 @@ class Conclusion(ResultPart):
     defined) or "undecided".
 
     `sense` is the precise sense of the verdict: "superintegrable" (one integral less than the dimension, proved),
-    "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable",
-    "confining and not integrable", else the kind. `ground` is the kind of evidence: "proved", "derived" (from the
-    measured singularity patterns), "measured" or "estimated"; empty where there is no verdict.
-    `integrals` is the number of independent integrals that are known or measured along orbits, `growth` the kind of
-    growth of the degrees.
+    "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable", "confining
+    and not integrable", else the kind. `ground` is the kind of evidence: "proved", "derived" (from the measured
+    singularity patterns), "measured" or "estimated"; empty where there is no verdict. `integrals` is the number of
+    independent integrals, known or measured; `growth` is that of the degrees.
     """
 
     kind: str
@@ -137,14 +136,14 @@ def _contradictory(facts: _Facts) -> _Verdict | None:
 
 
 def _not_birational(facts: _Facts) -> _Verdict | None:
-    """Give no verdict on maps that are not birational: degrees and closed orbits mean nothing for these."""
+    """Return "undecided" for maps that are not birational: their degrees and closed orbits mean nothing."""
     if not facts.result.defect or facts.growth is Growth.ZERO:
         return None
     return _Verdict("undecided", f"{_capital(facts.result.defect)}; {facts.growth_text}.", ground=None)
 
 
 def _linearisable(facts: _Facts) -> _Verdict | None:
-    """Periodic maps, those with a constant iterate, and those of bounded degrees."""
+    """Return the verdict on periodic maps, maps with a constant iterate, and maps of bounded degrees."""
     proof = facts.degrees.proof if facts.degrees is not None else None
     if proof is not None and proof.is_identity:
         sentence = f"The map is periodic: {proof.reason} (proved); {facts.integrals_text}."
@@ -163,7 +162,7 @@ def _linearisable(facts: _Facts) -> _Verdict | None:
 
 
 def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
-    """Maps with a dynamical degree above 1, proved."""
+    """Return the verdict on maps whose dynamical degree is proved to be above 1."""
     result = facts.result
     if facts.degrees is None or facts.degrees.enclosure is None:
         return None
@@ -177,7 +176,7 @@ def _of_positive_entropy(facts: _Facts) -> _Verdict | None:
 
 
 def _orbits_on_curves(facts: _Facts) -> _Verdict | None:
-    """The verdict on a map whose orbits lie on curves, by proved integrals; by others only if the growth is unknown."""
+    """Return the verdict on a map whose orbits lie on curves; unproved integrals count only for unknown growth."""
     result, proved_count = facts.result, 0  # of independent integrals
     if result.integrals is not None:
         proved_count = sum(verdict is Certainty.PROVED for _, verdict in result.integrals.formulas)
@@ -201,7 +200,7 @@ def _orbits_on_curves(facts: _Facts) -> _Verdict | None:
 
 
 def _by_growth(facts: _Facts) -> _Verdict | None:
-    """Exponential and polynomial growth, measured or derived."""
+    """Return the verdict that follows from exponential or polynomial growth, measured or derived."""
     count, integrals = facts.count, facts.integrals_text
     is_known = facts.growth is Growth.EXPONENTIAL  # else the text says that it is estimated
     if is_known or (facts.degrees is not None and facts.degrees.looks_exponential):

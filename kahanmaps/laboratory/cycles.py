@@ -1,7 +1,6 @@
 """Cycles of a map on projective space over GF(p): how many there are of each length.
 
-All points of P^n(GF(p)) are followed if they are few enough, otherwise random ones. Every count is exact, for one prime
-and one eps.
+All points of P^n(GF(p)) are followed if they are few enough, otherwise random ones. Counts are exact for one p and eps.
 
 No bound for the lengths is applied. The bound of Hasse and Weil, p + 1 + 2 sqrt p, holds for a cycle on an irreducible
 curve of genus 1 that the map sends to itself. Levels of integrals may have several components, and the map may exchange
@@ -43,8 +42,8 @@ class Census(PrintableResult):
 
     `lengths` is the number of cycles by length if all points were followed (`complete`), else the number of sampled
     points that are periodic, by their period. A point is `indeterminate` where the map is not defined,
-    `pre_indeterminate` if its orbit gets to such a point, `preperiodic` if its orbit gets to a cycle without being on
-    it, and `open` if none of this was seen in `steps` steps (samples only). Where a time limit `stopped` the work
+    `pre_indeterminate` if its orbit reaches such a point, `preperiodic` if its orbit reaches a cycle on which it does
+    not lie, and `open` if none of this happened within `steps` steps (samples only). If a time limit `stopped` the work
     before the images of all points were known, `examined` is 0.
     """
 
@@ -100,12 +99,25 @@ def cycle_census(
 ) -> Census:
     """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
 
-    A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
-    examined up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
-    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends the census early. The maps
-    of a composition are applied one after the other: a point is indeterminate if one of them is not defined. Above
-    dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
-    Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
+    The maps of a composition are applied one after the other: a point is indeterminate if one of them is not defined.
+    Above dimension 6 points at which a common factor of the forms vanishes are also indeterminate.
+
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        eps: an exact number, half the time step for a Kahan map.
+        prime: a prime between 2 and 2^31.
+        time_step, h: the time step 2 eps, instead of eps.
+        samples: the number of random points; by default all points if there are at most 2,000,000 (half as many with
+            each dimension above 6), otherwise 500.
+        steps: the largest number of steps for a random point.
+        seed: the random seed.
+        progress: called with a message.
+
+    Returns:
+        A `Census`, exact. A TimeLimit ends it early.
+
+    Raises:
+        InputError: for a wrong prime, number or dimension; BadPrime if eps or the map has no reduction.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)
@@ -236,9 +248,10 @@ class _ProjectiveMap:
 
 
 def default_eps(prime: int) -> list[fmpq]:
-    """The first two of a fixed list of eps that are not 0 and not equal up to sign (the inverse map) modulo the prime.
+    """Return the first two eps of a fixed list that modulo the prime are not 0 and not equal up to sign.
 
-    For p > 5 those with eps^4 = 1 are left out: there a map may be periodic that is not periodic at other eps.
+    For p > 5 no eps has eps^4 = 1, since for such eps a map may be periodic that is not periodic otherwise. (The sign
+    of eps exchanges the map and its inverse.)
 
     >>> default_eps(101)
     [1/7, 2/11]

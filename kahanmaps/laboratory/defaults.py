@@ -1,7 +1,7 @@
 """Default limits of analyses: one table for `analyze` and for the commands that run a single analysis.
 
-Analyses are bounded by units of counted work (algebra/work.py). `analyze` gives each of its parts a share of units by
-dimension, of which no share exceeds the values here, so that no command finds less than `analyze` does.
+Analyses are bounded by units of counted work (algebra/work.py). `analyze` gives each of its steps a share of units that
+depends on the dimension and does not exceed the values here, so that no command finds less than `analyze` does.
 """
 
 from __future__ import annotations
@@ -33,6 +33,5 @@ def tensor_degree(dim: int) -> int:
 
 
 def budget_for(search: str, effort: int | Budget) -> Budget:
-    """The budget of a search at an effort: 1 is the default, each increase by 1 doubles the units. A Budget is returned
-    unchanged."""
+    """Return the budget of a search; each increase of the effort by 1 doubles it. A Budget is returned unchanged."""
     return effort if isinstance(effort, Budget) else Budget(units_at(effort, UNITS[search]))

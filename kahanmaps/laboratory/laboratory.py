@@ -126,8 +126,8 @@ class Laboratory:
         if algebraic and isinstance(file.map, AlgebraicMap):
             self.root, self.map = file.map.root, file.map.given
             if symbols or self.root.degree > MAX_DEGREE:
-                found = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
-                raise InputError(f"found {found}, expected no other symbols and a degree of at most {MAX_DEGREE}")
+                given = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
+                raise InputError(f"found {given}, expected no other symbols and a degree of at most {MAX_DEGREE}")
             self.symbols = self.map.symbols
         else:
             self.map = map_with_symbols(file, self.symbols)
@@ -171,7 +171,7 @@ class Laboratory:
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
         """Return the map at values of the names in formulas: the symbols, and last eps if it enters as a symbol.
 
-        Elsewhere eps is 1, or the given number.
+        If eps is no symbol, it is 1 or the given number.
         """
         count = len(self.symbols)
         return self.map_at(prime, values[:count], values[count] if len(values) > count else 1)
@@ -259,10 +259,9 @@ class Laboratory:
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Certainty, Evidence]:
-        """Certify that the map, or the flow, preserves I or dx/phi, as the function `verdict_on` does; for a flow by
-        expansion.
+        """Certify that the map preserves I or dx/phi, as the function `verdict_on` does; for a flow, by expansion.
 
-        A function that is no shorter than one that was too long is not expanded.
+        A function is not expanded if one of at most its length was too long.
         """
         if self.field is not None and self.flow:
             is_kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
@@ -371,8 +370,7 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
     """Call `reconstruct`, where the first of the names stands for the root if there is one.
 
     The black box is evaluated at all roots modulo primes at which the minimal polynomial of the root splits. The
-    functions are polynomials in the first name, of degree less than that of the field. `options` are those of
-    `reconstruct`.
+    functions are polynomials in the first name, of degree less than that of the field. `options` are for `reconstruct`.
     """
     if root is None:
         return reconstruct(black_box, names, **options)
@@ -410,8 +408,8 @@ def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str],
 def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
     """Divide a nonzero polynomial in n variables, the root and eps by its factors that contain no variable.
 
-    The result has integer coefficients without a common factor. It is the shortest of its multiples by numbers of the
-    field that have a rational coefficient.
+    The result has integer coefficients without a common factor. Among the multiples of the polynomial in which some
+    coefficient is rational, it is the shortest.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
@@ -482,8 +480,8 @@ def is_kept_by_flow(
     """Return whether f . grad I = 0; for a density phi, whether f . grad phi = phi div f: then dx/phi is invariant.
 
     With a factor c, a function of the symbols, return whether f . grad I = c I: then exp(-c t) I is a time-dependent
-    integral. The identity is expanded, for every value of the symbols; the function is in (variables, symbols, eps).
-    Exact.
+    integral. The identity is expanded for all values of the symbols; exact. The function is in (variables, symbols,
+    eps).
 
     >>> from kahanmaps.algebra.parsing import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem

@@ -94,7 +94,7 @@ class ModularMap:
     def orbit(self, count: int) -> list[Point]:
         """Return the first `count` points of an orbit, or all of its points if the orbit has a smaller period.
 
-        If the orbit meets an indeterminacy point, another one is tried. Raises NoPoint if all do.
+        If the orbit meets an indeterminacy point, another orbit is tried. Raises NoPoint if all orbits do.
         """
         longest = 0
         for _ in range(_TRIES):
@@ -199,7 +199,7 @@ class ModularFlow(ModularMap):
     def along_orbit(
         self, degree: int, count: int, support: Sequence[int] | None = None
     ) -> tuple[Sequence[Values], Point, int | None]:
-        """Return Taylor coefficients of monomials along a solution, a row for each order; its start; None."""
+        """Return the Taylor coefficients of monomials along a solution, its initial point, and None (no period)."""
         start = self.random_point()
         return self.series(start, degree, count, support), start, None
 

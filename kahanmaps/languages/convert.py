@@ -51,7 +51,7 @@ def convert(
 
     Args:
         system: the system; its parameters are written as the numbers that the file gives.
-        language: one of `LANGUAGES`.
+        language: one of `LANGUAGES`, such as "pari" or "latex".
         what: a list of `PARTS`; None for the system, the map, and the integrals and density if they are known.
         name: prefix of the names of all functions, so that one session can load two systems; ignored in LaTeX.
         symbols: parameters that stay symbols (not in a [family] file); they are arguments of functions after eps.
@@ -62,8 +62,8 @@ def convert(
         time step is 2 eps, as stated in the initial comment).
 
     Raises:
-        InputError: for an unknown language or part, an invalid name, unknown integrals or density, a closed form
-            ("map-formulas") that is too large, and if SymPy is needed and missing.
+        InputError: for an unknown language or part, an invalid name, integrals or a density that are not known, a
+            closed form ("map-formulas") that is too large, and if SymPy is needed and missing.
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(convert(load("harmonic"), "pari", ["system"]).split("\\n\\n")[1].strip())
@@ -243,9 +243,9 @@ class _Writer:
         points: Mapping[str, Sequence[str]] | None = None,
         eps: bool = True,
     ) -> None:
-        """Write a function; `points` are its points and what their coordinates are called in the body.
+        """Write a function; `points` gives each argument that is a point with the names of its coordinates in the body.
 
-        Without them the function has one point, used as a vector.
+        Without `points` the function has one point, used as a vector.
         """
         numbers = [*(self.eps if eps else []), *self.symbols]
         local = {point: [self.safe[name] for name in names] for point, names in (points or {"point": ()}).items()}

@@ -90,8 +90,8 @@ class Formulas:
     def integrals_by_theorem(self) -> Iterator[tuple[str, str, RationalFunction]]:
         """Yield the integrals of a Hamiltonian system in x and x~: name, formula as text, function.
 
-        x^T M x~/eps with the matrices of a member, else H(x) + grad H(x)^T (x~ - x)/3; in the variables, those of x~
-        (`new`), the symbols and eps.
+        For a member they are x^T M x~/eps with its matrices, otherwise H(x) + grad H(x)^T (x~ - x)/3; they are
+        functions of the variables, those of x~ (`new`), the symbols and eps.
         """
         if self.H is None:
             return

@@ -1,4 +1,4 @@
-"""A map with an algebraic number in its coefficients: a map with a symbol, and the root that stands for it."""
+"""A map with an algebraic number in its coefficients: a map with a symbol, and the root that is its value."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from kahanmaps.maps.implicit import Map, MapFamily
 
 
 class AlgebraicMap(MapFamily):
-    """The map `given`, whose only symbol, if any, has the value `root`; over Q it is one over the number field Q[t]/g.
+    """The map `given` with the value `root` for its only symbol, if any; over Q it is a map over the field Q[t]/g.
 
-    `at_number` gives the map with a rational number for the symbol: for floats, where the root is rounded first.
+    `at_number` returns the map with a rational number for the symbol, for float computations with a rounded root.
 
     >>> from kahanmaps.algebra.roots import parse_root
     >>> from kahanmaps.algebra.parsing import parse_polynomial
@@ -79,7 +79,7 @@ class AlgebraicMap(MapFamily):
 
 
 def over_number_field(map_: MapFamily, root: Root) -> MapFamily:
-    """The map with points over Q[t]/g, t the root. Raises InputError where it has another one in its coefficients."""
+    """The map on points over Q[t]/g, t the root. Raises InputError if another root occurs in its coefficients."""
     if map_.root is None:
         return AlgebraicMap(map_, root, lambda _: map_)
     if map_.root != root:

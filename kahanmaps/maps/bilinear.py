@@ -1,6 +1,6 @@
 """Discretizations given by equations that are linear in the old point and linear in the new one.
 
-Kahan's is among them, and so are its repaired and pseudo-Kahan relatives, with other coefficients or with skew terms
+Among them are Kahan's method and its adjusted and pseudo-Kahan variants, with other coefficients or with skew terms
 like x Y - X y. The inverse map has the equations with the two points exchanged.
 """
 
@@ -19,18 +19,17 @@ TITLE = "bilinear map"
 
 
 def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> ImplicitMap:
-    """The map x -> x~ where n polynomials vanish, each of degree at most 1 in x and at most 1 in x~.
+    """Return the map x -> x~ defined by n polynomial equations, each of degree at most 1 in x and at most 1 in x~.
 
     Args:
         variables: the names of the n coordinates of x.
-        equations: polynomials over Q in the n coordinates of x, the n of x~, symbols if there are any, and eps, in this
-            order.
+        equations: n polynomials over Q in the n coordinates of x, then the n of x~, then symbols (if any), then eps.
 
     Returns:
         The map, exact; its inverse is known.
 
     Raises:
-        InputError: for another number of equations than of variables, and for one that is not linear in each point.
+        InputError: if there are not n equations, or one of them is not linear in each point.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> equation = parse_polynomial("X - x - 2*eps*x*X", ["x", "X", "eps"])

@@ -1,7 +1,7 @@
 """Compositions of maps and of their inverses, evaluated factor by factor.
 
-A composition is not defined where one of its steps is not defined, even if its expanded formulas are. The formulas are
-expanded only for output.
+A composition is not defined at a point where one of its steps is not defined, even if the expanded formulas are defined
+there. Formulas are expanded only for output.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class ComposedMap(MapFamily):
 
     @cached_property
     def has_eps(self) -> bool:
-        """Whether eps occurs in a part."""
+        """Whether eps occurs in a factor."""
         return any(part.map.has_eps for part in self.parts)
 
     @property
@@ -80,7 +80,7 @@ class ComposedMap(MapFamily):
 
     @cached_property
     def time_steps(self) -> int:  # type: ignore[override]  # read only
-        """The sum over the letters if they are one map and its inverse; otherwise 0, as there is no common flow."""
+        """The sum over the factors if they are one map and its inverse; otherwise 0, as there is no common flow."""
         letters = self._letters
         return sum(steps for _, steps in letters) if all(letter == letters[0][0] for letter, _ in letters) else 0
 
@@ -100,7 +100,7 @@ class ComposedMap(MapFamily):
         return sum(part.map.digits for part in self.parts)
 
     def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> Map:
-        """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where a part has no reduction."""
+        """The map over a field, at eps. Raises InputError for eps = 0, BadPrime if a factor has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         if self._last is None or values or self._last[0] is not over or self._last[1] is not element:
             parts = [part.at(element, over, values) for part in self.parts]
@@ -181,16 +181,16 @@ def composed_map(
     """Compose maps: apply one step of each map after the other, all with the same eps.
 
     Args:
-        maps: in the order in which they are applied; with a power, (map, power), which may be negative.
+        maps: the maps in the order in which they are applied, or pairs (map, power) with any integer as power.
         variables: names for the coordinates, by default those of the first map; the others are matched by position.
         symbols: the symbols of the composition, by default all those of the maps; equal names mean the same symbol.
-        values: for each map the values of its symbols as rational functions of these; by default themselves.
+        values: for each map the values of its symbols, rational functions of `symbols`; by default each symbol itself.
 
     Returns:
         The map, exact; its inverse is known if all the maps have one.
 
     Raises:
-        InputError: for maps of different dimensions, or with the same variables in another order, and for a negative
+        InputError: for maps of different dimensions or with the same variables in another order, and for a negative
             power of a map without inverse.
 
     >>> from kahanmaps.maps.kahan import KahanFamily
@@ -271,7 +271,7 @@ def is_involution(map_: MapFamily) -> bool:
 def _formulas(names: Sequence[str], parts: Sequence[MapFactor]) -> list[RationalFunction] | None:
     """The coordinates of the image of (x_1, ..., x_n) as functions of the names, eps last, in lowest terms.
 
-    None where they take too many products of terms.
+    None if this takes too many products of terms.
     """
     field = FunctionField(names, _BUDGET, reduces=True)
     n = parts[0].map.dim

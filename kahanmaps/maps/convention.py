@@ -22,7 +22,7 @@ NO_EPS = "the map does not depend on eps"
 
 
 def either(hint: str = "", **given: Any) -> Any:
-    """Return the argument that is given under one of several names, None where none is. Raises InputError for two."""
+    """Return the argument that is given under one of several names, or None. Raises InputError if two are given."""
     named = {name: value for name, value in given.items() if value is not None}
     if len(named) > 1:
         raise InputError(f"found {' and '.join(named)}, expected one of them{hint}")
@@ -30,7 +30,7 @@ def either(hint: str = "", **given: Any) -> Any:
 
 
 def resolve_eps(eps: Any, time_step: Any, h: Any = None, *, floats: bool = False) -> Any:
-    """Return eps, given as itself or by the time step 2 eps, of which h is short; None where none is given.
+    """Return eps, which is given as `eps` or by the time step 2 eps, as `time_step` or `h`; None if none is given.
 
     With `floats`, for floating-point orbits, a float stands for the decimal number that Python prints: 0.1 for 1/10.
     """

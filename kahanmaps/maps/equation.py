@@ -72,7 +72,7 @@ class Equation:
         ]  # fmt: skip
 
     def image(self, X: Sequence[Any], zero: Any, times: Product = operator.mul) -> list[Any]:
-        """Return the image of (X_1 : ... : X_n : Z) over any ring, perhaps with a common factor: the kernel of L.
+        """Return the image of (X_1 : ... : X_n : Z) over any ring, the kernel of L, perhaps with a common factor.
 
         It is computed by explicit forms if there are short ones, otherwise by the minors of L.
         """
@@ -89,10 +89,10 @@ class Equation:
 
     @cached_property
     def explicit(self) -> Equation | None:
-        """Numerators and common denominator of an explicit map (rows Q_i x~_i = P_i), as the one row of an equation.
+        """Numerators and common denominator of an explicit map (rows Q_i x~_i = P_i), as the only row of an equation.
 
-        They have no common factor. None if the map is not explicit, if they are long, and over fields other than QQ
-        and GF(p).
+        They have no common factor. None if the map is not explicit or they are long, and over fields other than QQ,
+        GF(p).
         """
         if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):
             return None

@@ -25,19 +25,18 @@ def explicit_map(
     image: Sequence[Any] | None = None,
     inverse: Sequence[Any] | Mapping[Any, Any] | None = None,
 ) -> ImplicitMap:
-    """The map x -> (P_1/Q_1, ..., P_n/Q_n).
+    """Return the map x -> (P_1/Q_1, ..., P_n/Q_n) with these rational functions as coordinates of the image.
 
     Args:
-        variables: the names of the n coordinates; or {variable: function}, instead of `image`.
-        image: n rational functions of the variables, then symbols, if there are any, and eps; or texts, or expressions
-            of SymPy.
-        inverse: the same for the inverse map, where it is known. That it is the inverse is not tested here.
+        variables: the names of the n coordinates; or a dict {variable: function}, without `image`.
+        image: n rational functions of the variables, then symbols (if any), then eps; or texts, or SymPy expressions.
+        inverse: the functions of the inverse map, if known; they are not tested here.
 
     Returns:
         The map, exact. Without `inverse` the inverse is computed by elimination on demand, if the map is birational.
 
     Raises:
-        InputError: for another number of functions than of variables, or other names in them.
+        InputError: if there are not n functions, or they contain other names.
 
     >>> explicit_map(["x", "y"], ["y", "(y + 2)/x"])([1, 3]), explicit_map({"x": "y", "y": "(y + 2)/x"})([1, 3])
     ((3, 5), (3, 5))

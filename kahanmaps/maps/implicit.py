@@ -2,17 +2,17 @@
 
 M is a matrix and r a vector of polynomials. For Kahan's method M = I - eps f' and r = (I + eps B) x + 2 eps c; for a
 map given by rational functions M is the diagonal matrix of their denominators; other discretizations that are linear in
-the new point are of this form as they stand. There are three kinds of objects:
+the new point already have this form. There are three kinds of objects:
 
-* `MapFamily` is the map over Q, with eps as a parameter. A new discretization is a function that returns an
+* `MapFamily` is the map over Q, with eps as a parameter. New discretizations are functions that return an
   `ImplicitMap`.
 * `Map` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is a composition of factors
   (usually one), each an `ElementaryMap` with an equation.
 * `Equation` contains the coefficients of M and r over that field (equation.py), from which the evaluators start; the
   generic evaluator, over any field, is in this module.
 
-In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix
-L = (M | -r) of forms of one degree. Where that degree is 1, exchanging the two points gives the inverse map.
+In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix L =
+(M | -r) of forms of one degree. If that degree is 1, exchanging the two points gives the inverse map.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class Map(LatexDisplay):
         return Map([other, self], eps, self.variables)
 
     def __pow__(self, power: int) -> Map:
-        """Return the power of the map: a composition with itself, of the inverse if negative, the identity for 0."""
+        """Return a power of the map: for a negative exponent a power of the inverse, for 0 the identity."""
         power = integer(power, "the power")
         if power:
             return Map([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
@@ -360,7 +360,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The generators of the polynomial ring of its formulas: the variables, the symbols, eps."""
+        """The generators of the ring of its formulas: the variables, then the symbols, then eps."""
         return (*self.variables, *self.symbols, "eps")
 
     @property
@@ -370,7 +370,7 @@ class MapFamily(LatexDisplay, ABC):
 
     @property
     def scales_with_eps(self) -> bool:
-        """Whether eps Phi(x, eps) is known to be a function of eps x, so that eps = 1 stands for every eps."""
+        """Whether eps Phi(x, eps) is known to depend on eps x only, so that eps = 1 represents every eps."""
         return False
 
     @property
@@ -430,7 +430,7 @@ class MapFamily(LatexDisplay, ABC):
         return composed
 
     def __pow__(self, power: int) -> MapFamily:
-        """Return the composition of the map with itself, of its inverse if negative, the identity for 0."""
+        """Return a power of the map: for a negative exponent a power of the inverse, for 0 the identity."""
         power = integer(power, "the power")
         powers = [(self, power)] if power else [(self, 1), (self, -1)]
         composed: MapFamily = import_module("kahanmaps.maps.composed").composed_map(*powers)
@@ -460,7 +460,7 @@ class ImplicitMap(MapFamily):
     The entries are polynomials over Q in the variables, then symbols (if any), then eps. `backward` are the rows of the
     inverse map, if known; otherwise it is computed by exchanging the points if M and r have degree 1 in the variables,
     and by elimination if not. `title` is the kind of map in a word or two. `time_steps` is 1 if a step approximates a
-    flow for the time 2 eps: the flow of `of_field` in the first of the variables, if that is given.
+    flow over the time 2 eps, namely that of the vector field `of_field`, if given, in the first variables; otherwise 0.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")

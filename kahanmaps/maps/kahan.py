@@ -8,7 +8,7 @@ which is linear in x~; explicitly Phi(x, eps) = x + 2 eps (I - eps f'(x))^{-1} f
 Jacobi matrix (I - eps f'(x))^{-1} (I + eps f'(x~)). Source: petrera-suris-2016, eqs. (eq: Kahan gen), (eq: Phi
 gen), (Jac).
 
-As all maps (implicit.py) it is an equation M(x) x~ = r(x), with M = I - eps f' and r = (I + eps B) x + 2 eps c.
+Like every map (implicit.py) it has an equation M(x) x~ = r(x): M = I - eps f' and r = (I + eps B) x + 2 eps c.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class KahanMap(ElementaryMap):
     """The Kahan map Phi(., eps) of a quadratic system over a field (by default the rationals).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
-    It is also substituted for eps in the coefficients of the system, and `values`, elements of the field, for the other
-    symbols. Results are exact over QQ and GF(p), and enclosures over RR(bits). For a system over a field, a
+    It is also substituted for eps in the coefficients of the system; the other symbols take the `values`, elements of
+    the field. Results are exact over QQ and GF(p), and enclosures over RR(bits). For a system over a field, a
     `SystemOver`, eps may be any element.
 
     M and r are computed from the tensor f'', which is faster over most fields than evaluating the equation.

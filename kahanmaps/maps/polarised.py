@@ -27,17 +27,18 @@ MAX_DEGREE = 6
 
 
 def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
-    """The polarised map of x' = f(x), f of degree at most `degree`, with the time step 2 eps.
+    """Return the polarised map of x' = f(x), f of degree at most `degree`, with the time step 2 eps.
 
     Args:
-        rhs: the n components of f, polynomials over Q in the n variables, then symbols, if there are any, and eps.
-        degree: d, from 2 to 6; a field of a lower degree has a map for each d.
+        rhs: the n components of f, polynomials over Q in the n variables, then symbols (if any), then eps.
+        degree: d, from 2 to 6; it may exceed the degree of f.
 
     Returns:
-        The map, exact, and its inverse. Its variables are those of f, at the points x_k, ..., x_{k+d-2}: x, x_1, x_2...
+        The map, exact; its inverse is known. Its variables are those of f at the points x_k, ..., x_{k+d-2}: x, x_1,
+        ...
 
     Raises:
-        InputError: where a degree exceeds d, or d is out of range.
+        InputError: if the degree of f exceeds d, or d is out of range.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> cubic = polarised_map([parse_polynomial("x^3", ["x", "eps"])])

@@ -1,4 +1,4 @@
-"""A map on projective space: (X : Z), x = X/Z, goes to the kernel of the matrix L of its equation.
+"""A map on projective space: the image of (X : Z), x = X/Z, is the kernel of the matrix L of its equation.
 
 The n x (n + 1) matrix L of forms of degree d in (X : Z) (equation.py) has n + 1 signed maximal minors, which are forms
 of degree n d; a common factor may be divided out. The forms of several factors are composed. Source:
@@ -22,8 +22,8 @@ class HomogeneousMap(NamedTuple):
     """The `forms` without common factor that give a map on projective space.
 
     `factor` is the common factor by which the forms of `Equation.image`, composed for several factors of a map, were
-    divided. `denominator` is, up to its sign, det M(x) made homogeneous; for several factors it is the product of
-    theirs. The map is singular everywhere if the last form is zero.
+    divided. `denominator` is, up to its sign, det M(x) made homogeneous; for several factors it is the product of their
+    denominators. The map is singular everywhere if the last form is zero.
     """
 
     forms: list[Any]
@@ -70,7 +70,7 @@ def _of_equation(equation: Equation) -> HomogeneousMap:
 
 
 def _without_common_factor(forms: list[Any]) -> tuple[list[Any], Any]:
-    """The forms divided by their common factor, and that; 1 where it is a number."""
+    """The forms divided by their common factor, and this factor, which is 1 if it is a number."""
     context = forms[0].context()
     common = context.constant(0)
     for form in forms:

@@ -100,7 +100,7 @@ class Terms:
     """
 
     def __init__(self, first: Sequence[Any], numbers: Any, multiples: Terms | None = None, gamma: Any = None) -> None:
-        """Start from t(1), ..., t(4); `multiples` is W, None if this is W. W(1) = 1; primes of W(2) are in the set."""
+        """Start from t(1), ..., t(4). `multiples` is W, None for W itself; W(1) = 1, primes of W(2) are in the set."""
         self._W = self if multiples is None else multiples
         self._numbers, self._gamma = numbers, gamma
         self._terms: dict[int, Any] = {}
@@ -186,9 +186,9 @@ class Terms:
         return self._mixed_quotients[n]
 
     def forget(self, n: int) -> None:
-        """Discard the terms with index below n that terms near 2 n + 8 and later do not need; keep the first ones.
+        """Discard the terms with index below n that are not needed for terms near 2 n + 8 and later, but not the first.
 
-        Products that are needed again later are recomputed, in a fifth of the time that they took before.
+        Products that are needed again are recomputed, which takes a fifth of their first computation.
         """
         while self._order and self._order[0] < n:
             self._terms.pop(self._order.popleft(), None)

@@ -16,7 +16,7 @@ _MATRICES = (fmpq_mat, fmpz_mat)  # columns or rows of coordinates
 
 
 def is_float_value(value: Any) -> bool:
-    """Whether the value is a float, or a number or an array of floats of numpy."""
+    """Whether the value is a float of Python or numpy, or an array of floats."""
     return isinstance(value, float) or getattr(getattr(value, "dtype", None), "kind", "") == "f"
 
 
@@ -133,8 +133,8 @@ def function_value(function: RationalFunction, arguments: Sequence[Any], named: 
         values.append(0)  # it does not matter
     if len(values) != len(rest) or not {*given} <= {*names}:
         hint = ', for example I(x, eps="1/10")' if len(values) == len(rest) - 1 and rest[-1] == "eps" else ""
-        found = ", ".join([f"{len(values)} values", *(f"{name}=" for name in given)])
-        raise InputError(f"found {found}, expected {len(names)}: {', '.join(names)}{hint}")
+        values_given = ", ".join([f"{len(values)} values", *(f"{name}=" for name in given)])
+        raise InputError(f"found {values_given}, expected {len(names)}: {', '.join(names)}{hint}")
     given.update(zip(rest, values, strict=True))
     values = [given[name] for name in names]
     if any(map(is_float_value, values)):

@@ -221,7 +221,7 @@ class Verifier:
             tried = {"claims": len({finding.place["key"] for finding in findings})}
             text = f"{len(findings)} controls of {tried['claims']} claims, all refuted at exact points"
             if without or not findings:
-                text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
+                text = f"no control refutes {', '.join(without)}" if without else "no claim was tested"
             verdict = Certainty.UNDECIDED if without or not findings else Certainty.PROVED
             claimed = "every claim fails on some input that breaks one of its hypotheses"
             findings.append(Finding(claimed, verdict, Evidence("controls", text, tried)))

@@ -1,4 +1,4 @@
-"""Escape times and basins: when and in which direction the orbits of a plane of initial points leave a ball."""
+"""Escape times and basins: the steps at which, and directions in which, orbits of a plane of points leave a ball."""
 
 from __future__ import annotations
 

@@ -188,7 +188,7 @@ def write_title(figure: Figure, text: str, style: Style) -> None:
 
 
 def legend_columns(labels: Sequence[str], style: Style, max_columns: int = 4) -> int:
-    """Return how many columns of these labels fit into the width of the style, at most `max_columns`.
+    """Return the number of columns of these labels that fit into the width of the style, at most `max_columns`.
 
     >>> legend_columns(["RK4", "implicit midpoint"], Style(width=8.6)), legend_columns(["x" * 50] * 2, Style(width=8.6))
     (2, 1)
@@ -210,7 +210,7 @@ def shortened_name(name: str, suffix: str, style: Style) -> str:
 
 
 def letter_count(label: str) -> int:
-    """Return about how many letters a label has when it is typeset: without the commands of mathtext."""
+    """Return the approximate number of letters of a typeset label, without the commands of mathtext."""
     return len(re.sub(r"\\[A-Za-z]+|[${}^_]", "", label))
 
 
@@ -275,8 +275,7 @@ def write_beside(
 def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: bool) -> float | None:
     """Make the vertical axis logarithmic for values from `least` to `largest`; return the height of zeros.
 
-    Exact zeros are drawn in a gray band at the bottom that is marked 0. Without zeros there is no band, and the answer
-    is None.
+    Exact zeros are drawn in a gray band at the bottom that is marked 0. Without zeros there is no band; returns None.
     """
     axes.set_yscale("log")
     low, high = math.log10(least), math.log10(largest)

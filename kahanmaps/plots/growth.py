@@ -1,6 +1,6 @@
-"""How complexity grows, as pictures: degrees of iterates, and heights of exact orbits.
+"""Pictures of the growth of complexity: degrees of iterates, and heights of exact orbits.
 
-Both are results computed before, or read from what `degrees --json` and `heights --json` wrote.
+Both are results of the library, or are read from the output of `degrees --json` and `heights --json`.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ def plot_degrees(
 ) -> Figure:
     """Plot the degrees d_n of the iterates against n, for one or more systems by their names.
 
-    Marks are the measured degrees. A solid line is the recurrence that they satisfy; dots join degrees for which none
-    could be checked, and what the legend says of their growth is estimated. `scale` is "linear", "log" (exponential
-    growth is a straight line) or "loglog" (a power is a straight line, from n = 1 on); by default "log" where some
-    growth is exponential or looks so, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0.
-    Raises InputError for no system or more than 7, and for a scale of another name.
+    Marks are the measured degrees. A solid line is the recurrence that they satisfy; a dotted line joins degrees
+    without a checked recurrence, whose growth in the legend is an estimate. `scale` is "linear", "log" (exponential
+    growth is a straight line) or "loglog" (a power is a straight line, from n = 1 on); by default "log" if some growth
+    is or looks exponential, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0. Raises InputError
+    for no system or more than 7, and for a scale of another name.
 
     >>> from kahanmaps.laboratory.growth.degrees import degree_growth
     >>> from kahanmaps.documents.catalog import load
@@ -117,7 +117,7 @@ def plot_degrees(
 
 
 def _degree_label(growth: DegreeGrowth) -> str:
-    """Return the text after the name in the legend: meaning of d_n, dynamical degree, and a mark for estimates."""
+    """Return the text after the name in the legend: d_n, the dynamical degree or the growth; estimates are marked."""
     name = ""
     if growth.eps is not None:
         name = rf", $\varepsilon = {label_number(growth.eps)}$"
@@ -299,8 +299,8 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
 class HeightCurve:
     """Heights in bits of one orbit at some steps, the kind of growth that was decided, and its numbers.
 
-    `eps` is exact, half the time step; `constant` is c in c n^2 or c n, `ratio` the factor of one step where growth is
-    exponential; `status` is how the orbit ended, in the words of OrbitEnd.
+    `eps` is exact, half the time step; `constant` is c in c n^2 or c n, `ratio` the factor of one step for exponential
+    growth; `status` is how the orbit ended, in the words of OrbitEnd.
     """
 
     eps: fmpq
@@ -314,7 +314,7 @@ class HeightCurve:
 
 
 def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
-    """The orbits of a survey as curves, every height of them.
+    """Return the orbits of a survey as curves with all heights.
 
     >>> from kahanmaps.laboratory.growth.height_survey import height_survey
     >>> from kahanmaps.documents.catalog import load

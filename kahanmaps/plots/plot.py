@@ -135,12 +135,12 @@ class Plot(AttributeHints):
         file = as_file(system)
         value = file.real_approximation.at(resolve_eps(eps, None, floats=True)).eps
         hyperplane = hyperplane_of(file, value, plane)
-        found = section_of(
+        section = section_of(
             ensemble_for(file.map, value, start_rows(x0, file.variables), n), hyperplane, n, direction=direction
         )
-        names = axes or [file.variables[k] for k in found.widest_axes(hyperplane)]
+        names = axes or [file.variables[k] for k in section.widest_axes(hyperplane)]
         functions = [requested_axis(file, value, name) for name in names]
-        return _axes(plot_section(found, functions, curves=curves_on(file, value, hyperplane, functions)))
+        return _axes(plot_section(section, functions, curves=curves_on(file, value, hyperplane, functions)))
 
     def escape(
         self,
@@ -153,7 +153,7 @@ class Plot(AttributeHints):
         cells: int = 300,
         radius: float = 1000,
     ) -> Axes:
-        """Plot when, or in which direction, float orbits leave a ball, as `plot escape` draws it.
+        """Plot the steps at which, or the directions in which, float orbits leave a ball, like `plot escape`.
 
         Args:
             system: a map, or a system, which stands for its Kahan map.
@@ -162,7 +162,7 @@ class Plot(AttributeHints):
             n: the number of steps.
             show: "time", or "basin" for the direction.
             cells: the number of initial points along each axis.
-            radius: outside of the ball, some coordinate is larger than this.
+            radius: a point is outside of the ball if max |x_i| exceeds this number.
         """
         from kahanmaps.plots.escape import plot_escape, survey_escape
 
@@ -175,7 +175,7 @@ class Plot(AttributeHints):
         return _axes(plot_escape(survey, show=show))
 
     def orbit(self, trajectory: Trajectory, x: int = 0, y: int = 1) -> Axes:
-        """The points of what `km.orbit` returned, in two of its coordinates."""
+        """Plot the points of a result of `km.orbit` in two coordinates."""
         _require(trajectory, Trajectory, "an orbit: km.plot.orbit(km.orbit(...))")
         points = np.asarray(trajectory)[:, None]
         return _drawn(
@@ -224,14 +224,14 @@ def plot_orbits(
     n: int | None = None,
     axes: Sequence[int] = (0, 1),
 ) -> Axes:
-    """The float orbits of a map as a portrait in two coordinates: `plot portrait` has all that may be drawn beside.
+    """Draw float orbits of a map in two coordinates. The command `plot portrait` can add flow and level curves.
 
     Args:
-        system: the map.
-        starts, x0: one initial point or many; by default those that `plot portrait` takes, around fixed points.
+        system: a map, or a system, which stands for its Kahan map.
+        starts, x0: one initial point or many; by default sixteen around a fixed point, as for `plot portrait`.
         eps: an exact number, half the time step where there is one.
-        steps, n: of each orbit, by default 1000.
-        axes: the numbers of the two coordinates.
+        steps, n: the number of steps of each orbit, by default 1000.
+        axes: the indices of the two coordinates, counted from 0.
     """
     starts, steps = either(starts=starts, x0=x0), 1000 if (steps := either(steps=steps, n=n)) is None else steps
     real_approximation = as_file(system).real_approximation

@@ -1,4 +1,4 @@
-"""Functions of points in floating point, many points at a time: coordinates, integrals, whatever a picture shows."""
+"""Functions of many points in floating point: coordinates, integrals and other quantities that pictures show."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SHORT = 60  # characters of a formula that fits along an axis
 class PointFunction:
     """A rational function of the variables and eps (in this order), in doubles.
 
-    `name` is what the user calls it, `eps` half the time step (exact), which is inserted.
+    `name` is its name in output; `eps`, half the time step (exact), is inserted.
 
     >>> radius = point_function("x^2 + y^2", ["x", "y"])
     >>> radius(np.array([[3.0, 4.0], [np.nan, 0.0]]))
@@ -37,7 +37,7 @@ class PointFunction:
     eps: fmpq = ZERO
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """The values at points (..., dim): an array (...), NaN at poles and where the value is no finite number."""
+        """The values at points (..., dim) as an array (...), with NaN at poles and for values that are not finite."""
         variable = self.variable
         if variable is not None:
             return np.array(points[..., variable], dtype=np.float64)
@@ -47,7 +47,7 @@ class PointFunction:
         return np.where(np.isfinite(values), values, np.nan)
 
     def at(self, point: Sequence[fmpq]) -> fmpq | None:
-        """The exact value at a rational point, None where it has none."""
+        """The exact value at a rational point, None at a pole."""
         value: fmpq | None = self.function.value(QQ, [*point, self.eps])
         return value
 
@@ -58,7 +58,7 @@ class PointFunction:
 
     @property
     def variable(self) -> int | None:
-        """The index of the variable that this function is; None if it is not a variable."""
+        """The index i if the function is the variable x_i; None for other functions."""
         if not self.function.denominator.is_one():
             return None
         for index, generator in enumerate(self.function.numerator.context().gens()[:-1]):
@@ -68,7 +68,7 @@ class PointFunction:
 
     @property
     def label(self) -> str:
-        """The name for a picture, typeset where it is a short formula."""
+        """The name for a picture, typeset if it is a short formula."""
         if is_name(self.name) or not self.function.denominator.is_one():
             return label_of(self.name)
         formula = latex_polynomial(self.function.numerator)
@@ -89,7 +89,7 @@ def point_function(
     parameters: Mapping[str, fmpq] | None = None,
     named: Mapping[str, RationalFunction] | None = None,
 ) -> PointFunction:
-    """The function that `text` is: one of `named`, or an expression in the variables, eps and the parameters.
+    """Return the function given by `text`: one of `named`, or an expression in the variables, eps and the parameters.
 
     `named` are rational functions of the variables and eps, in this order. Without `eps` (exact, half the time step),
     expressions with eps are refused. Raises InputError for text that cannot be read.

@@ -34,14 +34,14 @@ def plot_rotation(
     """Plot the rotation numbers of map and flow against the position on the segment from one initial point to another.
 
     Args:
-        normal_form: that of the system.
+        normal_form: the normal form of the system.
         eps: half the time step, exact.
         first, last: the ends of the segment, exact.
         points: the number of initial points; singular levels among them are left out.
 
     Solid lines are the rotation numbers of the map, dashed lines those of its second iterate where the map exchanges
     two real components, dotted lines those of the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal
-    lines mark some 1/n. Only real roots of chi have rotation numbers. Raises InputError if no point has one, and for
+    lines mark some 1/n. Only real roots of chi have rotation numbers. Raises InputError if there are none, and for
     fewer than two points.
     """
     if integer(points, "points") < 2:

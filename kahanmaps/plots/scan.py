@@ -46,9 +46,9 @@ def plot_scan(
 ) -> Figure:
     """Draw curves and points of the plane of two parameters, a color for each kind of growth, with their conditions.
 
-    `window` is (low, high) of each parameter; by default it holds most of the points with rational parameters. With
-    `modulo`, one of the primes modulo which all members were tried, the special ones among these, those on no component
-    as well. Raises InputError for a scan over another number of parameters, and another prime.
+    `window` is (low, high) of each parameter; by default it contains most of the points with rational parameters. With
+    `modulo`, a prime modulo which all members were tried, all special members modulo this prime are drawn instead.
+    Raises InputError for a scan over another number of parameters, and for another prime.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.scan.scan import scan
@@ -159,11 +159,10 @@ def _draw(scan: Scan, style: Style, kinds: list[_Kind], window: Window, beside_n
 
 
 def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None:
-    """Write conditions next to their curves and points where there is room: curves first; these labels may cover
-    points.
+    """Write conditions next to their curves, then next to points, if there is room; labels may cover points.
 
-    Among points, those with the fastest growth that is not exponential come first. A label takes the place, of those
-    where it fits, that the fewest curves cross.
+    Points with the fastest growth that is not exponential come first. Of the places where a label fits, it takes the
+    one that the fewest curves cross.
     """
     em = _CONDITION_SIZE * style.font_size
     across, high = (em / (72 * _INNER * inches) for inches in style.inches(_ASPECT))

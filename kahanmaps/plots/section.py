@@ -1,4 +1,4 @@
-"""Poincare sections: where floating-point orbits cross a hyperplane a.x = c, with invariant curves that are known."""
+"""Poincare sections: crossings of floating-point orbits with a hyperplane a.x = c, and level curves of integrals."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Section:
 
 
 def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunction:
-    """Return F - C for a text F=C, or F for F=0; raise InputError unless it is affine in the variables, without eps."""
+    """Return F - C for a text F=C. Raises InputError unless it is affine in the variables and does not contain eps."""
     left, _, right = text.partition("=")
     function = requested_axis(file, eps, left if right.strip() in ("", "0") else f"{left} - ({right})")
     polynomial = function.function.numerator
@@ -71,7 +71,7 @@ def hyperplane_of(file: SystemFile, eps: fmpq | None, text: str) -> PointFunctio
 def curves_on(
     file: SystemFile, eps: fmpq | None, hyperplane: PointFunction, axes: Sequence[PointFunction]
 ) -> list[PointFunction]:
-    """Return those integrals of a file that are, on a hyperplane, functions of the two variables that are the axes."""
+    """Return the integrals of a file that depend, on a hyperplane, only on the two variables along the axes."""
     plane = [axis.variable for axis in axes if axis.variable is not None]
     if len(plane) != 2:
         return []
@@ -100,7 +100,7 @@ def section_of(
     """
     if direction not in (UP, DOWN, BOTH):
         raise InputError(f"found the direction {direction}, expected {UP}, {DOWN} or {BOTH}")
-    found: list[list[FloatArray]] = [[] for _ in range(ensemble.n)]
+    crossings_by_orbit: list[list[FloatArray]] = [[] for _ in range(ensemble.n)]
     skipped, last = 0, np.empty((0, ensemble.n, ensemble.system.dim))
     for portion in ensemble.records(steps, 1, progress=progress):
         points = np.concatenate([last, portion])
@@ -108,17 +108,16 @@ def section_of(
         values = hyperplane(points)
         for k in range(ensemble.n):
             crossings, left_out = crossings_of(points[:, k], values[:, k], direction)
-            found[k].append(crossings)
+            crossings_by_orbit[k].append(crossings)
             skipped += left_out
-    return Section(tuple(np.concatenate(pieces) for pieces in found), skipped)
+    return Section(tuple(np.concatenate(pieces) for pieces in crossings_by_orbit), skipped)
 
 
 def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) -> tuple[FloatArray, int]:
     """Return the interpolated zeros of an affine function along an orbit, and how many were left out.
 
     Args:
-        points: those of the orbit (count, dim).
-        values: those of the function (count,).
+        points: the points of the orbit (count, dim). values: the values of the function (count,).
         direction: "up", "down" or "both".
 
     A zero needs three points on either side.
@@ -139,7 +138,7 @@ def crossings_of(points: FloatArray, values: FloatArray, direction: str = UP) ->
     nearby, heights = points[window], values[window]
 
     def zero(nodes: slice) -> FloatArray:
-        """The crossings by interpolation at these of the six nodes."""
+        """The crossings by interpolation at a subset of the six nodes."""
         places = np.arange(1 - _NODES // 2, _NODES // 2 + 1, dtype=np.float64)[nodes]
         polynomials = np.linalg.inv(np.vander(places, increasing=True))  # coefficients from values
         along = heights[:, nodes] @ polynomials.T
@@ -202,7 +201,7 @@ def plot_section(
         section: the crossings.
         axes: two functions of the point.
         style: sizes.
-        curves: integrals as `restricted_to` returns them, functions of two variables that are the axes; their levels
+        curves: integrals as functions of the variables along the axes, as `restricted_to` returns them; their levels
             through the first crossing of each orbit are drawn.
         window: the part of the plane; None for all crossings.
         equal: whether both axes have the same unit.
@@ -226,8 +225,8 @@ def plot_section(
             levels = levels_through(function, np.concatenate([points[:1] for points in section.crossings]))
             plane = [axis.variable for axis in axes if axis.variable is not None]
             dim = len(function.function.names) - 1
-            found = level_curves(function, plane, dim, levels[:MAX_LEVELS], window)
-            pieces = [piece for level in found for piece in level]
+            curves_by_level = level_curves(function, plane, dim, levels[:MAX_LEVELS], window)
+            pieces = [piece for level in curves_by_level for piece in level]
             if pieces:
                 look: dict[str, Any] = {"colors": "#999999", "linewidths": 0.5, "linestyles": LINES[k % len(LINES)]}
                 drawn.add_collection(LineCollection(pieces, zorder=1, **look), autolim=False)

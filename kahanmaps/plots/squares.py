@@ -351,13 +351,13 @@ def _magnify(axes: Axes, g_last: Floats, f_last: Floats, all_points: Floats, win
 
 
 def _in_two_digits(number: float) -> str:
-    """A positive number for a formula: 6.1, 180, or with a power of ten."""
+    """Format a positive number for a formula: 6.1, 180, or with a power of ten."""
     digits, power = f"{number:.1e}".split("e")
     return f"{float(f'{number:.2g}'):g}" if abs(int(power)) < 4 else rf"{digits}\cdot10^{{{int(power)}}}"
 
 
 def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:
-    """A text beside a point, away from the middle of them all; long ones above or below, moved so as to stay inside.
+    """Write a text beside a point, away from the middle of all points; a long one above or below, shifted inside.
 
     `side` is the alignment of a long name that has another one beside it.
     """

@@ -1,8 +1,8 @@
 """The style of pictures: sizes as a journal states them, colors that color-blind readers can distinguish.
 
-The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up
-to four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown by
-the map cividis, whose lightness grows evenly for all eyes.
+The colors are those of Okabe and Ito, in an order in which neighbours differ in lightness, so that a gray copy of up to
+four curves is readable; beyond color, curves differ in line style and points in their marks. Values are shown in the
+color map cividis, whose lightness grows evenly for all readers.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _MAX_PIXELS = 1 << 28  # a gigabyte while it is drawn
 class Style:
     """The layout of a picture: width and height in centimetres, font size in points, dots per inch of rasterised parts.
 
-    A height of None is left to the kind of picture. Raises InputError for sizes out of the range given with each, and
-    for more than 2^28 dots in the picture.
+    If the height is None, the kind of picture determines it. Raises InputError for sizes out of range, and for more
+    than 2^28 dots in the picture.
 
     >>> Style(width=25.4, font_size=8).inches(aspect=0.5)
     (10.0, 5.0)
@@ -76,7 +76,7 @@ class Style:
 
     @property
     def smallest(self) -> float:
-        """The size of notes and of numbers beside points: two points less, but not below 6, where reading ends."""
+        """The size of notes and of numbers beside points: two points less, but at least the legible size 6."""
         return min(self.font_size, max(6.0, self.font_size - 2))
 
     def settings(self) -> dict[str, Any]:

@@ -41,7 +41,7 @@ _CURVE_STEPS = 300
 class Pictures:
     """Draws the pictures of a page, or omits them unless `requested`.
 
-    `note` is a sentence for the page where matplotlib is missing, else empty.
+    `note` is a sentence for the page if matplotlib is missing, else empty.
     """
 
     def __init__(self, requested: bool = True) -> None:

@@ -16,7 +16,7 @@ from kahanmaps.algebra.printing import format_polynomial
 
 @dataclass(frozen=True, eq=False)
 class PolynomialField:
-    """x' = f(x): `rhs` are polynomials over Q in the variables, as many as these, then in `symbols`.
+    """A system x' = f(x); `rhs` has a polynomial over Q, in the variables and `symbols`, for each variable.
 
     >>> from kahanmaps.algebra.parsing import parse_polynomial
     >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x^3*y", "x")))

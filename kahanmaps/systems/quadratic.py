@@ -74,7 +74,7 @@ class QuadraticSystem(PolynomialField, LatexDisplay):
     def from_text(
         cls, variables: Sequence[str], rhs: Sequence[str], parameters: dict[str, Any] | None = None
     ) -> QuadraticSystem:
-        """Parse right-hand sides; parameters are exact numbers."""
+        """Parse right-hand sides; `parameters` are exact numbers by name."""
         check_names(variables)
         constants = {name: rational(value) for name, value in (parameters or {}).items()}
         return cls(tuple(parse_polynomial(text, variables, constants) for text in rhs))

@@ -23,8 +23,8 @@ _MAX_BITS = 2048
 def solution(system: QuadraticSystem, start: Sequence[Any], time: Any, bits: int = 64) -> list[arb] | None:
     """Return balls that contain the solution x(time) with x(0) = start, of radius at most 2^-bits max |x_i(time)|.
 
-    `start` and `time` are exact numbers; the time may be negative. None if there is no such solution, or it comes so
-    close to a pole that it would take too long. Raises InputError for a point of another dimension.
+    `start` and `time` are exact numbers; the time may be negative. None if there is no such solution, or if it comes
+    too close to a pole. Raises InputError for a point of another dimension.
 
     >>> [ball] = solution(QuadraticSystem.from_text(["x"], ["x^2"]), [1], "1/2")  # x = 1/(1 - t)
     >>> ball.contains(2), bool(ball.rad() < 1e-18)

@@ -133,7 +133,7 @@ def test_equations_and_parameters_are_read_exactly():
 
 def test_what_is_left_out_is_said():
     assert km.parse_system(LORENZ, "lorenz.ode").notes == (
-        "names are in lower case: XPP does not tell upper from lower case",
+        "names are in lower case: XPP does not distinguish upper and lower case",
         "the initial values x = -7.5, y = -3.6, z = 30 are left out: --start gives them, in the order of the variables",
         "left out, being about the integration: aux, @",
     )

@@ -144,15 +144,15 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
     """The level is infinite where the map is not defined, and 0 or delta = 1 as the names of the starts say."""
     _, normal_form, start = side_by_side(name)
     kinds = {
-        "h = 0": "at rest",
-        "the origin": "at rest",
+        "h = 0": "fixed",
+        "the origin": "fixed",
         "delta = 1": "on three lines",
         "level 0": "on a singular level",
         "no value": "on a singular level",
         "a double root": "on a singular level",
         "a triple root": "on a singular level",
     }
-    expected = next((f"the start is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
+    expected = next((f"the initial point is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
     assert special_start(normal_form, fmpq(1, 2), start) == expected
 
 

@@ -61,7 +61,7 @@ def test_the_page_of_an_analysis_has_the_verdict_first_and_every_section(drawn, 
     page = require_sound(drawn)
     titles = [title for level, title in page.headings if level == 2]
     assert titles[:3] == ["Verdict", "The system", "What the catalogue says"]
-    assert titles[-1] == "How to make this page again"
+    assert titles[-1] == "How to reproduce this page"
     assert volterra.conclusion.sentence in page.text
     for name, lines in volterra.sections:
         assert name[0].upper() + name[1:] in titles

@@ -40,7 +40,7 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     """
     file = opt.load_system(options["system"], options)
     eps = opt.eps_of(file, options)
-    found = lib.survey_escape(
+    escape = lib.survey_escape(
         file.real_approximation.map,
         lib.rational(1) if eps is None else eps,
         window_from(options, 2) or ((-2.0, 2.0), (-2.0, 2.0)),
@@ -51,6 +51,6 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
         radius=1000.0 if options["radius"] is None else lib.to_float(options["radius"]),
         progress=lambda step: progress(f"step {step} of {options['steps']}"),
     )
-    inside = int((found.times < 0).sum())
-    messages = [f"{file.label}: {inside} of {found.times.size} orbits stay inside for {options['steps']} steps"]
-    return Drawing(lib.plot_escape(found, options["style"], show=options["show"]), file, messages)
+    inside = int((escape.times < 0).sum())
+    messages = [f"{file.label}: {inside} of {escape.times.size} orbits stay inside for {options['steps']} steps"]
+    return Drawing(lib.plot_escape(escape, options["style"], show=options["show"]), file, messages)

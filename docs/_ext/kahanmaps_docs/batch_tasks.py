@@ -39,5 +39,5 @@ def default(value: Any) -> str:
 
 
 def database_tables() -> str:
-    """The tables, as SQLite is told to make them."""
+    """The tables, as SQL statements that create them."""
     return block(SCHEMA.strip(), "sql")

@@ -1,4 +1,4 @@
-"""The page of the catalogue: every system and map with its equations, what is known of it, and from where."""
+"""The page of the catalogue: every system and map with its equations, what is known about it, with references."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def titles() -> dict[str, tuple[int, str]]:
 
 
 class Catalogue(Mapping[str, "SystemFile"]):
-    """The named systems and maps: a mapping from names to system files, which are read when they are asked for.
+    """The named systems and maps: a mapping from names to system files, each of which is read on first access.
 
     >>> catalogue = Catalogue()
     >>> "lorenz" in catalogue, catalogue["lorenz"].dim
@@ -150,8 +150,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **v
         reference: a name of the catalogue (euler-top stands for euler_top), or a path: a `Path`, or text that ends in
             .toml, contains a path separator or names an existing file. The catalogue takes precedence; write ./name for
             a file with the same name.
-        parameters, values: exact numbers (int, Fraction, text such as "2/3") that replace the default values of the
-            parameters.
+        parameters, values: exact numbers (int, Fraction, text such as "2/3") that replace default values of parameters.
 
     Returns:
         The system file.

@@ -6,8 +6,8 @@ batch reuses the results that it has in common with the old one.
 
 Three rules ensure consistency:
 
-* what is reported as stored is stored: each method that writes is one transaction, and a kill at any moment leaves the
-  state before it or after it;
+* every result reported as stored is on the disk: each method that writes is one transaction, and a kill at any time
+  leaves the state before or after it;
 * there is one writer: opening for writing takes a lock that the operating system releases when the process ends;
 * readers do not block the writer for long: they read in chunks, each fetched completely before its first row is
   yielded; only counts are single queries, which take a second for a million tasks.

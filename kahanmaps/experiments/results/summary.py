@@ -1,6 +1,6 @@
 """Summaries of results: groups of tasks with counts and quantiles of numbers.
 
-Groups are exact: "1/3" is not 0.333. Numbers are summarised as the nearest doubles. Quantiles are order statistics by
+Groups are exact: "1/3" is not 0.333. Numbers are summarized as the nearest doubles. Quantiles are order statistics by
 nearest rank, so that they are values of the data: the p-quantile of n values is the ceil(p n)-th smallest, and the
 median of an even number of values is the lower of the two in the middle.
 """

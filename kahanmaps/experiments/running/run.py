@@ -27,8 +27,7 @@ class Batch:
     """An iterable of lists of records as they arrive: at least ten lists a second, some of them empty.
 
     Since writing waits for the disk, records of short tasks are collected in one list for four times as long as the
-    last list took to be written. A caller that stores each list before the next loses at most one list and the tasks in
-    flight.
+    last list took to be written. A caller that stores each list at once loses at most one list and the tasks in flight.
     """
 
     def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE) -> None:
@@ -103,7 +102,7 @@ def executor_for(
 
     The scheduler is given as "tcp://host:port" or by its scheduler file. Short tasks are run in groups of about
     `group_seconds`. `python` is the interpreter on the workers, if it differs from this one; `on_message` gets messages
-    about what the cluster is waiting for.
+    about waiting for the cluster.
     """
     if scheduler is None:
         return LocalWorkers(jobs, documents, group_seconds=group_seconds)

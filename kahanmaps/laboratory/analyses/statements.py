@@ -27,7 +27,7 @@ MAX_CHARACTERS = 300  # of a sentence with a formula
 
 
 def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
-    """div f, and the fixed points or the first of many."""
+    """Yield div f and the fixed points or, if there are many, the first ones."""
     search = result.fixed_points
     if search is None:
         return
@@ -121,7 +121,7 @@ def of_integrals(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """The names, or the first and the last of many."""
+    """Return the names or, if there are many, the first and the last one."""
     return ", ".join(names) if len(names) <= MAX_NAMES else f"{names[0]}, ..., {names[-1]}"
 
 
@@ -278,7 +278,7 @@ def _hyperplanes(result: AnalysisResult) -> Iterator[Statement]:
 
 
 def of_commuting_systems(result: AnalysisResult) -> Iterator[Statement]:
-    """The systems g whose Kahan maps commute with that of f; -g commutes as g does."""
+    """Yield the systems g whose Kahan maps commute with that of f; g and -g share a statement."""
     if isinstance(result.normal_form, SystemNormalForm) and (m := result.normal_form.form.m) > 1:
         text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
         split = all(factor.degree == 1 for factor in factors_of_chi(result.normal_form.form.A))

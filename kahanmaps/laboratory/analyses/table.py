@@ -62,12 +62,12 @@ def _family_json(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _algebra(context: AnalysisContext, **_: Any) -> TensorStructure | None:
-    """An algebra larger than Q over which f is defined; not for members of the family, whose normal form has more."""
+    """An algebra larger than Q over which f is defined; None for members of the family, whose normal form says more."""
     return None if isinstance(context.result.normal_form, SystemNormalForm) else tensor_structure(context.field)
 
 
 def _singularities(context: AnalysisContext, effort: Budget, progress: Callable[[str], None]) -> list[SingularityRun]:
-    """The singularities at two values of eps or the given one; none where formulas would be too large."""
+    """The singularities at the given eps or at two values of eps; none where formulas would be too large."""
     values = default_eps(context.map, context.seed) if context.result.eps is None else (context.result.eps,)
     if not all(can_be_written(context.map, value, effort.part(1 / len(values))) for value in values):
         return []
@@ -104,7 +104,7 @@ def _curves_json(result: AnalysisResult) -> dict[str, Any]:
 
 
 def _relations(context: AnalysisContext, **_: Any) -> tuple[SparseRelation, ...]:
-    """Hirota-Kimura relations with few terms, of the lowest degrees in which there are any."""
+    """Hirota-Kimura relations with few terms, in the lowest degrees that have any."""
     profile = None if context.result.integrals is None else context.result.integrals.profile
     if profile is None or profile.first_degree is None or profile.period is not None:
         return ()
@@ -126,7 +126,7 @@ def _poisson(context: AnalysisContext, effort: Budget, **options: Any) -> Poisso
 
 
 def _densities(context: AnalysisContext, **options: Any) -> DensitySearch:
-    """A density in closed form, or a product of powers of factors of the integrals; and whether there are others."""
+    """A density in closed form, or a product of powers of factors of the integrals."""
     return with_factors(
         find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
     )

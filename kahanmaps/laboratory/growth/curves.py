@@ -1,8 +1,8 @@
 """The images t -> Phi^n(a + b t) of a random line under a birational map over GF(p), exactly.
 
-The curve is stored as dim + 1 polynomials without a common factor. A map has one or several factors. The image of the
-curve under a factor is the kernel of an n x (n + 1) matrix of forms in its polynomials, the equation of the factor
-(maps/equation.py). The kernel is computed in one of two ways:
+The curve is stored as dim + 1 polynomials without a common factor. A map is a composition of one or several factors.
+The image of the curve under a factor is the kernel of an n x (n + 1) matrix of forms in its polynomials, the equation
+of the factor (maps/equation.py). The kernel is computed in one of two ways:
 
     minors  up to dimension 5: the maximal minors, divided by the gcd of two random combinations of them;
     series  in higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as

@@ -94,7 +94,7 @@ def bound_dynamical_degree(
     effort: int | Budget = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DynamicalDegreeBounds | None:
-    """Search for proved bounds of the dynamical degree of a planar map, the lower one above 1: positive entropy.
+    """Search for proved bounds of the dynamical degree of a planar map, with a lower bound above 1 (positive entropy).
 
     `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), and for all but finitely many eps.
     Each increase of `effort` by 1 doubles the work limit. Returns None for algebraic coefficients, and if no lower
@@ -132,8 +132,8 @@ def bound_dynamical_degree(
 def is_birational(map_: Map, rng: random.Random) -> bool:
     """Return whether a map over GF(p) is birational; True is a proof.
 
-    False is returned also if the inverse is not known. For every factor, the equation of the inverse, at the image
-    of a point, must have this point as a solution, as an identity of forms, and no other; one point shows the latter.
+    Also returns False if the inverse is not known. For every factor, a point must solve the equation of the inverse at
+    its image, which is tested as an identity of forms, and must be the only solution, which is tested at one point.
     """
     for factor in map_.factors:
         try:
@@ -247,8 +247,8 @@ def _degrees_of_formulas(map_: MapFamily, eps: fmpq | None, budget: Budget) -> I
 def round_up(number: arb, offset: int = 0) -> str:
     """Round an exact number up to six decimals, and add `offset` units of the last one.
 
-    With the offset -1 the result is strictly less than the number: that the dynamical degree is strictly more than it
-    holds for all but finitely many eps.
+    With the offset -1 the result is strictly less than the number; then the dynamical degree is strictly larger than
+    the result for all but finitely many eps.
     """
     units = int((number.fmpq() * 10**_DIGITS).ceil()) + offset
     text = f"{units // 10**_DIGITS}.{units % 10**_DIGITS:0{_DIGITS}d}"

@@ -69,9 +69,9 @@ class DegreeGrowth(PrintableResult):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and their growth.
 
     `eps` is None for generic eps (a random residue for each line). `patterns` are the singularity patterns, None if
-    they were not computed. Degrees and patterns are measured: evidence, and no proof. `enclosure` has proved bounds of
-    the dynamical degree of a planar map, the lower one above 1, or None. `proof` is a proof of the growth, or None. The
-    degrees of monomial maps are exact, and need no primes.
+    they were not computed. Degrees and patterns are measured, which is evidence and no proof. `enclosure` has proved
+    bounds of the dynamical degree of a planar map, if a lower bound above 1 was found, else None. `proof` is a proof of
+    the growth, or None. The degrees of monomial maps are exact, and need no primes.
     """
 
     _parts = "degrees"
@@ -135,7 +135,7 @@ class DegreeGrowth(PrintableResult):
     def recurrence(self) -> Recurrence | None:
         """The linear recurrence of the degrees: the derived one, or else the fitted one if it is confirmed.
 
-        None if there is neither: a fitted one is confirmed by terms beyond the last confinement.
+        A fitted recurrence is confirmed by terms beyond the last confinement. None if there is neither.
         """
         if self.proof is None or self.derived is not None:
             return self.derived or (None if self.unconfirmed else self.fitted)
@@ -150,7 +150,7 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def growth(self) -> Growth:
-        """The kind of growth: by a proof, by the recurrence, or by the bounds of the dynamical degree; else unknown."""
+        """The kind of growth, by a proof, by the recurrence, or by the bounds of the dynamical degree; else unknown."""
         if self.proof is not None:
             return self.proof.growth
         if self.ended == Ended.CONSTANT:
@@ -161,15 +161,14 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def dynamical_degree(self) -> GrowthRate | None:
-        """lim d_n^(1/n) as an algebraic number, by a proof or by the recurrence, else None."""
+        """The limit of d_n^(1/n) as an algebraic number, known by a proof or by the recurrence; else None."""
         if self.proof is not None:
             return self.proof.rate
         return None if self.recurrence is None else self.recurrence.rate
 
     @property
     def estimate(self) -> str | None:
-        """An estimate of the dynamical degree, rounded: the last quotient d_n/d_{n-1} where these hardly change, else
-        d_n^(1/n) for the last n, an upper bound."""
+        """A rounded estimate of the dynamical degree: d_n/d_{n-1} if this quotient settles, else d_n^(1/n)."""
         if len(self.degrees) < 3 or self.degrees[-1] == 0:
             return None
         n = len(self.degrees) - 1
@@ -179,8 +178,8 @@ class DegreeGrowth(PrintableResult):
     def looks_exponential(self) -> bool:
         """Whether the last quotients d_n/d_{n-1} change by far less than those of a sequence of polynomial growth.
 
-        There a quotient 1 + r falls by about r/n from one step to the next; here by less than a quarter of that, over
-        two steps. An estimate, for sequences that end before a recurrence could be checked.
+        For polynomial growth a quotient 1 + r decreases by about r/n in the next step; the answer is True if the last
+        two decreases are less than a quarter of that. It is an estimate, for sequences too short for a recurrence.
         """
         d = self.degrees
         n = len(d) - 1
@@ -216,14 +215,14 @@ class DegreeGrowth(PrintableResult):
 
     @property
     def basis(self) -> str:
-        """How the growth is known: with the proof, or with the number of steps searched for confinement."""
+        """The evidence for the growth in words: the proof, or the number of steps searched for confinement."""
         if self.proof is not None:
             return f"{self.known}: {self.proof.reason}"
         return f"{self.known}: {self.patterns.limit}" if self.patterns and self.patterns.limit else str(self.known)
 
     @property
     def known(self) -> Certainty:
-        """How the growth is known; the bounds in `enclosure` are proved in any case."""
+        """The certainty of the growth; the bounds in `enclosure` are proved in any case."""
         if self.proof is not None:
             return Certainty.PROVED
         if self.derived is not None:
@@ -291,17 +290,30 @@ def degree_growth(
     enclosed: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DegreeGrowth:
-    """Measure the degrees of the iterates of a map, for one exact `eps` (or `time_step` = 2 eps), or for generic eps.
+    """Measure the degrees of the iterates of a map, for one exact eps or for generic eps.
 
     The search stops when a recurrence is confirmed by at least 6 terms and by as many as its order, and either it is
-    derived from the singularity patterns or there are enough terms beyond the last confinement; with `max_terms` it
-    stops after d_1, ..., d_max_terms instead. It stops in any case when the budget is spent, which doubles with each
-    increase of `effort` by 1, or before a degree above `max_degree`. A TimeLimit ends it with the degrees measured so
-    far; if `effort` is a Budget, the TimeLimit is raised to the caller. `patterns` are the singularity patterns; by
-    default they are computed here, for `steps` steps. Unless `enclosed` is false, exponential growth in the plane is
-    proved. The computation is modulo random primes of 61 bits, so that degrees are measured and not proved, except for
-    the bounds of the dynamical degree of planar maps. The same `seed` gives the same result. Raises InputError for
-    wrong values.
+    derived from the singularity patterns or there are enough terms beyond the last confinement.
+
+    Args:
+        system: a map, or a system, which stands for its Kahan map.
+        eps: half the time step, an exact number; None for generic eps.
+        time_step, h: the time step 2 eps, instead of eps.
+        effort: each increase by 1 doubles the work limit. A Budget means that this is a stage of another computation.
+        max_terms: if given, the degrees d_1, ..., d_max_terms are measured instead.
+        max_degree: the search stops before a degree above this one.
+        seed: the random seed.
+        steps: the number of steps for which singularities are followed.
+        patterns: the singularity patterns, if known; by default they are computed.
+        enclosed: whether exponential growth in the plane is to be proved.
+        progress: called with a message at each stage.
+
+    Returns:
+        A `DegreeGrowth`, measured modulo random primes of 61 bits; only bounds of the dynamical degree of planar maps
+        are proved. A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised.
+
+    Raises:
+        InputError: for eps = 0, and for other values out of range.
 
     Source: bellon-viallet-1999.
 
@@ -336,8 +348,7 @@ def dynamical_degree(
 ) -> GrowthRate | DynamicalDegreeBounds | None:
     """Return the dynamical degree lim d_n^(1/n) of a map, with the arguments of `degree_growth`.
 
-    It is an algebraic number, or proved bounds, or None if it is undecided; `degree_growth(system).known` says how it
-    is known.
+    Returns an algebraic number, proved bounds, or None if undecided; `degree_growth(system).known` is its certainty.
 
     >>> dynamical_degree("euler_top")
     <GrowthRate: 1>
@@ -376,7 +387,7 @@ class _Search:
     measured: DegreeGrowth | None = None  # all but the bounds of the dynamical degree
 
     def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
-        """Measure degree after degree until a reason to stop."""
+        """Measure degree after degree until there is a reason to stop."""
         matrix = exponent_matrix(self.map, self.eps)
         if matrix is not None and (proof := monomial_growth(matrix)) is not None:
             period_proof = monomial_period(self.map, self.eps, matrix) if proof.growth is Growth.BOUNDED else None
@@ -478,7 +489,7 @@ class _Search:
             )
 
     def _compute_patterns(self) -> None:
-        """Compute the singularity patterns, once, and unless the map is affine."""
+        """Compute the singularity patterns at the first call, unless the map is affine."""
         if self.map.root is None and self.patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
             options: dict[str, Any] = {"steps": self.steps, "seed": self.seed, "effort": self.budget.part(0.7)}
             self.patterns = patterns_of_map(self.map, self.eps, **options)

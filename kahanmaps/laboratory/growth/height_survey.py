@@ -64,8 +64,8 @@ class SurveyedOrbit:
 class HeightSurvey(PrintableResult):
     """The orbits of the survey, in the order of eps and then of initial points.
 
-    `is_complete` is False if the budget or a TimeLimit ended the survey. If the map has no eps, that of the orbits has
-    no meaning. `heights.height` defines heights over number fields.
+    `is_complete` is False if the budget or a TimeLimit ended the survey. If the map has no eps, the `eps` of the orbits
+    has no meaning. `heights.height` defines heights over number fields.
     """
 
     _parts = "orbits"
@@ -139,8 +139,7 @@ def height_survey(
         system: a map, or a system, which stands for its Kahan map.
         eps: half the time step (exact), or None for 1/10 and 3/11.
         time_step, h: the time step 2 eps, instead of eps.
-        starts: the initial points, or how many random ones; a random one whose orbit meets a singular point is
-            replaced by another.
+        starts: the initial points, or the number of random ones, whose orbits do not meet a singular point.
         steps: the length of the orbits.
         max_digits: orbits end at a number with more digits; None for no limit.
         effort: each increase by 1 doubles the work limit, at which the current orbit ends and no other is started.
@@ -149,11 +148,11 @@ def height_survey(
         progress: called with a message before each orbit.
 
     Returns:
-        The survey. After a TimeLimit it has the orbits completed before, unless `effort` is a Budget: then the survey
-        is a stage of another computation, and the TimeLimit is raised.
+        The survey. If a TimeLimit expires, it has the orbits completed before. If `effort` is a Budget, the survey is a
+        stage of another computation, and the TimeLimit is raised.
 
     Raises:
-        InputError: for wrong values.
+        InputError: for eps = 0, no or too many initial points, and points of another dimension.
 
     >>> from kahanmaps.documents.catalog import load
     >>> survey = height_survey(load("weierstrass").system, starts=2, steps=40)

@@ -1,8 +1,8 @@
 """Growth of degrees that is proved: of monomial maps, and of maps some iterate of which is linear.
 
 A monomial map x~_i = c_i x^(a_i) has the exponent matrix A of its rows a_i, and its n-th iterate has A^n: degrees are
-those of matrices, and the dynamical degree is the spectral radius of A (hasselblatt-propp-2007). Where the iterate N
-has degree 1 on projective space, which is decided by composing formulas, d_(n + N) = d_n for all n.
+those of matrices, and the dynamical degree is the spectral radius of A (hasselblatt-propp-2007). If the N-th iterate
+has degree 1 on projective space, which is decided by composing formulas, then d_(n + N) = d_n for all n.
 """
 
 from __future__ import annotations
@@ -36,9 +36,8 @@ _LARGEST_ORDER = 60  # of a matrix of integers with at most _MAX_DIMENSION rows
 class GrowthProof:
     """A proved statement about the degrees of all iterates.
 
-    `growth` with its `power` (k for n^k, times an exponential where the `rate` is more than 1), `rate` the dynamical
-    degree, and `reason` the proof in a phrase. With `period` N the iterate N is linear; `is_identity`: it is the
-    identity.
+    `power` is k for growth as n^k, times an exponential if the `rate`, the dynamical degree, is more than 1; `reason`
+    is the proof in a phrase. With `period` N the N-th iterate is linear; `is_identity` says whether it is the identity.
     """
 
     growth: Growth
@@ -107,7 +106,7 @@ def monomial_degree(matrix: fmpz_mat) -> int:
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
     """Return how the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
 
-    They are those of the entries of A^n up to a factor between two constants.
+    The quotient of the degree by the largest modulus of the entries of A^n lies between two positive constants.
     """
     if matrix.nrows() > _MAX_DIMENSION:
         return None
@@ -123,7 +122,8 @@ def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
 def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> GrowthProof | None:
     """Prove that a monomial map with this exponent matrix is periodic; return None if it is not, or is the identity.
 
-    If A^n = 1, the iterate n multiplies each variable by a number or a function of eps. Its order is then 1 or 2.
+    If A^n = 1, the n-th iterate multiplies each variable by a number or a function of eps. The map is then periodic
+    only if this iterate has order 1 or 2.
     """
     one = matrix**0
     order = next((n for n in range(1, _LARGEST_ORDER + 1) if matrix**n == one), None)
@@ -134,9 +134,9 @@ def monomial_period(map_: MapFamily, eps: fmpq | None, matrix: fmpz_mat) -> Grow
 
 
 def spectral_radius(matrix: fmpz_mat) -> GrowthRate:
-    """The largest modulus of an eigenvalue, exactly; its multiplicity is the size of the largest Jordan block of one.
+    """Return the largest modulus of an eigenvalue, exactly, with the size of the largest Jordan block as multiplicity.
 
-    The determinant is not 0.
+    The matrix must be invertible; only Jordan blocks of eigenvalues with this modulus count.
 
     >>> spectral_radius(fmpz_mat([[2, 1], [1, 1]])).text
     '2.61803398874989484820, root of t^2 - 3*t + 1'

@@ -95,7 +95,7 @@ class Recurrence(ResultPart):
 
     @property
     def terms(self) -> int:
-        """The number of terms that it was found from or checked on."""
+        """The number of terms from which the recurrence was computed or on which it was checked."""
         return len(self.values) if self.measured is None else self.measured
 
     @property
@@ -165,9 +165,8 @@ class Recurrence(ResultPart):
 
     @cached_property
     def closed_form(self) -> str | None:
-        """a_n as a polynomial in n, one for each class of n modulo the period; None for exponential growth.
-
-        It holds from n = `preperiod` on. None also if there are more than 12 classes.
+        """The polynomials in n that give a_n, one for each class of n modulo the period; None for exponential growth.
+        They hold from n = `preperiod` on. None also if there are more than 12 classes.
         """
         if not self.is_polynomial or not self.factors:
             return "0" if not self.factors else None
@@ -252,9 +251,9 @@ class Recurrence(ResultPart):
 def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     """Return the shortest linear recurrence over Q of an integer sequence a_0, a_1, ..., or None.
 
-    A recurrence of order k is accepted if it holds for all terms, and these are more than the 2k terms that determine
-    it by at least 2 and at least k/3. The first terms may be exempt (`preperiod`); they count in the order.
-    Raises InputError if a value is not an integer.
+    The first 2k terms determine a recurrence of order k. It is accepted if it holds for all terms, with at least 2 and
+    at least k/3 terms beyond these. The first terms may be exempt (`preperiod`); they count in the order. Raises
+    InputError if a value is not an integer.
 
     >>> find_recurrence([1, 6, 36, 216, 1296]).rate.text
     '6'
@@ -281,5 +280,5 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
 
 
 def needed_checks(order: int) -> int:
-    """Return how many terms beyond those that determine it a recurrence of this order needs to be accepted."""
+    """Return how many terms must confirm a recurrence of this order, beyond those that determine it."""
     return max(2, -(-order // 3))

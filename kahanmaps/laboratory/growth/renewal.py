@@ -7,9 +7,9 @@ multiplicity of C_j there. A generic line meets the strict preimage of C_i by th
     d_(k+1) = d d_k - sum over i, l <= k of mu_i(k+1-l) s_i(l)
     s_i(k)  = deg(C_i) d_k - sum over j, l < k of nu_ji(k-l) s_j(l)
 
-with d_0 = 1: what is divided out is a product of powers of the forms of these preimages, and the zeros of C_i along
-the image of the line are such preimages too. Summed up as power series in z this is a linear system over Q(z).
-docs/mathematics.md proves it. Multiplicities along hypersurfaces are measured, all else follows exactly.
+with d_0 = 1. For the factors that are divided out are powers of the forms of these preimages, and the zeros of C_i
+along the image of the line lie in such preimages, too. Summed up as power series in z this is a linear system over
+Q(z). docs/mathematics.md proves it. Multiplicities along hypersurfaces are measured, all else follows exactly.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def degree_series(
         hypersurfaces: for each exceptional hypersurface its degree and its orbit data, which must be settled; the
             columns nu are in the same order. Multiplicities that are not known must not be `needed`.
         stages: for a word, the index (from 0) of the map that contracts each hypersurface. The series then has the
-            degrees after complete words only, with z for a single map.
+            degrees after complete words only, and the exponent of z counts single maps.
 
     Source: docs/mathematics.md.
 
@@ -98,8 +98,8 @@ def degree_series(
 def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
     """The hypersurfaces whose preimages have to be counted for the degrees; None if their multiplicities are unknown.
 
-    These are the hypersurfaces that lower the degree, and those with images in one of these, and so on. Unknown
-    multiplicities, in hypersurfaces `eventually_in` which images lie, matter only where these are needed.
+    These are the hypersurfaces that lower the degree, those with images in one of these, and so on. An unknown
+    multiplicity, in a hypersurface of `eventually_in`, matters only if that hypersurface is needed.
 
     >>> attracted = OrbitData(((0, 2),), (), 9, True, eventually_in=(0,))
     >>> lowering = OrbitData(((1, 0),), (), 9, True)
@@ -123,8 +123,8 @@ def needed(patterns: Sequence[OrbitData]) -> list[int] | None:
 def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
     """The generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of a fraction.
 
-    Exact. The roots of its denominator are the n-th powers of the given ones, so that its degree does not grow. Raises
-    ArithmeticError if its coefficients have more than 520 bits.
+    Exact. The roots of the new denominator are the n-th powers of the roots of the given one, so that its degree does
+    not grow. Raises ArithmeticError if its coefficients have more than 520 bits.
 
     >>> every_nth((fmpz_poly([1]), fmpz_poly([1, -1, -1])), 3)
     ((-1)*x + 1, (-1)*x^2 + (-4)*x + 1)
@@ -166,7 +166,7 @@ def coefficients(series: Fraction, count: int) -> list[int]:
 
 
 def _through_returns(patterns: Sequence[OrbitData], start: int, column: int) -> Fraction:
-    """The generating function of a column for a hypersurface, continued through those that it is mapped onto."""
+    """The generating function of a column of orbit data, continued through hypersurfaces that are images of `start`."""
     z = fmpz_poly([0, 1])
     k, shift, numerator = start, 0, fmpz_poly([])
     visited: dict[int, tuple[int, fmpz_poly]] = {}

@@ -1,4 +1,4 @@
-"""The search for invariant volume forms dx/phi of a map, where phi is a polynomial or a product of powers of some.
+"""The search for invariant volume forms dx/phi of a map, with phi a polynomial or a product of powers of polynomials.
 
 dx/phi is invariant if phi(x~) = det dPhi(x) phi(x): phi is a discrete Darboux polynomial with the cofactor det dPhi.
 All polynomials phi up to a degree form one null space modulo a prime. Products of powers of known polynomials, of any
@@ -75,11 +75,11 @@ class FoundDensity(FoundFunction):
 class DensitySearch(Search):
     """The result of `find_densities`.
 
-    `densities` is a basis of all phi of the least degree that has any. There are two exceptions: if none of these is
-    proved, a proved phi of another degree comes first, where there is one; for a Hamiltonian system the list is
+    `densities` is a basis of all phi of the least degree in which any exist. There are two exceptions: if none of these
+    is proved, a proved phi of another degree, if there is one, precedes them; for a Hamiltonian system the list is
     det(I - eps f') alone, whose degree need not be the least. `degree` is the largest degree that was tried; `cut` says
-    why the search stopped before the requested degree, empty where it did not. `period` is the period of the map, if
-    orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
+    why the search stopped before the requested degree, and is empty if it did not. `period` is the period of the map,
+    if orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
     |dx/phi| is invariant.
     """
 
@@ -98,7 +98,7 @@ class DensitySearch(Search):
 
     @property
     def may_use_integrals(self) -> bool:
-        """Whether the search found nothing for a map, so that factors of its integrals are to be tried."""
+        """Whether factors of the integrals are to be tried, since the search on a map (not a flow) found nothing."""
         return not (self.densities or self.anti_invariant or self.flow)
 
     @property
@@ -111,7 +111,7 @@ class DensitySearch(Search):
 
     @property
     def shown(self) -> tuple[FoundDensity, ...]:
-        """The density to print, the shortest, proved if any is; all others are this one times integrals."""
+        """The density to print: the shortest proved one or else the shortest; the others are multiples by integrals."""
         return tuple(sorted(self.densities, key=lambda phi: (phi.verdict is not Certainty.PROVED, len(phi.text)))[:1])
 
     @property
@@ -185,7 +185,7 @@ def find_densities(
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
-        on_result: called with the densities so far before further ones are tried, for searches that may be interrupted.
+        on_result: called with the densities so far at each stage, for searches that may be interrupted.
 
     Returns:
         A `DensitySearch`; formulas are exact, proved or supported. That there is none up to a degree is measured.

@@ -3,7 +3,7 @@
 For a set of polynomials phi_1, ..., phi_M the null space K(x) of an orbit consists of the c with sum c_j phi_j = 0 at
 every point of the orbit. Its reduced echelon basis depends on the orbit only, so that every coefficient that is not the
 same number for all orbits is an integral of the map. The codimension of the variety of the orbit, which is the number
-of independent integrals that such relations show, is the rank of the gradients of the relations at a point of it.
+of independent integrals that such relations show, is the rank of their gradients at a point of the orbit.
 
 All this is measured: modulo two primes, for two eps and several orbits; it proves nothing.
 
@@ -65,10 +65,10 @@ class OrbitRelations:
     """The polynomials up to a degree that vanish along one orbit: a space of this `dimension`.
 
     On the orbit, `independent` monomials are linearly independent. `form` is the reduced echelon form of the values of
-    the monomials in `exponents_up_to`; if multiples of leading monomials were left out, of the other ones, whose
-    relations imply the rest. `leading` are the monomials that depend linearly on those before them: all their multiples
-    do so too. `normals` is a basis of the span of the gradients at `point`; `period` is the number of points if the
-    orbit closed, otherwise None.
+    the monomials in `exponents_up_to`. If multiples of leading monomials were left out, it has only the other
+    monomials, whose relations imply the rest. `leading` are the monomials that depend linearly on earlier ones; all
+    their multiples have the same property. `normals` is a basis of the span of the gradients at `point`; `period` is
+    the number of points if the orbit closed, otherwise None.
     """
 
     form: nmod_mat
@@ -94,10 +94,9 @@ class OrbitRelations:
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimension` is the codimension of the variety of the orbit as far as these polynomials show it, `with_known` the
-    same together with integrals that were known before. `period` is the number of points of orbits that close, else
-    None. `agree`: all maps gave the same numbers. `complete`: all requested degrees were tried; otherwise `cut` says
-    why not.
+    `codimensions` are those of the varieties that these polynomials define; `with_known` counts known integrals, too.
+    `period` is the number of points of orbits that close, else None. `agree`: all maps gave the same numbers.
+    `complete`: all requested degrees were tried; otherwise `cut` says why not.
     """
 
     dim: int
@@ -205,14 +204,13 @@ def orbit_profile(
     Args:
         maps: the maps, with different primes and, if eps is not given, different eps.
         max_degree: the last degree; by default it depends on the dimension and on the number of monomials.
-        budget: no degree is begun once it is spent; None means no limit.
+        budget: no further degree is tried after the budget is spent; None means no limit.
         known_gradients: returns the gradients of known integrals at a point.
         progress: called with the degree that is tried.
 
     Returns:
         The `Profile`, measured. The search ends when the codimension is dim - 1, so that orbits lie on curves (dim if
-        orbits close), or at `max_degree`. It ends earlier, and is not complete, if there are too many monomials or the
-        budget is spent.
+        orbits close), or at `max_degree`. It ends early, and is not complete, for too many monomials or a spent budget.
 
     Raises:
         NoPoint: where orbits meet the singular set.
@@ -270,8 +268,7 @@ class Basis:
     """A Hirota-Kimura basis: the set of functions, and the null space of a generic orbit.
 
     `constant` says for each entry of the reduced echelon basis whether it is the same number for all orbits; the other
-    entries are integrals. `agree`: all orbits gave the same dimension. `period` is the number of points of orbits that
-    close, else None.
+    entries are integrals. `agree`: all orbits gave the same dimension. `period` is that of closed orbits, else None.
     """
 
     functions: tuple[str, ...]
@@ -356,7 +353,7 @@ class SparseRelation:
 
     `terms` are pairs of a monomial and its coefficient. A coefficient is the text of a number, perhaps with a power of
     eps, or a name such as "c3" for an integral and "e1" for a function of eps; `integrals` and `functions_of_eps` list
-    these names.
+    them.
     """
 
     terms: tuple[tuple[str, str], ...]

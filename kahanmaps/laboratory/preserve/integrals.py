@@ -161,7 +161,7 @@ class IntegralSearch(Search):
 
     @property
     def codimension(self) -> int:
-        """The number of independent integrals that orbits show, theorems give or formulas prove: the largest."""
+        """The largest of the numbers of independent integrals that orbits show, theorems give or formulas prove."""
         return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.formula_count)
 
     @property
@@ -183,8 +183,7 @@ class IntegralSearch(Search):
     def is_exact(self) -> bool:
         """Whether there can be no more than `codimension` integrals; otherwise it is a lower bound.
 
-        Relations of higher degrees could show more integrals, unless orbits already lie on curves (or, for a periodic
-        map, on points).
+        Relations of higher degrees could show more integrals, unless orbits lie on curves (on points, if they close).
         """
         dim, measured = self.profile.dim, bool(self.profile.nullities)
         closes = self.profile.period is not None or self.period_at_values is not None
@@ -209,7 +208,7 @@ class IntegralSearch(Search):
 
     @property
     def is_complete(self) -> bool:
-        """Whether there is a closed form for every integral that is known."""
+        """Whether there are as many closed forms as independent integrals are known to exist."""
         return self.formula_count >= self.codimension
 
     def rows(self) -> list[dict[str, str]]:
@@ -508,7 +507,7 @@ class _Collected:
 
     @property
     def _has_limit(self) -> bool:
-        """Whether the limit eps -> 0 makes sense: the map approximates a flow for every eps, or it is the flow."""
+        """Whether the limit eps -> 0 makes sense: for maps that approximate a flow for every eps, and for flows."""
         laboratory = self._laboratory
         of_flow = laboratory.flow or (laboratory.map.has_eps and laboratory.map.time_steps != 0)
         return of_flow and laboratory.eps is None and laboratory.root is None

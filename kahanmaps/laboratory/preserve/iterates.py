@@ -77,7 +77,7 @@ class RatioOfIterates:
 
     @property
     def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:
-        """The ratio, and the definitions of the letters F0, F1, ... in it: of rank 2 these abbreviate the functions."""
+        """The ratio and, for rank 2, the definitions of the letters F0, F1, ... that abbreviate functions in it."""
         if self.two_point_basis.rank == 1:
             return RationalFunction(self.functions[self.numerator[0]], self.functions[self.denominator[0]]), []
         taken = self.functions[0].context().names()
@@ -153,8 +153,7 @@ def verdict_on_ratio(
 ) -> tuple[Certainty, Evidence]:
     """Decide whether I has the same value one step later, as an identity for the map of the laboratory.
 
-    `too_long` collects the lengths of orbit segments that cannot be expanded; expansion is not tried again for these
-    lengths and longer ones.
+    `too_long` collects the lengths of orbit segments that are too long to be expanded; longer ones are not tried.
     """
     map_, eps = laboratory.map, laboratory.eps
     n, too_long = map_.dim, too_long if too_long is not None else set[int]()
@@ -201,7 +200,7 @@ def integrals_in_iterates(
         laboratory: the map.
         required: the number of independent integrals at which the search stops, known ones included.
         independent: the known integrals, on the first map of the laboratory.
-        budget: no further basis is tried once it is spent.
+        budget: no further basis is tried after the budget is spent.
         progress: called with the basis that is tried.
 
     Returns:

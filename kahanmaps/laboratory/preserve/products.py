@@ -364,7 +364,7 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     reconstructed = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
 
     def with_constant(allowed: list[RationalFunction]) -> list[list[int]]:
-        """Return a basis of the vectors whose constant is 1 or a product of powers of the allowed ones."""
+        """Return a basis of the vectors whose constant is 1 or a product of powers of the allowed constants."""
         combinations = multiplicative_relations([*(c for _, c in reconstructed), *allowed])
         chosen = [
             _combined(a[: len(reconstructed)], [v for v, _ in reconstructed])
@@ -389,8 +389,7 @@ def _assembled(
 ) -> Products:
     """Build the result from exponent vectors.
 
-    `constant_one` are those with constant 1, `of_densities` those allowed for a density by its constant (1 first, then
-    -1).
+    `constant_one` are the vectors with constant 1; `of_densities` are those for a density with the constant 1 or -1.
     """
     degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = []
@@ -403,7 +402,7 @@ def _assembled(
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
     def cost(vector: Sequence[int]) -> tuple[int, int, int]:
-        """Prefer a denominator of low degree, then a numerator of low degree."""
+        """The sort key of a vector: the degree of the denominator, then that of the numerator."""
         denominator, numerator = (
             sum(sign * k * d for k, d in zip(vector, degrees, strict=True) if sign * k > 0) for sign in (-1, 1)
         )

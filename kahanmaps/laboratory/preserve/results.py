@@ -32,8 +32,7 @@ class FoundFunction(LatexDisplay, ResultPart):
 class Search(PrintableResult):
     """The request of a search: the system file, the symbols that formulas contain, and eps (None: a symbol as well).
 
-    With `flow` the search concerns the differential equation, not its map. Random points are points modulo the
-    `primes`.
+    With `flow` the search concerns the differential equation, not its map. Random points are taken modulo the `primes`.
     """
 
     file: SystemFile
@@ -53,7 +52,7 @@ class Search(PrintableResult):
 
     @property
     def of_flow(self) -> dict[str, Any]:
-        """The first key of the JSON record where the search concerns the flow; empty otherwise."""
+        """The first entry of the JSON record if the search concerns the flow; empty otherwise."""
         return {"flow": True} if self.flow else {}
 
     @property

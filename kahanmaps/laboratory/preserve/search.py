@@ -2,16 +2,14 @@
 
 A search runs on one map: modulo a prime, at one eps, at one value of each symbol. It records the steps that gave a
 space: affine integrals, the relations of a degree, a product of cofactors. Repeating the steps on maps with other
-primes, eps and values of the symbols gives the coefficients of the same polynomials there, from which closed forms are
-interpolated.
+primes, eps and values of the symbols gives the coefficients of the same polynomials there, to be interpolated.
 
 Interpolation needs the same space on every map, but two spaces may have bases with the same zero pattern: then a single
 map, modulo one prime and at one value of the symbols, does not determine which space is which. Take a coefficient w in
 which they differ. Its values w_1, ..., w_k on the k spaces are the roots of chi(T) = (T - w_1) ... (T - w_k), whose
 coefficients do not depend on the order of the spaces, so that they can be interpolated. A linear factor of chi over Q
 gives the coefficient w_i of one space as a function of the symbols and eps, and its value identifies this space on any
-other map. A factor of higher degree belongs to spaces that are conjugate over an extension of Q and have no formula
-over Q.
+other map. A factor of higher degree belongs to spaces conjugate over an extension of Q, without formulas over Q.
 """
 
 from __future__ import annotations
@@ -111,8 +109,8 @@ def search_spaces(
     """Search for spaces whose ratios give as many independent integrals as the profile shows, by fast methods only.
 
     The fast methods are: affine integrals, relations along orbits that span few dimensions, polynomials with known
-    cofactors, and polynomials over known denominators. Once the `budget` is spent only affine integrals are tried.
-    Raises NoPoint.
+    cofactors, and polynomials over known denominators. Over the `budget` only affine integrals are tried. Raises
+    NoPoint.
     """
     result, required = SpaceSearch(), profile.codimension
     is_of_vector_field = isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMap)
@@ -176,10 +174,10 @@ def repeat_search(
     reference: int,
     branches: Mapping[int, Mapping[Pattern, Branches]] = NO_BRANCHES,
 ) -> SpaceSearch | None:
-    """Repeat the steps of a search on another map; return None where the spaces have another shape (a special value).
+    """Repeat the steps of a search on another map; return None if its spaces have other zero patterns (special values).
 
-    `reference` is the prime of the search. Spaces with the same zero pattern come in any order unless `branches`
-    distinguishes those of the step.
+    `reference` is the prime of the search. Spaces with the same zero pattern are in any order unless `branches`
+    distinguishes those of their step.
     """
     repeated = SpaceSearch(cofactors=original.cofactors)
     steps = list(zip(original.steps, original.spaces, strict=True))

@@ -1,1 +1,1 @@
-"""Which members of a family of maps are integrable: the scan of its parameters."""
+"""The scan of parameters: a search for the integrable members of a family of maps."""

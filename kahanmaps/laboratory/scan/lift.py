@@ -1,12 +1,13 @@
-"""Lift components modulo several small primes to varieties over Q, by Chinese remainders and rational reconstruction.
+"""Lift components modulo several small primes to varieties over Q, by Chinese remaindering and rational reconstruction.
 
 A variety reconstructed from some of the primes must also appear modulo the others. This does not prove that it is a
 component over Q; `scan` confirms it at members on it.
 
 A point with coordinates in a number field has residues modulo the primes that have a factor of degree 1 there: for most
-fields more than half of the primes. The Chinese remainder theorem combines one residue for each of several primes; any
-of the conjugates will do. Small integer relations between products of the coordinates, found as short vectors of a
-lattice, are the equations: for the first coordinate over Q, and for each further one over the field of those before it.
+fields more than half of the primes. The Chinese remainder theorem combines one residue, of any of the conjugates, for
+each of several primes. The equations are small integer relations between products of the coordinates, found as short
+vectors of a lattice: an equation over Q for the first coordinate, and for each further one an equation over the field
+of the earlier ones.
 """
 
 from __future__ import annotations
@@ -230,7 +231,7 @@ def lift_conjugate_points(
 
 
 def _search_equations(values: Sequence[int], modulus: int, names: Sequence[str]) -> tuple[fmpq_mpoly, ...] | None:
-    """Return a relation for each coordinate, of the smallest degree in it; None if there are no small ones."""
+    """Return a relation of least degree in each coordinate; None if there are no relations with small coefficients."""
     context = ring(names)
     basis = [(context.constant(1), 1)]  # of the field of the coordinates so far: products and their residues
     equations = []
@@ -265,7 +266,7 @@ def _search_relation(residues: Sequence[int], modulus: int, spare: int) -> list[
 
 
 def _solve_modulo(equations: Sequence[fmpq_mpoly], p: int) -> set[tuple[int, ...]]:
-    """Return the solutions modulo a prime; none if it divides a leading coefficient."""
+    """Return the solutions modulo a prime; no solutions if the prime divides a leading coefficient."""
     size = len(equations)
     for k, equation in enumerate(equations):
         leading = tuple(int(equation.degrees()[k]) * (i == k) for i in range(size))

@@ -101,8 +101,8 @@ class Scanned:
         """Measure the degrees of a random member on a component modulo a random prime of 61 bits, on one random line.
 
         Returns None if the component has no point modulo the primes tried. A degree is -1 if the iterate is defined
-        nowhere. As many degrees are measured as are `expected`, which also says about how large they are; the sequence
-        ends before a degree above `max_degree`.
+        nowhere. The sequence is as long as `expected`, the degrees it is likely to have, or ends before a degree above
+        `max_degree`.
         """
         for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
             field = GF(random_prime(rng))

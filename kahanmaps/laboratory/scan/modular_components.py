@@ -1,8 +1,8 @@
 """The components of a set of points of GF(p)^k: affine subspaces, hypersurfaces of these, single points.
 
-The points with one degree sequence lie on certain varieties, without the points of their special subvarieties, and a
-few are there by chance. So a candidate is a variety through few random points of the set; it is accepted as a component
-if it has about as many points of the set as a variety of its dimension d has points, p^d.
+The points with one degree sequence lie on certain varieties, outside of special subvarieties; a few have it by chance.
+So a candidate is a variety through few random points of the set; it is accepted as a component if it has about as many
+points of the set as a variety of its dimension d has points, p^d.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def find_components(
     unassigned = np.array(points, dtype=np.int64)
 
     def affine_subspaces(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
-        """Yield affine subspaces with at least `needed` of the points, and which points are in them."""
+        """Yield affine subspaces with at least `needed` of the points, each with a mask of the points in it."""
         for _ in range(_TRIES if count <= 3 else _TRIES_MANY_PARAMETERS):
             check()
             if len(unassigned) < needed:
@@ -115,7 +115,7 @@ def find_components(
 def _hypersurfaces(
     points: Any, needed: float, prime: int, rng: random.Random, check: Callable[[], None]
 ) -> Iterator[tuple[Form, Any]]:
-    """Yield irreducible hypersurfaces with at least `needed` of the points, and which points are on them.
+    """Yield irreducible hypersurfaces with at least `needed` of the points, each with a mask of the points on it.
 
     The first attempt interpolates more points than there are coefficients, and finds the product of all hypersurfaces;
     further ones interpolate just enough points to determine one hypersurface, if all of them happen to lie on it.

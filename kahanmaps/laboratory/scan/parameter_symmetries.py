@@ -26,7 +26,7 @@ _MAX_POINTS = 24
 
 
 def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return generators of the group of changes of parameters that was found, as images of the parameters.
+    """Return generators of the group of all changes of parameters that were found, as images of the parameters.
 
     Each preserves the degrees of the special members modulo each prime for which all members were tried, and the
     hypersurfaces over Q, except for components that are mapped to infinity. Only changes that move a component, or
@@ -106,7 +106,7 @@ def _images(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
 
 
 def _is_reportable(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
-    """Return whether hypersurfaces are mapped to ones with the same degrees, and some component moves or is curved."""
+    """Return whether the change preserves the degrees of hypersurfaces, and some component moves or is not affine."""
     *images, denominator = _images(change, names)
 
     def pull_back(equation: fmpq_mpoly) -> fmpq_mpoly:

@@ -98,10 +98,9 @@ class Scan(PrintableResult):
     """The result of a scan: components, those with the slowest growth first.
 
     `generic` are the degrees d_1, ..., d_N of a generic member, `sweeps` the special members modulo each prime, and
-    `unassigned` the numbers of those that are on no component: points over number fields or of a height above
-    `height`, or members that are special modulo this prime by chance. `symmetric` lists changes of parameters that
-    permute the special members, by their images. `ended` is "complete", "budget" or "interrupted"; `omitted` names
-    what was not done.
+    `unassigned` the numbers of special members on no component: they are points over number fields or of a height above
+    `height`, or special modulo this prime by chance. `symmetric` lists changes of parameters that permute the special
+    members, by their images. `ended` is "complete", "budget" or "interrupted"; `omitted` names what was not done.
     """
 
     file: SystemFile
@@ -126,13 +125,13 @@ class Scan(PrintableResult):
 
     @property
     def height(self) -> int:
-        """The bound of numerators and denominators up to which conditions are found; 0 with too few primes."""
+        """The bound up to which numerators and denominators in conditions are found; 0 with too few primes."""
         bounds = [height_bound([sweep.prime for sweep in sweeps]) for sweeps in self._kinds if len(sweeps) > 2]
         return min(bounds, default=0)
 
     @property
     def _kinds(self) -> tuple[list[Sweep], ...]:
-        """The sweeps over all members, and those over members on random lines of parameter space, and planes."""
+        """The sweeps over all members, those over random lines of parameter space, and those over random planes."""
         return (
             [sweep for sweep in self.sweeps if sweep.complete],
             *([sweep for sweep in self.sweeps if not sweep.complete and sweep.width == width] for width in (1, 2)),
@@ -159,7 +158,7 @@ class Scan(PrintableResult):
 
     @property
     def coverage(self) -> str:
-        """A sentence that says which members were searched, and which components such a search finds."""
+        """A sentence on the members that were searched and the components that such a search finds."""
         if not self.height:
             tried = counted(len(self.sweeps), "prime")
             return f"conditions need members modulo three primes, and those modulo {tried} were tried"

@@ -1,10 +1,10 @@
-"""Which members of a family of maps are integrable: components of parameter space where degrees grow more slowly.
+"""The search for integrable members of a family of maps: components of parameter space where degrees grow more slowly.
 
 All members with parameters in GF(p) are tried for several small primes p (`sweep`). Those with smaller degrees than a
 generic member are special. They fall into classes by their degrees, and these into components modulo each prime
 (`modular_components`); components that appear modulo all primes are lifted to conditions over Q (`lift`). A condition
-is *found modulo* these primes. It is *confirmed* where members on it, random modulo large primes, have the same degrees
-by the computation that `degrees` does. None of this is a proof. The kind of growth is that of one rational member.
+is *found modulo* these primes. It is *confirmed* if random members on it, modulo large primes, have the same degrees
+when these are computed as by `degrees`. None of this is a proof. The kind of growth is that of one rational member.
 """
 
 from __future__ import annotations
@@ -103,15 +103,14 @@ def scan(
         over: names of the parameters that vary; the others keep the values of the file. eps may be one of them.
         eps: half the time step (exact), or None for generic eps: conditions that hold for every eps.
         time_step, h: the time step 2 eps, instead of eps.
-        terms: how many iterates are measured, by default as many as have small degrees, at most 7.
+        terms: the number of iterates that are measured; by default those of small degree, at most 7.
         primes: at least three primes; by default there are some ten thousand members modulo them.
-        effort: an integer; each increase by 1 doubles the work. What was not done is reported.
+        effort: an integer; each increase by 1 doubles the work limit. Anything skipped is reported.
         seed: the random seed.
-        jobs: threads, by default as many as processors; they need numba.
+        jobs: the number of threads, which need numba; by default the number of processors.
         analysis: the effort of an analysis of one member on each component whose degrees do not grow exponentially;
             of several points with the same degrees, only one is analyzed. None: no analyses.
-        progress: called repeatedly with a message; if it raises TimeOver, the scan ends with the result so far, as it
-            does at a TimeLimit.
+        progress: called repeatedly with a message; a TimeOver that it raises, or a TimeLimit, ends the scan early.
 
     Returns:
         A `Scan`. Conditions are found modulo primes and confirmed at members; this is evidence, not proof.
@@ -301,10 +300,10 @@ class _ScanRun:
         self.sweeps[:] = [sweep for sweep in self.sweeps if sweep.generic == generic]
 
     def more_lines(self, components: Sequence[Component], _: Sequence[int] | None, max_members: float) -> list[Choice]:
-        """Plan more random lines in place of the present ones, if a hypersurface was probably missed on these.
+        """Plan new and more random lines, if a hypersurface was probably missed on the present ones.
 
-        A hypersurface is missed if the unassigned members are as many as it has. The plan is empty if none was, or if
-        it needs more than `max_members` members.
+        A hypersurface was probably missed if there are as many unassigned members as it has points. The plan is empty
+        if none was missed, or if it needs more than `max_members` members.
         """
         lines = [sweep for sweep in self.sweeps if sweep.on_lines]
         plan: list[Choice] = [(sweep.prime, _LINE_FACTOR * round(sweep.measured / sweep.prime), 1) for sweep in lines]
@@ -319,8 +318,8 @@ class _ScanRun:
     ) -> list[Choice]:
         """Plan further primes if points were probably missed, with at most `max_members` members in total.
 
-        Points are missed if there are unassigned members, but fewer than a curve has, or a hypersurface on random
-        lines. The plan is empty if none were, or if the user gave the primes.
+        Points were probably missed if there are unassigned members, but fewer than a curve (on random lines: a
+        hypersurface) has points. The plan is empty if none were missed, or if the user gave the primes.
         """
         sizes = ((sweep, sweep.prime if sweep.complete else sweep.measured / sweep.prime) for sweep in self.sweeps)
         if primes is not None or not any(
@@ -371,7 +370,7 @@ class _ScanRun:
 
 
 def _measure_growth(component: Component, family: Scanned, budget: Budget) -> DegreeGrowth | None:
-    """Return the growth at a rational member; if there is none or it is special, the growth fitted to more degrees."""
+    """Return the growth at a rational member; without one, or if it is special, the growth fitted to more degrees."""
     growth = None
     if component.values is not None:
         member, eps_of_member = family.member(component.values)
@@ -415,7 +414,7 @@ def _agree(first: Degrees, second: Degrees) -> bool:
 def _choose_plan(parameter_count: int, primes: Sequence[int] | None, max_members: float) -> list[Choice]:
     """Choose primes, each with the number of random lines or planes in parameter space, or None for all members.
 
-    The first of the plans, largest first, with at most `max_members` members.
+    Returns the largest plan that needs at most `max_members` members.
     """
     plans: list[list[Choice]]
     lines: list[list[Choice]] = [[(p, n, 1) for p in _LINE_PRIMES] for n in _LINES.get(parameter_count, _MANY_LINES)]

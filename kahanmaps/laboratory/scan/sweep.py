@@ -93,13 +93,13 @@ def sweep(
 
     Args:
         map_: the family; its symbols are the parameters that vary.
-        count: the number of parameters that vary; one more than the symbols if eps is one, as the last and never 0.
+        count: the number of parameters that vary. If it is one more than that of the symbols, eps is the last
+            parameter; it is never 0.
         prime: the prime.
         eps: half the time step (exact), or None for generic eps, taken from GF(p^2).
         terms: the number of degrees.
         max_length: as for `Family.degrees`.
-        on: the number and the dimension of random affine subspaces of parameter space whose members are measured, or
-            None for all members.
+        on: number and dimension of the random affine subspaces whose members are measured; None for all members.
         units: the units of work that are counted for one member.
         seed: the random seed.
         jobs: as for `Family.degrees`.

@@ -1,10 +1,10 @@
-"""The exceptional hypersurfaces of a map without their polynomials: by points, and by curves through these points.
+"""The exceptional hypersurfaces of a map, represented by points and curves through these points, without polynomials.
 
 Let M and M' be the matrices of a map F and of its inverse, both linear in the point. The image of a hypersurface that F
 contracts lies in the indeterminacy locus of the inverse. So the hypersurface is a pole, a factor of det M(X), or
 infinity Z = 0, or a zero of det M'(F(X)). Of these forms only det M, det M' and their factors over Q are expanded,
-which are short. On a random line modulo a prime their zeros are points. Points that share all multiplicities from the
-first step on represent one hypersurface.
+which are short. On a random line modulo a prime their zeros are points. Points with the same multiplicities at all
+steps are taken to represent one hypersurface.
 
 Along a curve only the orders of forms are known, and each form is a product of powers of hypersurfaces. The exponents
 are the orders at the points themselves, and so linear equations give the multiplicities and degrees of the
@@ -42,8 +42,10 @@ Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
 
 @dataclass(frozen=True)
 class HypersurfaceComponent:
-    """A hypersurface: its exponents in the forms, its degree, its order along the curve t (None: it contains it), and
-    its equation on the surface (t, u)."""
+    """A component of zero sets: its exponents in the forms, its degree, and its equation on the surface (t, u).
+
+    `order` is its order along the curve u = 0; None if it contains the curve.
+    """
 
     exponents: tuple[int, ...]
     degree: int
@@ -56,7 +58,7 @@ class HypersurfaceComponent:
         return self.exponents, self.degree
 
     def roots(self, t: int) -> list[int]:
-        """The coordinates u in GF(p) of its points with this t."""
+        """The coordinates u in GF(p) of the points of the hypersurface with this t."""
         p = int(self.equation.context().modulus())
         on_line = [0] * (self.degree + 1)
         for (i, j), c in self.equation.terms():
@@ -69,8 +71,8 @@ def components(
 ) -> list[HypersurfaceComponent]:
     """The components of the zero sets of forms on the surface curve(t) + u direction, in projective space over GF(p).
 
-    Each form over Q comes with a flag: whether it is evaluated at the image of the point under the map of the equation.
-    `direction` is a random vector: then degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
+    Each form over Q has a flag, whether it is evaluated at the image of the point under the map of the equation.
+    `direction` must be random, so that degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
     """
     field = GF(equation.over.characteristic)
     ring = nmod_mpoly_ctx.get(("t", "u"), modulus=field.prime, ordering=Ordering.degrevlex)
@@ -126,7 +128,7 @@ class _Forms:
 
     @property
     def all(self) -> list[tuple[Any, bool]]:
-        """The forms in the order of columns, each with whether it is evaluated at the image; some occur twice."""
+        """The forms in the order of columns, each with whether it is evaluated at the image; a form may occur twice."""
         at_points = [(form, False) for form in self.poles]
         return [*at_points, *((form, True) for form in self.images), (self.infinity, False)]
 
@@ -135,8 +137,8 @@ class _Forms:
 class _Curve:
     """A curve through a point of a line where a form vanishes, and the functions that are tracked along the curve.
 
-    `across` is another random vector, for surfaces. `minor_exponents` are the exponents of the forms in the common
-    factor of the minors of the equation, which is no part of the map. Curves are followed within the limits.
+    `across` is another random vector, which spans surfaces. `minor_exponents` are the exponents of the forms in the
+    common factor of the minors of the equation, which does not belong to the map. `limits` bound the number of steps.
     """
 
     equation: Equation
@@ -170,8 +172,7 @@ class _Curve:
 
     @cached_property
     def key(self) -> Key:
-        """The key of its hypersurface: whether it is contracted, which forms vanish there, and the first
-        `rows`.
+        """The key of its hypersurface: is it contracted, which forms vanish there, and the first `rows`.
 
         Raises OrbitDataUnknown where there is no first step.
         """
@@ -214,7 +215,7 @@ class _Curve:
         return components(self.equation, self.forms.all, curve, self.across)
 
     def through(self, component: HypersurfaceComponent, curve: Sequence[nmod_poly]) -> _Curve:
-        """Return the curve with a point of a component on the surface through `curve`; raises OrbitDataUnknown."""
+        """Return this curve at a point of a component on the surface through `curve`. Raises OrbitDataUnknown."""
         for t in range(1, _TRIES):
             for u in component.roots(t):
                 point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
@@ -223,7 +224,7 @@ class _Curve:
 
     @cached_property
     def components_with_points(self) -> list[tuple[HypersurfaceComponent, _Curve]]:
-        """Return all components on a plane, each with a curve through one of its points; empty if one has no point."""
+        """Return all components on a plane, each with a curve through one of its points; empty if one has none."""
         try:
             return [(component, self.through(component, self.line)) for component in self.components(self.line)]
         except OrbitDataUnknown:
@@ -232,12 +233,12 @@ class _Curve:
 
 @dataclass(frozen=True)
 class _Resolved:
-    """The orders of hypersurfaces along a curve, from those of forms: the rows of `OrbitData`.
+    """The rows of `OrbitData`: the orders of hypersurfaces along a curve, computed from the orders of forms.
 
-    `exponents` are those of the hypersurfaces in the forms; `left_inverse` gives the orders of hypersurfaces from those
-    of forms, and its results are checked. Without it forms are factored on surfaces: `keys_of_kind` has the keys of the
-    hypersurfaces with components of a kind, `keys` those of all, in their order, and `multiplicities` the results after
-    each number of steps.
+    `exponents` are those of the hypersurfaces in the forms; its `left_inverse` turns orders of forms into orders of
+    hypersurfaces, and the results are checked. If it is None, forms are factored on surfaces: `keys_of_kind` has the
+    keys of the hypersurfaces with components of a kind, `keys` all keys in the order of the hypersurfaces, and
+    `multiplicities` the results after each number of steps.
     """
 
     curve: _Curve
@@ -268,7 +269,7 @@ class _Resolved:
         return tuple(rows)
 
     def _on_surface(self, orders_of_forms: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
-        """The orders along a curve by the factors of forms on a surface through it. Raises OrbitDataUnknown."""
+        """The orders of hypersurfaces along a curve, from factors of forms on a surface. Raises OrbitDataUnknown."""
         nu, largest = fmpq_mat(len(self.keys), 1), max(orders_of_forms.entries())
         if largest == 0:
             return nu
@@ -304,9 +305,9 @@ def exceptional_hypersurfaces(
 ) -> tuple[int, list[Hypersurface]]:
     """The degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
 
-    Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
-    point. Only points modulo random primes are followed. If the forms do not suffice to tell the hypersurfaces
-    apart, their degrees are 0 and their orders those of the forms. Raises OrbitDataUnknown.
+    Hypersurfaces with the same orders count as one. The equation of the map and that of its inverse must be linear in
+    the point. Points modulo random primes are followed. If the forms do not distinguish the hypersurfaces, their
+    degrees are set to 0 and their orders are those of the forms. Raises OrbitDataUnknown.
     """
     map_at_eps = map_.at(eps)
 
@@ -407,8 +408,10 @@ def _followed(
 def _on_line(
     map_: ElementaryMap, forms: _Forms, functions: tuple[Function, ...], limits: Range, rng: random.Random
 ) -> tuple[int, int, list[_Curve]]:
-    """The degree of the map on a random line, the number of points over the closure where forms vanish, and those in
-    GF(p), each with the line as a curve through it."""
+    """Return the degree of the map on a random line, and the number of zeros of the forms over the closure of GF(p).
+
+    Also returns the zeros in GF(p), each with the line as a curve through it.
+    """
     equation, p = map_.equation, map_.field.characteristic
     a, b, across = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
     line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]

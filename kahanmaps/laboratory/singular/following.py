@@ -1,9 +1,8 @@
 """The multiplicities along an exceptional hypersurface, step by step: its singularity pattern.
 
 A curve through a generic point of the hypersurface is a power series in t. After each step a power of t is divided out:
-its exponent mu is the multiplicity with which the image lies in the indeterminacy locus. The orders nu of the critical
-hypersurfaces along the image are the multiplicities with which it lies in these. Series are followed until the pattern
-is known for all steps.
+its exponent mu is the multiplicity with which the image lies in the indeterminacy locus. The multiplicities nu with
+which it lies in the critical hypersurfaces are their orders along the image. Series are computed until it has settled.
 """
 
 from __future__ import annotations
@@ -47,11 +46,10 @@ Fraction = tuple[fmpz_poly, fmpz_poly]  # numerator and denominator
 class OrbitData:
     """A singularity pattern: the rows (mu, nu_1, nu_2, ...) of the steps 1, 2, ..., and their continuation.
 
-    `is_settled`: the rows are known for all steps. There are three cases. The columns satisfy the `recurrences`, given
-    by their characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the j-th hypersurface,
-    and its pattern continues this one. Or all later rows are zero, as far as they were computed (`followed` steps),
-    except for the multiplicities of the hypersurfaces in `eventually_in`, in which the images lie again and again:
-    these are not known.
+    If it `is_settled`, the rows are known for all steps, in one of three cases. The columns satisfy the `recurrences`,
+    given by their characteristic polynomials. Or `continues_as` is (T, j): after T steps the image is the j-th
+    hypersurface, whose pattern continues this one. Otherwise all later rows are zero up to the step `followed`, except
+    for unknown multiplicities in the hypersurfaces of `eventually_in`, in which the images lie again and again.
     """
 
     rows: tuple[tuple[int, ...], ...]
@@ -75,7 +73,7 @@ class OrbitData:
 
     @property
     def sentences(self) -> list[str]:
-        """Two phrases: at which steps the degree drops, and in which exceptional hypersurfaces the images lie."""
+        """Two phrases: the steps at which the degree drops; the exceptional hypersurfaces in which images lie."""
         rows = self.rows[: self.settled_at]
         drops = [f"{row[0]} at step {t}" for t, row in enumerate(rows, 1) if row[0]]
         incidences = [
@@ -110,7 +108,7 @@ class OrbitData:
         return replace(self, rows=rows, recurrences=tuple(self.recurrences[k] for k in columns if self.recurrences))
 
     def generating_function(self, column: int) -> Fraction:
-        """The sum of a column's entries times z, z^2, ..., as a fraction of polynomials in z; up to the return.
+        """The generating function of a column (entries times z, z^2, ...), as a fraction; up to the return.
 
         >>> OrbitData(((1,), (2,), (4,)), (fmpz_poly([-2, 1]),)).generating_function(0)
         (x, (-2)*x + 1)
@@ -140,16 +138,16 @@ class AlongCurves(Protocol):
         """The functions in the form that `images_of_curve` takes."""
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Return for each step, or the first steps, the power that is divided out and the orders of hypersurfaces."""
+        """Return the power that is divided out and the orders of hypersurfaces, for all steps or the first ones."""
 
 
 @dataclass(frozen=True)
 class Tracked:
     """The functions whose orders are measured along curves through a hypersurface.
 
-    `minor_exponents` are their exponents in the common factor of the minors of the equation, which is no part of the
-    map; `initial_orders` are their orders on the hypersurface itself: 1 for its own, 0 for others. The first `critical`
-    of them are those of contracted hypersurfaces.
+    `minor_exponents` are the exponents of the functions in the common factor of the minors of the equation, which does
+    not belong to the map; `initial_orders` are the orders on the hypersurface: 1 for its own form, 0 for others. The
+    first `critical` of them are those of exceptional hypersurfaces.
     """
 
     functions: tuple[Function, ...] = ()
@@ -158,7 +156,7 @@ class Tracked:
     critical: int = 0
 
     def rows(self, run: Sequence[JetStep]) -> tuple[tuple[int, ...], ...]:
-        """Return the rows of `OrbitData` for steps along a curve; without tracked functions those of det M(x)."""
+        """Return the rows of `OrbitData` for steps along a curve; without tracked functions, the orders of det M(x)."""
         if not self.functions:
             return tuple((step.common, step.denominator or 0) for step in run)
         pairs = zip(divided_powers(run, self.initial_orders, self.minor_exponents), run, strict=True)
@@ -166,7 +164,7 @@ class Tracked:
 
 
 def divided_powers(run: Sequence[JetStep], initial_orders: Sequence[int], minor_exponents: Sequence[int]) -> list[int]:
-    """The powers of t divided out that belong to the map, not to the common factor of the minors of its equation.
+    """The powers of t that are divided out, without those that belong to the common factor of the minors.
 
     `initial_orders` are the orders of the functions before the steps, `minor_exponents` their exponents in that factor.
     """
@@ -182,12 +180,12 @@ NOTHING_TRACKED = Tracked()
 
 @dataclass(frozen=True)
 class Range:
-    """How far hypersurfaces are followed: along series for `shown` steps, and for `reach` steps in all.
+    """The number of steps for which hypersurfaces are followed: `shown` along series, and `reach` in all.
 
     A singularity can be confined only where the image lies in the indeterminacy locus. Beyond the first steps only a
-    point of the image is followed, which is fast. Where it reaches the locus, series are needed, which are slow: for
-    at most `series_steps` steps, or `repeating_steps` if multiplicities repeat and each step uses up terms, so that
-    series are long. The computation stops when the `budget` is spent.
+    point of the image is followed, which is fast. If it reaches the locus, series are needed, which are slow: for at
+    most `series_steps` steps, or `repeating_steps` if multiplicities repeat and every step uses up terms, so that the
+    series must be long. The computation stops when the `budget` is spent.
     """
 
     shown: int
@@ -209,13 +207,13 @@ class TestCurve:
 
     @property
     def prime(self) -> int:
-        """The prime modulo which all is computed."""
+        """The prime modulo which the curve is computed."""
         return self.equations[0].over.characteristic
 
     def steps(
         self, count: int, tangents: Sequence[Sequence[int]] = (), max_precision: int = _MAX_PRECISION
     ) -> tuple[list[JetStep], bool]:
-        """Return `count` steps along series of sufficient length, and whether budget and precision allowed all of them.
+        """Return steps along series of sufficient length, and whether budget and precision allowed all `count` of them.
 
         With tangents no function is tracked.
         """
@@ -245,7 +243,7 @@ class TestCurve:
     def orbit_data_until_return(self, up: int) -> OrbitData:
         """The orders along a curve if the image is a hypersurface again after the step `up`.
 
-        If it is a critical hypersurface after some step, the later orders are those of that hypersurface.
+        If the image is a critical hypersurface after some step, the later orders are those of that hypersurface.
         """
         steps = self.limits.shown
         reach = min(self.limits.reach, steps + _FREE_STEPS)
@@ -265,8 +263,8 @@ class TestCurve:
     def orbit_data(self, first_steps: int) -> OrbitData:
         """Return the orbit data along the curve, with more steps until it is settled or the limits are reached.
 
-        `first_steps` is the number of steps to begin with. The image may move on a critical hypersurface until
-        something happens, so that orders have to repeat for as long as curves are followed.
+        `first_steps` is the number of steps to begin with. The image may move on a critical hypersurface for many steps
+        before it meets another one, so a recurrence is accepted only if it holds for as long as curves are followed.
         """
         steps, limits, max_precision = first_steps, self.limits, _FIRST_PRECISION
         while True:

@@ -38,17 +38,17 @@ class NotGeneric(ArithmeticError):
 
 
 class Letters(tuple[Equation, ...]):
-    """Equations that are applied in turn, one in each step, and from the beginning again: a word of maps.
+    """A word of maps: equations that are applied periodically, one in each step.
 
-    A function belongs to one place in the word: it is evaluated after the number of steps given in `places`, and after
-    each complete word from there.
+    A function belongs to one place in the word: it is evaluated after the number of steps given in `places`, and again
+    after each further complete word.
     """
 
     places: tuple[int, ...] = ()
 
 
 def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
-    """Return the equations of the step 1, 2, ...: those of one map of a word, otherwise all."""
+    """Return the equations of a step, counted from 1: for a word those of one map, otherwise all."""
     return (equations[(step - 1) % len(equations)],) if isinstance(equations, Letters) else equations
 
 
@@ -73,7 +73,7 @@ def valuation(series: nmod_poly, precision: int) -> int | None:
 
 @dataclass(frozen=True)
 class JetStep:
-    """The result of one step: valuations in t (None: at least the precision), and the rank of the differential.
+    """The result of one step: valuations in t (None if at least the precision), and the rank of the differential.
 
     Attributes:
         common: the power of t divided out of all coordinates; for several factors that of their composed minors.
@@ -102,7 +102,7 @@ def images_of_curve(
     tangents: Sequence[Sequence[int]] = (),
     functions: Sequence[Function] = (),
 ) -> Iterator[JetStep]:
-    """Yield the steps of the curve point + t direction, with its neighbours in the tangent directions, without end.
+    """Yield steps without end of the curve point + t direction, with its neighbours in the tangent directions.
 
     Exact. The equations of the map are over GF(p); points and vectors are residues (X : Z). Give either tangents, for
     the rank, or `functions`, for their orders. Raises PrecisionTooLow and NotGeneric.

@@ -2,10 +2,11 @@
 
 Source: grammaticos-ramani-papageorgiou-1991.
 
-Where the polynomials of hypersurfaces are too large to be written down, points on them are zeros on a random line. For
-an equation M(x) x~ = r(x) that is linear in both points det dPhi(x) is det M'(x~)/det M(x) up to its sign, with the M'
-of the inverse map. So away from poles and infinity exceptional hypersurfaces are the zeros of E(X) = det M'(X~), where
-(X~ : Z~) is the image of X. On a line E is a polynomial of one variable. Source: petrera-suris-2016, eq. (Jac).
+If the polynomials of hypersurfaces are too large to be expanded, their zeros on a random line give points on them. For
+an equation M(x) x~ = r(x) that is linear in both points, det dPhi(x) is det M'(x~)/det M(x) up to its sign, where M'
+belongs to the inverse map. So away from poles and infinity the exceptional hypersurfaces are the zeros of E(X) = det
+M'(X~), where (X~ : Z~) is the image of X. On a line E is a polynomial in one variable. Source: petrera-suris-2016, eq.
+(Jac).
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ def critical_points(
     """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
     `equations` are those of the factors of the map over the field, linear in the point, and `inverses` those of their
-    inverses; for several factors E is the product of those of the factors. Without inverses det M stands for E, and the
+    inverses; for several factors E is the product of the E of the factors. Without inverses det M replaces E, and the
     points are the poles that are not at infinity. Returns the points and, for each multiplicity, the number of zeros
     over the closure of GF(p): there may be zeros without points in GF(p).
     """
@@ -135,7 +136,7 @@ def critical_points(
 
 
 def _denominator(equation: Equation, X: Sequence[nmod_poly], times: Product) -> nmod_poly:
-    """The last minor of L at X, whose coordinates are polynomials: up to its sign det M."""
+    """The last minor of the equation at X, a point with polynomial coordinates: det M up to its sign."""
     zero = X[0] * 0
     rows = equation.rows(equation.monomials(X, times), zero)
     minor: nmod_poly = kernel_minors([[*row[:-1], zero] for row in rows], times)[-1]
@@ -161,17 +162,17 @@ POINTS_DIFFER = "its multiplicities along two curves modulo different primes dif
 class Hypersurface(ResultPart):
     """An irreducible hypersurface over Q and its singularity pattern, at one exact eps.
 
-    `divides_denominator`: it is a factor of det(I - eps f'(x)); `multiplicity`: how often it divides the Jacobian
-    determinant of the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at infinity, and "?"
-    where it is too large: then `degree` is that of all components of this multiplicity together. It is contracted by
-    the step `contracted_at` and is a hypersurface again after the step `confined_at` (each None if that did not
-    happen). `steps` are the first steps, at the first of two points, modulo the first of the `primes`.
+    `divides_denominator` says whether it is a factor of det(I - eps f'(x)); `multiplicity` is its exponent in the
+    Jacobian determinant of the homogeneous map (None: not computed); `polynomial` is "Z" for the hyperplane at
+    infinity, and "?" if it is too large: then `degree` is that of all components of this multiplicity together. The
+    step `contracted_at` contracts the hypersurface, and after the step `confined_at` the image is a hypersurface again
+    (None if that did not happen). `steps` are the first steps, at the first of two points, modulo the first of the
+    `primes`.
 
-    It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
-    happened before: nothing, repetition, or growth by a linear recurrence. `settled_at` is None if its pattern has not
-    settled. `orbit_data` is this pattern. In a composition that is followed map by map all steps are those of single
-    maps, and the map of number `stage`, from 0, contracts it; otherwise `stage` is None.
-    `generic` is its polynomial over Q[eps], empty if it is not known.
+    It was followed for `followed` steps in all. From the step `settled_at` on, the pattern follows from its earlier
+    rows: it is zero, periodic, or given by a linear recurrence. `settled_at` is None if the pattern has not settled.
+    `orbit_data` is this pattern. In a composition that is followed map by map all steps are those of single maps, and
+    the map of number `stage`, from 0, contracts it; otherwise `stage` is None. `generic` is its polynomial over Q[eps].
     """
 
     polynomial: str = "?"
@@ -192,7 +193,7 @@ class Hypersurface(ResultPart):
 
     @property
     def text(self) -> str:
-        """The polynomial and what became of it."""
+        """The polynomial and the outcome for the hypersurface."""
         return f"{self.polynomial} = 0: {self.status}"
 
     def sentence(self, at: str) -> str:
@@ -234,10 +235,9 @@ class Hypersurface(ResultPart):
 
 @dataclass(frozen=True)
 class HypersurfaceForm:
-    """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown).
+    """An irreducible form, whether it is a pole, and its exponent in the Jacobian determinant (None: unknown).
 
-    `minor_exponent` is its exponent in the common factor of the minors of an equation, and `stage` the number of that
-    map in a word, from 0.
+    `minor_exponent` is its exponent in the common factor of the minors of an equation; `stage` is the index of its map.
     """
 
     form: Any
@@ -252,9 +252,8 @@ class Tracking:
     """The forms whose orders are measured along curves: `critical` ones, and those in the common factor of the minors.
 
     The map contracts the critical ones. The minors are those of an equation of the map; `of_minors` are the forms in
-    their common factor.
-    Where the maps of a composition are followed one by one, `stage` is the number of the one that contracts, from 0,
-    and steps are single maps of a word of `period`.
+    their common factor. If the maps of a composition are followed one by one, `stage` is the index (from 0) of the map
+    that contracts, and steps are single maps of a word of length `period`.
     """
 
     critical: Sequence[HypersurfaceForm] = ()
@@ -342,7 +341,7 @@ def outcome_of(
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """Follow the hypersurfaces as `unwritten` does, including the poles and infinity, all without polynomials."""
+    """Follow all hypersurfaces as `unwritten` does, without polynomials, including the poles and infinity."""
     hypersurfaces = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))

@@ -1,11 +1,11 @@
 """Singularity confinement: the images of the exceptional hypersurfaces (contracted by the map) and of its poles.
 
-A hypersurface on which the differential of the map degenerates may be contracted to something smaller: different points
-have the same image, and the memory of the initial point is lost. The singularity is confined if, along curves through
-the hypersurface, a later image is a hypersurface again. Degrees of iterates drop below their maximum only where images
-of exceptional hypersurfaces lie in the indeterminacy locus. The hypersurfaces are computed exactly over Q, for an exact
-eps; their images at random points modulo large primes, which is evidence and no proof.
-Source: grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
+A hypersurface on which the differential of the map degenerates may be contracted: its image has a lower dimension, and
+the image of a point no longer determines the point. The singularity is confined if, along curves through the
+hypersurface, a later image is a hypersurface again. Degrees of iterates drop below their maximum only where images of
+exceptional hypersurfaces lie in the indeterminacy locus. The hypersurfaces are computed exactly over Q, for an exact
+eps. Their images are computed at random points modulo large primes, which is evidence and no proof. Source:
+grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
 """
 
 from __future__ import annotations
@@ -90,11 +90,11 @@ class TooLongFormula(InputError):
 class SingularityRun(PrintableResult):
     """The singularities of a Kahan map at one exact eps, half the time step.
 
-    `denominator` is det(I - eps f'(x)) as text, "?" for a composition of which it is too large; `critical_degree` the
-    degree of the Jacobian determinant of the homogeneous map (None where it was too large to expand: contracted
-    hypersurfaces are then known by random points). The map is not dominant where that determinant vanishes identically:
-    its image lies in a hypersurface, and none is followed. `word` are the maps of a composition that is followed map by
-    map: then steps of hypersurfaces are single maps.
+    `denominator` is det(I - eps f'(x)) as text, or "?" for a composition if it is too large. `critical_degree` is the
+    degree of the Jacobian determinant of the homogeneous map; it is None if the determinant is too large to expand, and
+    exceptional hypersurfaces are then represented by random points. If the determinant vanishes identically, the map is
+    not dominant: its image lies in a hypersurface, and no hypersurface is followed. `word` are the maps of a
+    composition that is followed map by map; steps of hypersurfaces are then single maps.
     """
 
     _parts, _noun = "hypersurfaces", ("hypersurface", "hypersurfaces")
@@ -122,8 +122,8 @@ class SingularityRun(PrintableResult):
     def verdict(self) -> str:
         """The verdict on all hypersurfaces together.
 
-        "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"; where that
-        has no meaning at this eps, "singular everywhere" or "not dominant".
+        "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"; for a map
+        that is not birational at this eps "singular everywhere" or "not dominant".
         """
         if self.is_undefined:
             return "singular everywhere"
@@ -180,15 +180,26 @@ def singularities(
 ) -> SingularityRun:
     """Compute the exceptional hypersurfaces and poles of a Kahan map at one exact eps, and their singularity patterns.
 
-    Without eps two values are tried, and the result at the first of them is returned if their patterns agree.
+    Args:
+        system: a map, or a system, which stands for its Kahan map; of dimension at most 6.
+        eps: half the time step, an exact number; None: two values are tried, and their patterns must agree.
+        time_step, h: the time step 2 eps, instead of eps.
+        steps: the number of steps for which hypersurfaces are followed: by default 1000 in the plane, 500 in dimension
+            3, 250 in dimension 4 and 100 above, fewer if series are needed at all steps.
+        seed: the random seed.
+        effort: each increase by 1 doubles the work limit.
+        progress: called with a message for each hypersurface.
 
-    They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
-    above, fewer where series are needed all the way. Hypersurfaces are exact, their outcome that of two random points
-    modulo two random primes; "not confined" means within this number of steps. The computation stops when the budget is
-    spent, which doubles with each increase of `effort` by 1, or at a TimeLimit; if `effort` is a Budget, the TimeLimit
-    is raised to the caller. Returns a SingularityRun; raises InputError for dimensions above 6, a wrong number of
-    steps, and an eps or coefficients of more than 10,000 digits, or so long that writing formulas would exceed the
-    budget. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+    Returns:
+        A `SingularityRun`, without eps that of the first value. Hypersurfaces are exact; their outcome is measured at
+        two random points modulo two random primes, and "not confined" refers to this number of steps. A TimeLimit ends
+        the computation early; if `effort` is a Budget, it is raised.
+
+    Raises:
+        InputError: for dimensions above 6, a wrong number of steps, numbers too long for the budget, and different
+            patterns.
+
+    Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, str(run.verdict)
@@ -285,7 +296,7 @@ def singularities(
 def _map_by_map(
     map_: MapFamily, run: SingularityRun, seed: int, limits: Range, progress: Callable[[str], None]
 ) -> SingularityRun | None:
-    """The run for a composition whose maps are followed one by one; None where one of them is too large."""
+    """The run for a composition whose maps are followed one by one; None if one of them is too large."""
     rng = random.Random(f"map by map {derive_seed(seed, map_.subject, run.eps)}")
     followed = followed_map_by_map(map_, run.eps, rng, limits, progress)
     return followed and replace(run, word=followed[0], hypersurfaces=tuple(followed[1]), stopped=limits.budget.is_spent)
@@ -385,7 +396,7 @@ class Patterns:
 
 
 def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
-    """The patterns from runs at one eps, or at two that represent all; `at`: the map depends on eps."""
+    """The patterns from runs at one eps, or at two that represent every eps; `at`: the map depends on eps."""
     results = set()
     for run in runs:
         if not run.is_dominant:
@@ -408,8 +419,8 @@ def patterns(
 ) -> Patterns:
     """The patterns of the Kahan map at one exact eps (half the time step) or, where none is given, at two.
 
-    Up to dimension 4 those of `singularities`; above it, and for an eps too long for formulas, random points stand for
-    hypersurfaces.
+    Up to dimension 4 they are those of `singularities`; in higher dimensions, and for an eps too long for formulas,
+    random points represent hypersurfaces.
     """
     map_ = as_map(system)
     budget = budget_for("singularities", effort)
@@ -454,7 +465,7 @@ def _digits(map_: MapFamily, eps: fmpq) -> int:
 
 
 def _most_digits(dim: int, budget: Budget) -> int:
-    """The largest number of digits with which formulas are written within the budget, at least 50."""
+    """The largest number of digits for which the budget allows formulas, at least 50."""
     return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_PER_MILLION[dim] * min(budget.left / 1e6, MAX_DIGITS))))
 
 
@@ -528,8 +539,7 @@ def _range(dim: int, steps: int | None, budget: Budget) -> Range:
 def symbolic_denominator(system: QuadraticSystem | MapFamily) -> list[tuple[str, int]] | None:
     """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
 
-    Exact. None above dimension 4, where it may be long, for compositions too large to be multiplied out, and where a
-    variable is called eps.
+    Exact. None above dimension 4, for compositions too large to be expanded, and if a variable is called eps.
 
     >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
     [('12*x*eps^2 - 1', 1)]

@@ -1,12 +1,11 @@
 """The polynomials of the hypersurfaces that a map may contract; for a composition, those of each of its maps.
 
-The exceptional hypersurfaces of a composition are preimages of those of its maps, under the maps applied before: long
-polynomials. Map by map the polynomials are short. Curves through the hypersurfaces are followed through the word of the
-maps, one map a step, starting with the map that contracts the hypersurface. Powers of a word repeat it.
+The exceptional hypersurfaces of a composition are preimages of those of its maps under the maps applied before, and
+have long polynomials. Map by map the polynomials are short. Curves through the hypersurfaces are followed through the
+word of the maps, one map a step, starting with the map that contracts the hypersurface. Powers of a word repeat it.
 
 For every eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
-Hilbert's irreducibility theorem its factors stay irreducible at all but few eps, so that those at one eps are their
-values there.
+Hilbert's irreducibility theorem its factors stay irreducible for most eps, so that those at one eps are their values.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ _MAX_PRODUCTS = 300_000  # of terms, to expand the Jacobian determinant of the a
 
 @dataclass(frozen=True)
 class Word:
-    """A composition as a word of maps: the degrees of those that it begins with, and how often these are repeated."""
+    """A composition as a word of maps: the degrees of the first maps, and how often these are repeated."""
 
     degrees: tuple[int, ...]
     power: int
@@ -95,8 +94,8 @@ def followed_map_by_map(
 ) -> tuple[Word, list[Hypersurface]] | None:
     """The hypersurfaces that the maps of a composition contract, at one exact eps, with the word of these maps.
 
-    Steps and limits are those of single maps, but the first steps those of the word. Hypersurfaces that the budget did
-    not allow to be followed are left out. None where the polynomials of one of the maps are too large.
+    Steps and limits are those of single maps, but the first steps are those of the word. Hypersurfaces for which the
+    budget did not suffice are left out. None if the polynomials of one of the maps are too large.
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
@@ -168,9 +167,9 @@ def _critical_factors(forms: list[Any], degree: int) -> list[tuple[Any, int]] | 
 def factors_at_finite_points(forms: list[Any]) -> list[tuple[Any, int]] | None:
     """The factors of the Jacobian determinant of forms at Z = 1, with multiplicities; None where it is too large.
 
-    There the determinant of n + 1 forms F_1, ..., F_n, F_0 of degree d in (X : Z) is d F_0^(n+1) det dy/dx, where
-    y_i = F_i/F_0, by Euler's relation. Of det dy/dx denominators and contents of rows are known as factors, so that
-    only the rest is expanded. Symbols may follow Z.
+    There the determinant of n + 1 forms F_1, ..., F_n, F_0 of degree d in (X : Z) is d F_0^(n+1) det dy/dx, where y_i =
+    F_i/F_0, by Euler's relation. Denominators and contents of rows are factors of det dy/dx, so that only the rest is
+    expanded. Symbols may follow Z.
     """
     n, context = len(forms) - 1, forms[0].context()
     affine_point = [context.constant(1) if k == n else x for k, x in enumerate(context.gens())]
@@ -232,10 +231,10 @@ def name_of(form: Any, map_: MapFamily) -> str:
 
 
 def with_eps(map_: MapFamily, eps: fmpq, hypersurfaces: Sequence[Hypersurface]) -> tuple[Hypersurface, ...]:
-    """Add to hypersurfaces that a map contracts at one eps their polynomials over Q[eps], where these are found.
+    """Add the polynomials over Q[eps] to hypersurfaces that a map contracts at one eps, where these are found.
 
-    Exact: at this eps the polynomial is that of the hypersurface, up to a factor. None is found for compositions that
-    are multiplied out, where forms are too large, and where the polynomial is reducible at this eps.
+    Exact: at this eps the polynomial is that of the hypersurface, up to a factor. It is not found for expanded
+    compositions, if forms are too large, and if it is reducible at this eps.
     """
     polynomials: dict[int | None, dict[str, str]] = {}  # by factor of the map, then by polynomial at this eps
     result = []

@@ -6,8 +6,7 @@ conditions are necessary, so no solution is discarded. Third, every solution is 
 proved, or supported at random points.
 
 A quadratic system in n variables over a number field K of degree m is one in n m variables over Q, and its Kahan map is
-that over K (docs/beyond.md). So the g over K whose maps commute with that of f are among the rational ones for this
-larger system.
+that over K (docs/beyond.md). So the g over K whose maps commute with that of f are among its rational g.
 """
 
 from __future__ import annotations
@@ -115,11 +114,11 @@ class CommutingFamily(ResultPart):
 
 @dataclass
 class CommutingSystems(PrintableResult):
-    """The result of the search; if `complete`, there are no other rational g of this shape.
+    """The quadratic g whose Kahan maps commute with that of f; if `complete`, there are no others of this shape.
 
     `dimension` is that of the space of g with [f, g] = 0; `irrational` describes solutions that are not rational;
-    `discarded` counts solutions of the equations that do not commute; `every_g_commutes` is True if f = 0, and then
-    nothing is listed; `undecided` has a message on each open question.
+    `discarded` counts solutions of the equations whose maps do not commute; `every_g_commutes` is True if f = 0, and
+    then no g is listed; `undecided` has a message on each open question.
     """
 
     _parts, _noun = "nontrivial", ("commuting system", "commuting systems")
@@ -145,7 +144,7 @@ class CommutingSystems(PrintableResult):
 
     @property
     def kind_text(self) -> str:
-        """The kind of g that were searched."""
+        """A phrase for the fields g among which the search ran."""
         over = f" over the number field of a {self.root}" if self.root else ""
         if self.shape == "linear":
             return f"fields g = B f (B a constant {'matrix' if over else 'rational matrix'}{over})"
@@ -153,7 +152,7 @@ class CommutingSystems(PrintableResult):
 
     @property
     def nontrivial(self) -> list[CommutingField]:
-        """The single solutions other than 0, f and -f."""
+        """The isolated solutions other than 0, f and -f."""
         return [g for g in self.solutions if not g.trivial]
 
     @property
@@ -167,7 +166,7 @@ class CommutingSystems(PrintableResult):
         return [{"g": ", ".join(g.rhs), "verdict": str(g.finding.verdict)} for g in self.nontrivial]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data, the shape that scripts rely on."""
+        """Plain data."""
         return {
             **attributes(self, "shape"),
             "status": "complete" if self.complete else "undecided",
@@ -191,17 +190,17 @@ def commuting_systems(
 ) -> CommutingSystems:
     """Find all rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
-    Exact over Q. A solution that no lemma proves is supported at random points.
+    Exact over Q. A solution is proved by a lemma, or else supported at random points.
 
     Args:
-        system: f.
+        system: f, a quadratic system over Q.
         shape: "linear" for g = B f with a constant matrix B; "quadratic" for any g of degree at most 2; None for
             "quadratic" if the dimension is at most 3 and a short search finds all of them, else "linear" with a `note`.
         seed: the random seed.
         error_bits: a supported solution is wrong with a probability below 2^-error_bits.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message at each stage.
-        on_result: called with the solutions so far after each, for searches that may be interrupted.
+        on_result: called with the solutions so far after each new one, for searches that may be interrupted.
         C: a matrix with C f' = f' C; only g with C g' = g' C are searched.
 
     Returns:
@@ -305,7 +304,7 @@ class _Search:
                 self._report()
 
     def _report(self) -> None:
-        """Hand over a copy of the solutions so far."""
+        """Call `on_result` with a copy of the solutions so far."""
         result = self.result
         lists: dict[str, Any] = {"solutions": [*result.solutions], "families": [*result.families]}
         self.on_result(replace(result, **lists, undecided=[*result.undecided, UNFINISHED]))
@@ -356,7 +355,7 @@ class _Search:
                 self._report_unsolved(component, solutions.reason)
 
     def _report_unsolved(self, part: SolutionComponent, reason: str) -> None:
-        """Report equations that were not solved; after a few, only that there are more."""
+        """Report equations that were not solved: the first few, then only that there are more."""
         texts = [format_polynomial(p) for p in part.equations]
         shown = "; ".join(f"{text if len(text) < 200 else text[:200] + '...'} = 0" for text in texts[:6])
         message = f"equations for b1, ..., b{len(part.values)} were not solved over Q ({reason}): {shown}"

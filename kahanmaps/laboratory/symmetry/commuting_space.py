@@ -1,13 +1,13 @@
 """The quadratic fields g whose flow commutes with that of f: [f, g] = f' g - g' f = 0, exact linear algebra over Q.
 
-Where the Kahan maps of f and g commute for every eps, the bracket vanishes, since it is the first term of the
-commutator in eps. So every commuting system is in this space.
+If the Kahan maps of f and g commute for every eps, the bracket vanishes, since it is the first term of the commutator
+in eps. So every commuting system is in this space.
 
-Inside it further equations hold. Both maps are power series in eps at a fixed rational point x, the coefficients
-polynomials in the b of g = b_1 g_1 + ... + b_l g_l. So is the difference Phi_f(Phi_g(x)) - Phi_g(Phi_f(x)), and every
-coefficient of it is an equation for b that holds exactly. The first one, at eps^2, is the bracket. The Kahan map is the
-flow over the time h = 2 eps of the field f + h^2 f_2 + ..., f_2 = f'f'f/12 - f''(f, f)/6; where the bracket vanishes,
-the next equations, at eps^4, are cubic in b: [f_2, g] + [f, g_2] = 0.
+In this space further equations hold. At a fixed rational point x both maps are power series in eps whose coefficients
+are polynomials in the b of g = b_1 g_1 + ... + b_l g_l. So is the difference Phi_f(Phi_g(x)) - Phi_g(Phi_f(x)), and
+every coefficient of it is an equation for b that holds exactly. The first one, at eps^2, is the bracket. The Kahan map
+is the flow over the time h = 2 eps of the field f + h^2 f_2 + ..., f_2 = f'f'f/12 - f''(f, f)/6; where the bracket
+vanishes, the next equations, at eps^4, are cubic in b: [f_2, g] + [f, g_2] = 0.
 """
 
 from __future__ import annotations
@@ -79,8 +79,7 @@ def commutator_equations(
     rng: random.Random,
     budget: Budget,
 ) -> list[fmpq_mpoly]:
-    """Return equations that hold for b if the Kahan maps of f and g = sum `weights[i]` `basis[i]` commute for every
-    eps.
+    """Return equations that hold for b if the Kahan maps of f and g = sum weights[i] basis[i] commute for every eps.
 
     `weights` are polynomials in b. Exact: coefficients of eps^2, ..., eps^order of the commutator at small random
     integer points, until two consecutive points give no new equation or the `budget` is spent. Returns linearly
@@ -144,8 +143,8 @@ class _SeriesMap:
 class CommutingSpace:
     """A basis of all g with [f, g] = 0, f itself first; `matrices` are the B with g = B f (shape linear), else empty.
 
-    Where the components of f are dependent B is not unique, and one of several is given. If `dimension` is more than
-    the number of fields, the space is too large: its dimension is at most that, and f alone is kept.
+    If the components of f are dependent, B is not unique, and one of several is given. If `dimension` exceeds the
+    number of fields, the space is too large: `dimension` is an upper bound, and f is the only field.
     """
 
     fields: tuple[QuadraticSystem, ...]
@@ -160,10 +159,9 @@ def unknowns(system: QuadraticSystem, shape: str) -> int:
 
 
 def commuting_space(f: QuadraticSystem, shape: str, seed: int = 0, C: fmpq_mat | None = None) -> CommutingSpace:
-    """Compute all g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"). Exact; f is not
-    zero.
+    """Compute all g with [f, g] = 0, of the shape g = B f ("linear") or any quadratic g ("quadratic"); exact.
 
-    With a matrix C, for which C f' = f' C, only those g with C g' = g' C.
+    f is not 0. With a matrix C such that C f' = f' C, only the g with C g' = g' C are computed.
 
     The conditions are taken at random integer points, and the result is verified as an identity of polynomials.
     Source: petrera-suris-2016.

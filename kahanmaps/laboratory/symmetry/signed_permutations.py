@@ -2,9 +2,9 @@
 
 With (S x)_{p(i)} = s_i x_i the condition f(S x) = sign S f(x) is a set of equations between single coefficients. In
 scaled variables y_i = e_i x_i, e_i > 0, for which the logarithms of the coefficients have the least sum of squares, the
-numbers s_i are 1 or -1: S takes this scaling to another one with this property, and it is unique up to scalings that do
-not change f. So signed permutations are searched with the scaled coefficients, whose logarithms are rational
-combinations of those of coprime integers. Matrices S that are not rational in x are dropped.
+numbers s_i are 1 or -1: S maps this scaling to another one with this property, and such a scaling is unique up to
+scalings that do not change f. So signed permutations are searched with the scaled coefficients, whose logarithms are
+rational combinations of those of coprime integers. Matrices S that are not rational in x are dropped.
 
 The search is a backtracking over images of the variables, and drops a choice at the first equation that fails.
 """
@@ -33,7 +33,7 @@ def signed_permutations(f: QuadraticSystem, sign: int, budget: Budget) -> tuple[
     """Search for S with f_2(S x) = sign S f_2(x), where f_2 are the quadratic terms, or the linear ones.
 
     Exact. If infinitely many S differ by scalings that do not change f_2, only the signed permutations for one scaling
-    of the variables are returned, for the given variables if these have any. Returns the matrices, and whether these
+    of the variables are returned: for the given variables, if there are any. Returns the matrices, and whether these
     are all: the search stops after 1000 matrices, and when the `budget` is spent.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "4*y^2 + 1"])
@@ -119,7 +119,7 @@ def _exponent(number: fmpz, b: fmpz) -> int:
 def _signed_permutations_of(
     numbers: dict[tuple[int, ...], int], n: int, sign: int, budget: Budget
 ) -> Iterator[list[tuple[int, int]] | None]:
-    """Yield the signed permutations that preserve a table of numbers, as images and signs; None at a spent budget."""
+    """Yield the signed permutations that preserve a table of numbers, as images and signs; None over the budget."""
     size = len(next(iter(numbers), (0, 0)))
     # The equations that contain a variable and no later one, each once; those that fail most often come first.
     equations = [

@@ -39,7 +39,7 @@ MATRICES = "rational matrices"
 
 @dataclass(frozen=True)
 class Symmetry(ResultPart):
-    """T(x) = S x + r with T Phi T^{-1} = Phi, or Phi^{-1} where it is `reversing`; for every eps."""
+    """An affine T(x) = S x + r with T Phi T^{-1} = Phi or, if it is `reversing`, Phi^{-1}; for every eps."""
 
     variables: tuple[str, ...]
     S: fmpq_mat
@@ -70,7 +70,7 @@ class Symmetry(ResultPart):
 class Infinitesimal(ResultPart):
     """A field S x + s with f'(x)(S x + s) - S f(x) = weight f(x).
 
-    Its flow T_t gives T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps): a symmetry where the weight is 0.
+    Its flow T_t satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps): a symmetry if the weight is 0.
     """
 
     variables: tuple[str, ...]
@@ -95,13 +95,13 @@ class Infinitesimal(ResultPart):
 
 @dataclass
 class Symmetries(PrintableResult):
-    """The symmetries that were found, and the searches that were completed.
+    """The result of `linear_symmetries`: the symmetries of a Kahan map, and the searches that were completed.
 
-    `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;
-    `signed` are all signed permutations (with a translation where needed), of the variables or of scaled ones (see
-    signed_permutations.py), `others` further linear symmetries.
-    `generators` generate a group whose linear parts are `order` matrices (None: not known): those of `signed`, or of
-    `others` as well where there are no infinitesimal symmetries, so that all are finite in number: see `group_of`.
+    `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None; `signed`
+    are all signed permutations (with a translation where needed), of the variables or of scaled ones (see
+    signed_permutations.py), `others` further linear symmetries. `generators` generate a group with `order` different
+    linear parts (None: not known): that of `signed` or, without infinitesimal symmetries, that of `signed` and
+    `others`; `group_of` says which.
     """
 
     _parts, _noun = "generators", ("generator", "generators")
@@ -132,7 +132,7 @@ class Symmetries(PrintableResult):
 
     @property
     def group_text(self) -> str:
-        """The group in words: 4 signed permutations, 2 of them reversing; empty for the trivial group."""
+        """The group in words, e.g. "4 signed permutations, 2 of them reversing"; empty for the trivial group."""
         if self.order is None or self.order == 1:
             return ""
         return f"{self.order} {self.group_of}, {self.reversing_order or 'none'} of them reversing"
@@ -152,7 +152,7 @@ class Symmetries(PrintableResult):
         return [{"kind": t.kind, "action": t.text} for t in (*self.symmetries, *self.reversing)]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data, the shape that scripts rely on."""
+        """Plain data."""
         signed = self.group_of != MATRICES
         forward = sum(not t.reversing for t in self.signed) if signed else (self.order or 0) - self.reversing_order
         group = {
@@ -182,11 +182,18 @@ def linear_symmetries(
 ) -> Symmetries:
     """Find affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
 
-    The search covers the Lie algebra of affine symmetries, and a scaling; signed permutations, also of scaled
-    variables, with a translation where needed (dimension at most 12); in dimension at most 3, where that algebra has no
-    linear element, all rational matrices. The result is exact and proved. Each increase of `effort` by 1 doubles the
-    work that the search may take. `on_result` is called once, with the result that the stages then fill.
-    Source: cmoq-2013.
+    The search covers the Lie algebra of affine symmetries, a scaling, and signed permutations, also of scaled
+    variables, with a translation where needed (dimension at most 12). In dimension at most 3 it covers all rational
+    matrices, if the Lie algebra has no linear element.
+
+    Args:
+        system: a quadratic system over Q.
+        effort: each increase by 1 doubles the work limit.
+        progress: called with a message at each stage.
+        on_result: called once, with the result, to which the later stages add.
+
+    Returns:
+        A `Symmetries`, exact and proved. Source: cmoq-2013.
 
     >>> symmetries = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
     >>> symmetries.order, [t.text for t in symmetries.generators]
@@ -371,7 +378,7 @@ def is_symmetry(system: QuadraticSystem, S: fmpq_mat, r: Sequence[fmpq], sign: i
 
 
 def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> tuple[fmpq, ...] | None:
-    """An r with f(S x + r) = sign S f(x), 0 if possible; None if none that is rational was found.
+    """Return an r with f(S x + r) = sign S f(x), 0 if possible; None if no rational r was found.
 
     Source: cmoq-2013.
 
@@ -411,8 +418,8 @@ def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, budget: Budget) -> t
 def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:
     """Return polynomials in the entries of S that vanish if S is invertible and f(S x) = sign S f(x) for all x.
 
-    `S` holds the generators of a ring, row by row. The divergence of f must be invariant under an invertible S as well:
-    this follows, and is linear in S.
+    `S` holds the generators of a ring, row by row. The equations contain the invariance of the divergence of f, which
+    follows from them if S is invertible and is linear in S.
 
     >>> s = ring(["s"]).gens()[0]
     >>> matrix_equations(QuadraticSystem.from_text(["x"], ["x^2"]), [[s]], 1)

@@ -3,8 +3,8 @@
 With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's method is equivariant under affine changes of
 variables: the map of f at eps is that of g at eps/c. Only some P are tried: permutations of the variables, scaled up to
 dimension 5, after a change to a frame that f determines (invariant hyperplanes, lines of fixed points), and in the
-plane all P. Parameters of g are unknowns too. An equivalence that is found is verified exactly; if none is found, there
-may still be one.
+plane all P. Parameters of g are unknowns too. Every equivalence is verified exactly; if none is found, one may still
+exist.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ Monomials = frozenset[tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Equivalence(ResultPart):
-    """The change of variables y = P x + q, with eps/c for eps, to a system of the catalogue with these parameters."""
+    """An affine equivalence with a system of the catalogue at these parameters: y = P x + q, and eps becomes eps/c."""
 
     name: str
     parameters: dict[str, fmpq]
@@ -80,7 +80,7 @@ def equivalent_system(
 
     Args:
         system: a quadratic system; for a system of the catalogue itself, None is returned.
-        fixed: its fixed points, if they are known; lines of fixed points give frames.
+        fixed: the fixed points of the system, if they are known; lines of fixed points give frames.
         effort: each increase by 1 doubles the work limit.
 
     Returns:
@@ -235,7 +235,7 @@ def _equivalence_equations(
 ) -> tuple[list[fmpq_mpoly], list[fmpq_mpoly]]:
     """Return the coefficients of g(P x + q) - c P f(x), those of degree 2 in x separately from the others.
 
-    The equations for the divergences are added: they follow, and have lower degree in the unknowns.
+    The equations for the divergences are added: they follow from the others, and have lower degree in the unknowns.
     """
     n = f.dim
     joint = ring([*(f"x{i}" for i in range(n)), *unknowns.names()])
@@ -271,7 +271,7 @@ def _points(
     budget: Budget,
     depth: int = 0,
 ) -> Iterator[list[fmpq]]:
-    """Yield rational solutions, one from each family: the `values` where the equations for their variables hold."""
+    """Yield rational solutions, one from each family; a solution is the `values` at a zero of the equations."""
     context = values[0].context()
     solved = solve_system([p for p in equations if not p.is_zero()], values, budget)
     for component in solved.components:

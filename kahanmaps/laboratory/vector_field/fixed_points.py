@@ -41,8 +41,8 @@ _KINDS = {1: "line", 2: "plane"}
 class FixedPoints(ResultPart):
     """A point, or a set of points: `coordinates` in some of the variables, for which `equations` vanish.
 
-    `dimension` is that of the set, `count` the number of its points over the complex numbers, None where they are
-    infinitely many; `eigenvalues` the characteristic polynomial of f' there, in `eigenvalue` and these variables.
+    `dimension` is that of the set, `count` the number of its points over the complex numbers, None if there are
+    infinitely many; `eigenvalues` is the characteristic polynomial of f' there, in `eigenvalue` and these variables.
     """
 
     coordinates: tuple[fmpq_mpoly, ...]
@@ -75,7 +75,7 @@ class FixedPoints(ResultPart):
         return f"{self.where}, eigenvalues of f': {self.eigenvalues_text} = 0"
 
     def are_fixed_by_map(self, eps: fmpq | None) -> bool | None:
-        """Whether det(I - eps f') is not 0 at these points: True at all, False at none, None at some or not known.
+        """Whether det(I - eps f') is not 0 at these points: True (at all), False (at none) or None (mixed or unknown).
 
         Args:
             eps: an exact number, or None for all but finitely many.
@@ -107,7 +107,7 @@ class FixedPoints(ResultPart):
 
 @dataclass(frozen=True)
 class FixedPointSearch(ResultPart):
-    """All fixed points, rational ones first; `undecided` is the reason why some may be missing, or empty."""
+    """All fixed points, rational ones first; `undecided` says why some may be missing, and is empty if none are."""
 
     found: tuple[FixedPoints, ...]
     undecided: str
@@ -138,8 +138,7 @@ class FixedPointSearch(ResultPart):
 def fixed_points(system: SystemLike, effort: int | Budget = 1) -> FixedPointSearch:
     """Compute all equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
 
-    Each increase of `effort` by 1 doubles the work that the search may take; above dimension 6 nothing is searched.
-    What may be missing is reported in `undecided`.
+    Each increase of `effort` by 1 doubles the work limit; there is no search above dimension 6. See `undecided`.
 
     >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
     >>> print(fixed_points(pendulum))

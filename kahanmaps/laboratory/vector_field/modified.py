@@ -47,9 +47,9 @@ Field = tuple[fmpq_mpoly, ...]
 class SurvivingIntegral:
     """An integral I of the flow of f, and its continuation I + eps^2 I_2 + ... as an integral of the modified field.
 
-    `corrections` are I_2, I_4, ... up to `order`. `verdict` is "survives", up to the requested order, "lost", if there
-    is no polynomial correction of degree at most `degree` at eps^(order + 2), for any choice of the earlier ones, or
-    "not examined", if the linear equations for the next one are too large. All are exact.
+    `corrections` are I_2, I_4, ... up to `order`. `verdict` is "survives" (up to the requested order), "lost" (no
+    polynomial correction of degree at most `degree` exists at eps^(order + 2), for any choice of the earlier ones) or
+    "not examined" (the linear equations for the next correction are too large). All are exact.
     """
 
     integral: fmpq_mpoly
@@ -92,18 +92,18 @@ class ModifiedField(ResultPart):
             "variables": list(self.file.variables),
             "field": [{"order": k, "rhs": plain(self.fields[k])} for k in even],
             "hamiltonian": [{"order": k, "term": plain(self.hamiltonian[k])} for k in even if self.hamiltonian],
-            "flow_integrals": [attributes(found, *names) for found in self.integrals],
+            "flow_integrals": [attributes(integral, *names) for integral in self.integrals],
         }
 
     def lines(self) -> list[str]:
-        """Return the series and sentences as lines of cells, separated by tabs; long polynomials are counted only."""
+        """Return the series and sentences as lines of cells separated by tabs; long polynomials are given by size."""
         lines = []
         for k in range(2, self.order + 1, 2):
             for name, component in zip(self.file.variables, self.fields[k], strict=True):
                 lines.append(f"eps^{k}\t{name}'\t{_short(component)}")
         for k in range(0, self.order + 1 if self.hamiltonian else 0, 2):
             lines.append(f"eps^{k}\tmodified H\t{_short(self.hamiltonian[k])}")
-        lines += [f"proved\t{_short(found.integral)}\t{found.sentence}" for found in self.integrals]
+        lines += [f"proved\t{_short(integral.integral)}\t{integral.sentence}" for integral in self.integrals]
         nothing = [] if self.integrals else ["no polynomial integral of the flow is known, or found by a search"]
         return lines + nothing
 
@@ -210,7 +210,7 @@ def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> lis
         candidates.append(file.hamiltonian.H)
     functions = [normalized(function, file.dim).leading for function in measured_integrals(file).values()]
     progress("searching for integrals of the flow")
-    functions += [found.function for found in find_integrals(file, flow=True, effort=_EFFORT).integrals]
+    functions += [integral.function for integral in find_integrals(file, flow=True, effort=_EFFORT).integrals]
     for function in functions:
         if function is not None and function.denominator.is_constant():
             candidates.append(function.numerator.project_to_context(context))
@@ -229,8 +229,8 @@ def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> lis
 def _continued(integral: fmpq_mpoly, fields: Sequence[Field], order: int) -> SurvivingIntegral:
     """Return how far an integral of the flow can be continued by polynomials.
 
-    All corrections up to an order are unknowns of one linear system: that at a higher order may require another choice
-    of the earlier ones, which are determined up to integrals of the flow.
+    All corrections up to an order are unknowns of one linear system, since the next correction may require another
+    choice of the earlier ones, which are determined only up to integrals of the flow.
     """
     names = fields[0][0].context().names()
     context, top = ring(names), degree(integral)

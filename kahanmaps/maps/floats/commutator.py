@@ -27,8 +27,8 @@ class Commutator:
     """Measured sizes of Phi_g(Phi_f^n(x)) - Phi_f^n(Phi_g(x)), relative to the largest coordinate (at least 1).
 
     `by_step` are pairs (n, size) for n = 1, 2, 4, ... and the last step, `largest` is the largest of all steps.
-    `by_eps` are pairs (eps, size) at n = 1 for eps and its halves; `slope` is that of the last two above rounding, None
-    where there are none. `message` says why the orbit ended early; it is empty for a complete one.
+    `by_eps` are pairs (eps, size) at n = 1 for eps and its halves; `slope` is the slope of log size against log eps
+    between the last two sizes above rounding error, None without two. `message` says why the orbit ended early.
     """
 
     by_step: tuple[tuple[int, float], ...]
@@ -70,7 +70,7 @@ def commutator(f: MapFamily, g: MapFamily, eps: Any, start: Sequence[Any], steps
         eps: an exact number, half the time step where there is one.
         start: the initial point, exact numbers.
         steps: the number of steps, at least 1.
-        ratio: the eps of g in that of f.
+        ratio: the quotient of the eps of g and that of f.
 
     >>> from kahanmaps.maps.kahan import as_map
     >>> from kahanmaps.systems.quadratic import QuadraticSystem

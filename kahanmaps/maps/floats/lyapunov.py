@@ -45,10 +45,10 @@ _MIN_COMPILED_WORK = 10_000  # orbits times steps below which compiling does not
 class Lyapunov(ResultPart):
     """The Lyapunov exponents of an ensemble in floating point, largest first.
 
-    `unit` is the time of a step: 2 eps, or 1 for a map without a time step, whose exponents are per step. `exponents`
-    (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them; `half` are the
-    exponents over the first half of the steps, which show how far they have converged. `log_volume` is the mean of
-    log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. `ended` is the
+    `unit` is the time of a step: 2 eps, or 1 for a map without a time step, so that its exponents are per step.
+    `exponents` (orbits, dim) are per unit of time, over all counted steps, for the orbits that completed them; `half`
+    are the exponents over the first half of the steps, which show how far they have converged. `log_volume` is the mean
+    of log |det dPhi| per unit of time, computed independently; it should be the sum of the exponents. `ended` is the
     number of orbits that overflowed or reached a pole; they are excluded. `steps` is the number of counted steps, after
     `transient` uncounted ones; fewer than requested if `stopped` by a time limit.
     """

@@ -1,4 +1,4 @@
-"""A .npy file to which float orbits are appended as they are computed, and which is valid at all times.
+"""A .npy file to which float orbits are appended as they are computed, and which is valid at every time.
 
 A .npy file is a header with the shape, followed by the numbers. numpy reserves space in the header for the first length
 to grow, so a portion is appended in two writes: first the numbers, then the header with the new length, in place. A

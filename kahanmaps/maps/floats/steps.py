@@ -6,8 +6,7 @@ blocks (planar_blocks.py), and the same equation decomposes into blocks of two r
 pivot is small (straight_line_program.py); such steps are counted, and the orbit continues. An orbit ends as *singular*
 if a pivot is 0, and as *overflow* if an intermediate number or a coordinate of the image is not finite.
 
-With the same kernel results are reproducible to the last bit, whatever the number of orbits and threads and the size
-of the portions.
+With the same kernel results are reproducible to the last bit, for any number of orbits and threads and any portions.
 """
 
 from __future__ import annotations
@@ -178,7 +177,7 @@ def float_equation(map_over: ElementaryMap) -> FloatEquation:
     products: list[tuple[int, int]] = []
 
     def place(exponent: tuple[int, ...]) -> int:
-        """Return the index in y of a monomial."""
+        """Return the index of a monomial in the vector y."""
         if exponent not in index:
             last = max(k for k, e in enumerate(exponent) if e)
             smaller = place((*exponent[:last], exponent[last] - 1, *exponent[last + 1 :]))
@@ -281,8 +280,8 @@ class BatchState(NamedTuple):
     """The states of a batch of n orbits, one per column, and the status of each.
 
     `z` has the shape (rows, n). `failed_at` is the index of the first iterate that does not exist, `near` the number of
-    near-singular steps, `near_at` the index of the point at the first of them (-1: none). The column of an orbit that
-    has ended is 0.
+    near-singular steps, `near_at` the index of the point at the first of them (-1: none). Columns of ended orbits are
+    0.
     """
 
     z: FloatArray

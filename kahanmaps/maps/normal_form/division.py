@@ -2,8 +2,8 @@
 
 On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
 gamma = 1 - disc(h) level^2 (docs/mathematics.md, "A translation, and tau functions"). So it has period N on the smooth
-levels where psi_N(gamma) = 0 and no psi_d does for a d < N. By Mazur's theorem no rational gamma has a period of 11 or
-more than 12. Source: ward-1948 for the recurrence, mazur-1977.
+levels with psi_N(gamma) = 0 and psi_d(gamma) != 0 for all d < N. By Mazur's theorem the period at a rational gamma is
+neither 11 nor more than 12. Source: ward-1948 for the recurrence, mazur-1977.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _GAMMA = fmpz_poly([0, 1])
 class PeriodicLevels:
     """The levels with period N: psi_N, its factor for the exact period N, and the rational gamma with that period.
 
-    `psi` is without the factor gamma^(1/3) that it has where 3 divides N.
+    `psi` is psi_N without the factor gamma^(1/3) that occurs if 3 divides N.
     """
 
     period: int
@@ -40,7 +40,7 @@ class PeriodicLevels:
 
     @cached_property
     def primitive(self) -> fmpz_poly:
-        """psi_N without the factors that it shares with psi_d for a proper divisor d of N, its content taken out."""
+        """The primitive part of psi_N, without the factors that it shares with psi_d for proper divisors d of N."""
         polynomial, table = self.psi, division_polynomials(self.period)
         for d in range(1, self.period):
             if self.period % d == 0:
@@ -50,15 +50,14 @@ class PeriodicLevels:
 
     @cached_property
     def gammas(self) -> tuple[fmpq, ...]:
-        """The rational gamma with the exact period N, in increasing order; 0 and 1, where E is not smooth, left out."""
+        """The rational gamma with the exact period N, in increasing order, without 0 and 1, where E is not smooth."""
         roots = (-fmpq(f[0], f[1]) for f, _ in self.primitive.factor()[1] if f.degree() == 1)
         return tuple(sorted(root for root in roots if root != 0 and root != 1))
 
     def squares(self, discriminant: fmpq, eps: fmpq) -> tuple[fmpq, ...]:
-        """Return for each of `gammas` the square of the value of h/(1 + eps^2 D) on that level, in a plane with this
-        disc(h).
+        """Return for each of `gammas` the square of h/(1 + eps^2 D) on that level, in a plane with this disc(h).
 
-        The levels are real where it is positive. Raises InputError for disc(h) = 0 or eps = 0.
+        The levels with a positive square are real. Raises InputError for disc(h) = 0 or eps = 0.
 
         >>> PeriodicLevels(5).squares(fmpq(-27), fmpq(1, 2))
         (5/729,)
@@ -77,7 +76,7 @@ def division_polynomials(largest: int) -> list[fmpz_poly]:
     psi = [fmpz_poly([c]) for c in (0, 1, 2, 3, 4)]
 
     def product(n: int, indices: tuple[int, ...]) -> fmpz_poly:
-        """The product of psi at these indices, as a term of psi_n: with gamma for each three cube roots too many."""
+        """The product of psi at these indices, as a term of psi_n: three surplus cube roots make a factor gamma."""
         cube_roots = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
         value = _GAMMA ** (cube_roots // 3)
         for k in indices:

@@ -25,7 +25,7 @@ _CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is it
 class NthIterate:
     """Iterates of Phi(., eps) over QQ, GF(p) or real balls in a normal form; the time step is 2 eps.
 
-    Raises BadPrime where the normal form has no reduction modulo p.
+    Raises BadPrime if the normal form has no reduction modulo p.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
@@ -48,9 +48,9 @@ class NthIterate:
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
 
-        Raises SingularStep where the map is not defined: over Q at any step, elsewhere at one of the first few or the
-        last; PrecisionLost for balls that are too wide; OverBudget, over Q, where an orbit that is stepped has numbers
-        of more than `max_bits` bits before it is there, and before it meets a pole.
+        Raises SingularStep if the map is not defined at a step: over Q at any step, elsewhere at one of the first few
+        or the last. Raises PrecisionLost for balls that are too wide and, over Q, OverBudget if the orbit has numbers
+        of more than `max_bits` bits before step n and before a pole.
         """
         if n < 0:
             raise InputError(f"found the step {n}, expected 0 or more (for the inverse map, change the sign of eps)")
@@ -100,7 +100,7 @@ class NthIterate:
 def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any]) -> str:
     """Return why the orbit of a rational initial point is special in a plane, which balls cannot decide; or "".
 
-    Special are planes in which the start is at rest, or on a singular level cubic (delta is 0 or 1).
+    A plane is special if the initial point is a fixed point there, or lies on a singular level cubic (delta is 0 or 1).
     """
     from kahanmaps.maps.normal_form.splitting import Splitting
 
@@ -108,9 +108,9 @@ def special_start(normal_form: SystemNormalForm, eps: Any, start: Sequence[Any])
     for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
         numerator, denominator = plane.block.level((U, V, W))
         if plane.block.is_zero or (U == 0 and V == 0):
-            return f"the start is at rest in the plane {plane.name}"
+            return f"the initial point is fixed in the plane {plane.name}"
         if denominator == 0 or numerator == 0 or plane.block.discriminant == 0:
-            return f"the start is on a singular level in the plane {plane.name}"
+            return f"the initial point is on a singular level in the plane {plane.name}"
         if plane.block.discriminant * numerator * numerator == denominator * denominator:
-            return f"the start is on three lines in the plane {plane.name}"
+            return f"the initial point is on three lines in the plane {plane.name}"
     return ""

@@ -148,8 +148,9 @@ class LevelCubic:
     def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
         """Return whether P is a multiple of T, which has this order; None if it is not known.
 
-        It is none if order P is not zero. Otherwise, for every prime l that divides both the order and the index of
-        the multiples of T, the parts of P and T of l-power order are compared by one logarithm; the others agree.
+        It is not if `order` P is not zero. Otherwise, for every prime l that divides both the order of T and the index
+        of its multiples in the group, one discrete logarithm compares the parts of P and T of l-power order; for other
+        primes nothing is to be compared.
         """
         if not self.is_zero(self.multiple(order, P)):
             return False

@@ -1,16 +1,16 @@
-"""The exact period of an orbit of a family member: over GF(p) without walking it, over Q with a proof.
+"""The exact period of an orbit of a family member: over GF(p) without computing the orbit, over Q with a proof.
 
-In every plane of the normal form the Kahan map is a translation of the level cubic (planar_block.py), and its
-period is the order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, the same for all
-points of a level. Over a field of q elements a multiple of it lies in the Hasse interval q + 1 +- 2 sqrt(q), where baby
-steps and giant steps find it, about q^(1/4) of each; in large fields Schoof's algorithm narrows the interval first. The
+In every plane of the normal form the Kahan map is a translation of the level cubic (planar_block.py), and its period is
+the order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, the same for all points of
+a level. Over a field of q elements the Hasse interval q + 1 +- 2 sqrt(q) contains a multiple of this order, which about
+q^(1/4) baby steps and as many giant steps find; in large fields Schoof's algorithm narrows the interval first. The
 period of the orbit is the least common multiple.
 
-The translation is defined also at the poles of the map, where W = 0. Whether an orbit meets a pole is decided too.
-On a smooth level the poles are the points (U : V : 0) with h(U, V) = 0. Without a root of h in the field there are
-none; otherwise the question is whether P - (U : V : 0) is a multiple of T.
+The translation is defined also at the poles of the map, where W = 0. Whether an orbit meets a pole is decided too. On a
+smooth level the poles are the points (U : V : 0) with h(U, V) = 0. If h has no root in the field, there are none;
+otherwise the orbit of P meets a pole if and only if P - (U : V : 0) is a multiple of T.
 
-Levels with a singular cubic have their own, elementary answers: see `Kind`.
+On singular level cubics the period is elementary: see `PeriodKind`.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class PeriodKind(StrEnum):
 class PlanePeriod:
     """The period in one plane, over a field of `q` elements (0: of characteristic 0).
 
-    `period` is None where there is none (`status` "aperiodic" or "undefined") or it was not found ("undecided").
+    `period` is None if there is none (`status` "aperiodic" or "undefined") or it was not found ("undecided").
     `meets_pole` says whether the orbit runs into a pole of the map, or starts at one; None: not known.
     """
 
@@ -122,8 +122,8 @@ def orbit_period(
 ) -> OrbitPeriod:
     """Compute the exact period modulo p of the orbit of `start` under the Kahan map at `eps`, half the time step.
 
-    The period of a plane over a field of more than `largest` elements is "undecided". Raises BadPrime
-    where the member has no normal form modulo p, InputError for a wrong start.
+    The period in a plane over a field of more than `largest` elements is "undecided". Raises BadPrime if the normal
+    form has no reduction modulo p, InputError for an initial point of another dimension.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form
@@ -272,8 +272,8 @@ def period_of(
 ) -> OrbitPeriod:
     """Compute the period of the orbit of `start`, in the coordinates of the system, modulo a prime or (None) over Q.
 
-    `normal_form` is that of the system (family.system_normal_form) or, where the coordinates are its own, of a member.
-    The other arguments and the results are those of `orbit_period` and `period_over_rationals`.
+    `normal_form` is that of the system (family.system_normal_form), or of a member in the same coordinates. The other
+    arguments and the results are those of `orbit_period` and `period_over_rationals`.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.system_normal_form import system_normal_form
@@ -312,9 +312,16 @@ def period(
     time_step: Any = None,
     h: Any = None,
 ) -> OrbitPeriod:
-    """Compute the period of an orbit of the Kahan map of a system that has a normal form: see `period_of`.
+    """Compute the period of an orbit of the Kahan map of a system with a normal form, modulo a prime or over Q.
 
-    Raises InputError where it has none, with the reason.
+    Args:
+        system: a system that has a normal form, for example a member of the commuting family.
+        start, x0: the initial point, exact numbers.
+        eps, time_step, h: half the time step, or the time step 2 eps; exact.
+        prime: a prime, for the period modulo this prime; None for that over Q.
+
+    Returns:
+        An `OrbitPeriod`, exact or proved. Raises InputError, with the reason, if there is no normal form.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> str(period(QuadraticSystem.from_text(["x", "y"], ["2*x*y", "-x^2 - y^2"]), [1, 2], "1/10").status)
@@ -325,7 +332,7 @@ def period(
 
 
 def normal_form_and_start(system: SystemLike, eps: Any, start: Any) -> tuple[SystemNormalForm, Any, Sequence[Any]]:
-    """Return the normal form with eps and the initial point. Raises InputError where one of them is missing."""
+    """Return the normal form with eps and the initial point. Raises InputError if one of them is missing."""
     normal_form = system_normal_form(system)
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
@@ -336,11 +343,11 @@ def normal_form_and_start(system: SystemLike, eps: Any, start: Any) -> tuple[Sys
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:
-    """Compute the period over Q of the orbit of `start` under the Kahan map at `eps` (the time step is 2 eps), or prove
-    that there is none.
+    """Compute the period over Q of the orbit of `start` under the Kahan map at `eps`, or prove that it is aperiodic.
 
-    Reduction modulo an unramified odd prime of good reduction is injective on torsion. So T has infinite order if it
-    has different orders modulo two such primes; where they agree, n T = 0 is tested over the field itself.
+    `eps` is half the time step, exact. Reduction modulo an unramified odd prime of good reduction is injective on
+    torsion. So T has infinite order if it has different orders modulo two such primes; if the orders agree, n T = 0
+    is tested over the field itself.
 
     >>> from kahanmaps.family.random_members import random_member_with_eigenvalues
     >>> from kahanmaps.family.planar import normal_form

@@ -68,7 +68,7 @@ class AlgebraBlock(LevelBlock):
 
     @property
     def primes(self) -> list[fmpz]:
-        """Numbers whose prime factors include all those at which a sum of coordinates may cancel."""
+        """Numbers whose prime factors include all primes at which a sum of coordinates may cancel."""
         return [self.bad]
 
     def bits(self, triple: Triple) -> tuple[int, int]:
@@ -86,11 +86,10 @@ class AlgebraBlock(LevelBlock):
         return int(self.algebra.degree**2 * (largest.bit_length() + self.algebra.degree + 3))
 
     def fraction(self, triple: Triple) -> tuple[list[fmpz], fmpz, fmpz]:
-        """Return numerators of the coefficients of U/W and V/W, the denominator, and an integer whose primes may
-        cancel.
+        """Return numerators of the coefficients of U/W and V/W, the denominator, and a number whose primes may cancel.
 
         A prime of the denominator that is neither bad nor a divisor of the third number has exactly one prime ideal of
-        degree 1 above it that divides W. If W is not rational, the start must have a level.
+        degree 1 above it that divides W. If W is not rational, the level of the initial point must be defined.
         """
         U, V, W = triple
         if W.polynomial.degree() == 0:
@@ -202,8 +201,7 @@ class ShortElements:
     ) -> Triple:
         """Return the sum of scale times term times lift, times `inverse` and a number that makes it integral.
 
-        Terms and result have coefficients in Z[t]; the coefficients of the result and the remaining denominator are
-        coprime.
+        Terms and result have coefficients in Z[t]; those of the result are coprime to the remaining denominator.
         """
         degree = self._algebra.degree
         factors = [(scale * inverse).matrix.numer_denom() for scale in scales]

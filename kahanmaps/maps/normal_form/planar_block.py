@@ -14,8 +14,8 @@ on which Psi is a translation. Let delta = disc(h) level^2. On the Jacobian
 
     y^2 + 6 x y + 16 gamma y = x^3 + 3 gamma x^2,      gamma = 1 - delta,
 
-it is the translation by T = (0, 0); E is singular for delta = 0 and, three lines, for gamma = 0 (docs/mathematics.md).
-Elements may be of any field, or integers: there is nothing here but sums and products.
+it is the translation by T = (0, 0); E is singular for delta = 0 and for gamma = 0, where it consists of three lines
+(docs/mathematics.md). Elements may be of any field, or integers, since only sums and products occur.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class PlanarBlock:
         return b * b * c * c - 4 * (a * c * c * c + b * b * b * d) + 18 * (a * b * c * d) - 27 * (a * a * d * d)
 
     def image(self, point: Sequence[Any]) -> Triple:
-        """Return Psi(U : V : W), with its content; (0, 0, 0) at an indeterminacy point of Psi."""
+        """Return Psi(U : V : W), not reduced by its content; (0, 0, 0) at an indeterminacy point of Psi."""
         U, V, W = point
         UU, UV, VV = U * U, U * V, V * V
         p, q, r = self.D
@@ -64,7 +64,7 @@ class PlanarBlock:
         )
 
     def preimage(self, point: Sequence[Any]) -> Triple:
-        """Return the preimage of (U : V : W) under Psi, with its content."""
+        """Return the preimage of (U : V : W) under Psi, not reduced by its content."""
         U, V, W = point
         first, second, third = self.image((U, V, -W))
         return -first, -second, third

@@ -4,8 +4,8 @@ h and the initial point are scaled such that h is a primitive integer form and (
 factor; the scale contains eps. Psi(P_k) is quadratic in the triple P_k, and its content must be removed: otherwise the
 numbers would double their length with every step. For primes that do not divide 6 disc(h) den(level) the content of
 Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (proved in docs/mathematics.md); this gives the natural
-lifts of `tau`. Single steps remove the content by gcds. They are used for short orbits, and for orbits on singular
-cubics, whose numbers hardly grow.
+lifts of `tau`. Single steps remove it by gcds; they are used for short orbits, and on singular cubics, where numbers
+hardly grow.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ IntegerTriple = tuple[fmpz, fmpz, fmpz]
 
 
 class LevelBlock(ABC):
-    """A plane with an initial point: its level, and whether that is special."""
+    """A plane with an initial point, the level of this point, and whether the level is special."""
 
     block: PlanarBlock
     start: Triple
@@ -109,7 +109,7 @@ class IntegerBlock(LevelBlock):
 
     @property
     def lifts(self) -> tuple[PlanarBlock, Triple, Triple]:
-        """The cubic over Q, and natural lifts of the start and its image; primitive, so that all are but for `bad`."""
+        """The cubic, and primitive natural lifts of the start and its image; so all are primitive outside `bad`."""
         one, points = fmpq(1), list(islice(self.triples(), 2))
         if len(points) < 2:  # a pole
             points.append(primitive(self.block.image(self.start)))
@@ -120,7 +120,7 @@ class IntegerBlock(LevelBlock):
 
     @property
     def primes(self) -> list[fmpz]:
-        """Numbers that contain the primes at which a sum of coordinates may cancel."""
+        """Numbers whose prime factors include all primes at which a sum of coordinates may cancel."""
         assert self.level is not None
         return [self.level.q]
 
@@ -137,7 +137,7 @@ class IntegerBlock(LevelBlock):
     def fixed_number(self, form: Sequence[fmpz]) -> fmpz | None:
         """Return a number whose primes are those at which alpha U + beta V and W may have a common factor.
 
-        None if that may be any prime.
+        None if every prime may divide both.
         """
         alpha, beta = form
         value = self.block.h(beta, -alpha)

@@ -23,7 +23,7 @@ from kahanmaps.algebra.integers import split_by_primes
 from kahanmaps.errors import PrecisionLost
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
-_MULTIPLES = 24  # m, of which the reduction of m T is looked at
+_MULTIPLES = 24  # the largest m for which the reduction of m T is examined
 _LARGE_MULTIPLE = 50  # if some primes are bad for all of them, a multiple from here on is taken
 _SMALL = 3  # coefficients of elements by which the model is reduced
 _TERMS = 40  # of the series, which decrease like 4^-n

@@ -3,9 +3,8 @@
 x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
 product of the W_i take a few multiplications. To reduce them to lowest terms, three kinds of common factors must be
 removed: the gcds of the W_i with each other; the primes of the fixed numbers (denominators of alpha, beta and of the
-level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides
-h(beta, -alpha)); and, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed in each plane
-separately.
+level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides h(beta,
+-alpha)); and, if h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W. Orbits are computed plane by plane.
 """
 
 from __future__ import annotations
@@ -120,7 +119,7 @@ class PlanesPoint:
     def height(self) -> int:
         """The bit length of the largest of the integers over one common denominator in lowest terms; costs a gcd.
 
-        `bits` is a few bits off, and much too high where planes have denominators in common.
+        `bits` differs by a few bits, and is much too large if planes have common denominators.
         """
         if self._height is None:
             numerators, denominator = self.common()
@@ -194,7 +193,7 @@ class PlanesPoint:
         return pairs
 
     def _fractions_of(self, planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> list[tuple[fmpz, fmpz]]:
-        """Return numerators and denominators of all coordinates, from those of the planes or residues."""
+        """Return numerators and denominators of all coordinates, from those of the planes or from residues of these."""
         fractions: dict[int, tuple[fmpz, fmpz]] = {}
         rows = self._assembly.rows
         for support, (numbers, forms) in self._assembly.by_support.items():
@@ -211,7 +210,7 @@ class PlanesPoint:
 
 
 def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fmpz]:
-    """The numerators of planes, each times the W of the others, in one column; and the product of all W."""
+    """Return the numerators of the planes, each times the W of the others, in one column, and the product of all W."""
     *products_before, product = accumulate((W for _, W in planes), mul, initial=fmpz(1))
     products_after = [*accumulate((W for _, W in planes[:0:-1]), mul, initial=fmpz(1))][::-1]
     others = (before * after for before, after in zip(products_before, products_after, strict=True))
@@ -220,7 +219,7 @@ def _scaled(planes: Sequence[tuple[Sequence[fmpz], fmpz]]) -> tuple[fmpz_mat, fm
 
 
 def _common_part(numerator: fmpz, denominator: fmpz, modulus: fmpz) -> fmpz:
-    """Return a common factor of two numbers and the modulus: the greatest one, except for high powers of primes."""
+    """Return the greatest common factor of two numbers and the modulus, except for high powers of primes."""
     common = modulus.gcd(numerator % modulus)
     return common if common == 1 else common.gcd(denominator % common)
 

@@ -1,13 +1,12 @@
 """The n-th iterate over Q, unless the orbit reaches a pole or exceeds its budget before step n.
 
-An orbit is computed exactly while its numbers are short. After that it ends at the same step as an orbit by single
-steps, which is determined as follows.
+An orbit is computed exactly while its numbers are short. Afterwards the step at which single steps would end (at a pole
+or over the budget) is determined as follows.
 
 * Heights are computed at a few steps, at increasing distances. Up to O(1) they are convex functions of the step
   (a polynomial of degree 2, or linear). So if the height is within the budget at two steps, it is within the budget in
   between, and a rise shows where the budget is exceeded at the latest; later steps are irrelevant.
-* Poles up to there are found modulo random primes of 61 bits and verified over Q: a pole over Q is a pole modulo every
-  prime.
+* Poles up to there are found modulo random primes of 61 bits (a pole over Q is one modulo every prime), and verified.
 * The poles of a plane that is periodic, or whose level is parabolic, are known for all steps at once, and its numbers
   stay short. If this holds for all planes, any n can be reached.
 """
@@ -40,7 +39,7 @@ _MAX_BITS, _MAX_MODULAR_STEPS = 1 << 28, 250_000
 
 
 class OverBudget(Exception):
-    """The orbit has numbers longer than allowed at `step` or before, of `bits` bits there; None: not computed."""
+    """The orbit has too long numbers at `step` or before; at `step` they have `bits` bits (None: not computed)."""
 
     def __init__(self, step: int, bits: int | None) -> None:
         self.step, self.bits = step, bits
@@ -105,9 +104,9 @@ class OrbitInPlanes:
         return value
 
     def _step_within_budget(self, n: int) -> tuple[int, PlanesPoint | None, int | None]:
-        """Return (n, value, 0), or for an earlier step over the budget that step, None and its bits (None: not known).
+        """Return (n, value, 0) or, for an earlier step over the budget, that step, None and its bits (None: unknown).
 
-        The value is None if it was not computed, or is at a pole.
+        The value is None if it was not computed, or at a pole.
         """
         step = max(1, min(self._reachable, n - 1))
         target = n if self._numbers_stay_short else _halved(n, step)
@@ -169,7 +168,7 @@ class OrbitInPlanes:
 
 
 def _halved(n: int, step: int) -> int:
-    """The least of n, n/2, n/4, ..., rounded down, that is above the step: tables for n have the values of these."""
+    """The least of n, n/2, n/4, ..., rounded down, that is above the step; tables for n contain the values at these."""
     while n >> 1 > step:
         n >>= 1
     return n
@@ -182,8 +181,8 @@ def _undefined_step(step: int) -> SingularStep:
 class _Plane:
     """The data of the orbit in one plane for all steps: whether its numbers stay short, its period and its pole.
 
-    They stay short if the orbit returns after `period` steps, or if its level is parabolic (`period` is None). `pole`
-    is the first step then that is not defined, None for none.
+    They stay short if the orbit returns after `period` steps, or if its level is parabolic (`period` is None). In these
+    cases `pole` is the first step that is not defined, or None.
     """
 
     def __init__(self, block: PlanarBlock, start: Triple) -> None:

@@ -24,11 +24,11 @@ from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """One plane: `name` says at which root or factor of chi, `degree` is that of its field over the field of x.
+    """One plane: `name` names its root or factor of chi, `degree` is that of its field over the field of x.
 
     `residue` takes the coefficients of an element of K (elements of the field of x) to its value in the plane, and
     `coefficients` takes a value in the plane to `degree` elements of the field of x (two for a complex pair). `context`
-    is FLINT's field of the plane where that is an extension of GF(p), since it cannot be read off its elements.
+    is FLINT's field of the plane if that is an extension of GF(p), since elements do not determine it.
     """
 
     name: str
@@ -42,8 +42,8 @@ class Plane:
 class Splitting:
     """The planes of a normal form over QQ, GF(p) or real balls, for the map with this eps (the time step is 2 eps).
 
-    `T` is the change x = T y from the coordinates y of the form, None for none. Raises BadPrime where there is no
-    reduction modulo p, or chi has a repeated root there.
+    `T` is the change x = T y from the coordinates y of the form, or None. Raises BadPrime if there is no reduction
+    modulo p, or chi has a repeated root modulo p.
     """
 
     def __init__(self, form: NormalForm, field: Field, eps: Any, T: fmpq_mat | None = None) -> None:

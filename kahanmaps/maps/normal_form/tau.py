@@ -1,4 +1,4 @@
-"""Tau functions: the points of an orbit in a plane as products of terms of two Somos sequences of a third the length.
+"""Tau functions: the points of an orbit in a plane as products of terms, a third as long, of two Somos sequences.
 
 On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to triples that satisfy
 
@@ -51,7 +51,7 @@ def triples(block: Any) -> Iterator[Triple]:
 def iterate(block: Any, n: int) -> Triple | None:
     """Return the primitive triple P_n up to sign, n >= 0; None if the sequences do not apply and steps are needed.
 
-    That is where the cubic is singular, T has small order, or n is small. Poles on the way are passed over.
+    This happens if the cubic is singular, T has small order, or n is small. Poles at earlier steps are ignored.
     """
     if block.is_constant:
         at_rest: Triple = block.start

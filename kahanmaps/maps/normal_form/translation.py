@@ -1,8 +1,8 @@
 """The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
 
 In balls the formulas are those of `tau`, with natural lifts and without scales, since they lose the fewest bits. For
-exact elements there is a faster way. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is computed by doublings and
-additions. With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y), the point is
+exact elements another method is faster. On the Jacobian Y^2 = x^3 + ... (`level_curves`) n T is computed by doublings
+and additions. With natural lifts of the points around a base point, chi as in `tau`, and n T = (x, Y), the point is
 
     P_n ~ chi_0 x (x - x_u) P_0 + chi_{-1} (Y - Y_u - m (x - x_u)) P_1 - chi_1 (Y - Y_u - m' (x - x_u)) P_{-1},
 
@@ -38,9 +38,8 @@ def iterate(
 ) -> Triple:
     """Return P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
-    `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep where a
-    pole is met among the first points, which are stepped one by one; NoTranslation where it meets
-    too many special positions.
+    `is_zero` decides whether an element is zero; `inexact` says that elements are balls. Raises SingularStep for a pole
+    among the first points, which are computed step by step; NoTranslation for too many special positions.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> F = GF(10007)
@@ -77,8 +76,8 @@ def iterate(
 def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
     """r = W/s at a start with delta = 0 and an image, s^2 = -D; None where D = 0, so that P_n = P_0 + n (P_1 - P_0).
 
-    A step takes 1 from r, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r, if r is a
-    positive integer, and none otherwise. r is rational in r^2 at the start and at its image.
+    A step decreases r by 1, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r, if r is
+    a positive integer, and none otherwise. r is a rational function of r^2 at the start and r^2 at its image.
     """
 
     def square(point: Triple) -> Any:
@@ -205,7 +204,7 @@ def _multiple_of_T(gamma: Any, n: int, is_zero: Callable[[Any], bool]) -> tuple[
 
 
 def _times_power(x: Any, y: Any, c: Any, count: int) -> tuple[Any, Any] | None:
-    """Return 2^count times the point (x, y), None for zero. It uses sums: FLINT is slower with multiples."""
+    """Return 2^count times the point (x, y), None for zero. Sums are used, since FLINT is slower with multiples."""
     try:
         for _ in range(count):
             square = x * x

@@ -1,1 +1,1 @@
-"""Orbits of any map, in every arithmetic: which way to step, and the steps."""
+"""Orbits of any map, in every arithmetic: the choice of the method, and the steps."""

@@ -1,4 +1,4 @@
-"""Forward substitution for maps with a triangular equation, such as explicit maps: fractions in, fractions out.
+"""Forward substitution for maps with a triangular equation, such as explicit maps, on points given by fractions.
 
 Each row of M x~ = r contains one unknown that does not occur in the rows solved before it. The entries of a row are
 homogenized in each pair (p_k, q_k) separately, where x_k = p_k/q_k in lowest terms. These integers are shorter than

@@ -105,10 +105,10 @@ def _lowest_terms(numerators: Sequence[fmpz], W: fmpz, common: fmpz) -> list[Fra
 class UnreducedPoint(IntegerPoint):
     """The image of a point, as integers whose common factor is removed only when it matters.
 
-    The gcds of long numbers take most of the time of an orbit that grows exponentially, and usually find a few bits.
-    Here a factor left in the integers costs nothing: its share of their length stays the same from step to step. So
-    the small primes are divided out, and other common factors once the numbers are `_LONGER` times as long, or when
-    the coordinates are read. Where a long common factor is found, all later points of the orbit are reduced.
+    The gcds of long numbers take most of the time of an orbit whose heights grow exponentially, and usually have a few
+    bits only. A factor that is not removed costs little: its share of the length of the integers stays the same from
+    step to step. So only small primes are divided out at once, and other common factors after the numbers have become
+    `_LONGER` times as long, or when the coordinates are read. After a long common factor all later points are reduced.
     """
 
     def __init__(self, numerators: Sequence[fmpz], denominator: fmpz, previous: IntegerPoint) -> None:

@@ -122,7 +122,7 @@ class Orbit(HtmlDisplay):
     """The orbit of an initial point under a map, or some of its iterates: iterate over it once, then read `end`.
 
     Args:
-        kahan_map: the map, over any exact field or over balls.
+        kahan_map: a map (not only a Kahan map), over any exact field or over balls.
         start: the initial point, a sequence of exact numbers.
         steps: the number of steps; None for no limit.
         at: the requested iterates, each computed directly by means of the normal form. Except over Q, poles at steps
@@ -131,9 +131,9 @@ class Orbit(HtmlDisplay):
         max_digits: the largest number of decimal digits of the integers over one common denominator (over Q).
         normal_form: if given (family.system_normal_form), steps are taken in normal form: over Q plane by plane; over
             balls each point directly from the initial point, so that balls do not widen from step to step.
-        is_requested: which steps are requested; others may be skipped where this saves time.
+        is_requested: returns whether a step is requested; other steps may be skipped where this saves time.
 
-    `first` and `last` are the first points and the last point delivered so far.
+    `first` is the list of the first points, `last` the last point delivered so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -195,14 +195,14 @@ class Orbit(HtmlDisplay):
 
     @property
     def relations(self) -> str | None:
-        """The relations between points of the orbit that are in use, and since which step; None if there are none."""
+        """The relations between points that are in use, and the step from which on; None if there are none."""
         walk = self._rational_orbit
         return None if walk is None or walk.relations is None else f"{walk.relations.name} from step {walk.since} on"
 
     def interrupt(self) -> None:
         """Stop a running orbit after the current step (safe to call from a signal handler).
 
-        The direct computation of an iterate, which may take long, is abandoned.
+        A direct computation of an iterate, which may take long, is abandoned.
         """
         self._interrupted = True
         if self._busy_thread == get_ident():

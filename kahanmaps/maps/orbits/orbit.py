@@ -81,15 +81,14 @@ def orbit(
     Args:
         system: the map; a quadratic system stands for its Kahan map. A map at a fixed eps, such as phi @ psi, is
             iterated in its own field.
-        start, x0: the initial point: exact numbers, by variable in a dict, or text such as "1/2,-1/3"; for float orbits
-            also floats.
+        start, x0: the initial point: exact numbers, a dict by variable, or text "1/2,-1/3"; or floats for float orbits.
         eps: an exact number, for Kahan maps half the time step; None for a map that does not depend on it. For float
             orbits a float stands for the decimal that Python prints.
         time_step, h: the time step 2 eps, instead of eps.
-        steps, n: the number of steps, or
+        steps, n: the number of steps; instead of it:
         at: the requested iterates.
-        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or a field: QQ, GF(p), RR(bits), CC(bits), a
-            number field.
+        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto"; or QQ, GF(p), RR(bits), CC(bits), a number
+            field.
         exact: True for "exact", False for "float", instead of `arithmetic`.
         method: "generic", "normal-form" or "doubling"; by default chosen automatically.
         backward: step by the inverse map.
@@ -238,8 +237,8 @@ class OrbitRequest(NamedTuple):
 class Trajectory(HtmlDisplay):
     """The result of `orbit`: points in the given `arithmetic`, computed by `method`, for the reason `why`.
 
-    Iterating over it keeps no points in memory; its length, indexing, tables and arrays compute all points and keep
-    them. `integrals` are functions of x and eps (PhaseFunction) by name, whose values are added to tables and files.
+    Iterating over it keeps no points in memory; for its length, indexing, tables and arrays all points are computed and
+    kept. `integrals` are functions of x and eps (PhaseFunction) by name, whose values are added to tables and files.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> result = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
@@ -262,7 +261,7 @@ class Trajectory(HtmlDisplay):
 
     @property
     def why(self) -> str:
-        """The method and the reason for it; for long orbits over Q also the relations that were found and used."""
+        """The reason for the method; for long orbits over Q also the relations between points that are used."""
         relations = getattr(self.orbit, "relations", None)
         return self._why if relations is None else f"{self._why}; {relations}"
 
@@ -299,7 +298,7 @@ class Trajectory(HtmlDisplay):
     @overload
     def __getitem__(self, index: str) -> Any: ...
     def __getitem__(self, index: int | slice | str) -> Any:
-        """Return a point, a list of points, or by the name of a variable the array of its values."""
+        """Return a point (by index), a list of points (by slice), or the array of values of a variable (by name)."""
         if isinstance(index, slice):
             return OrbitPoints(self, index)
         if not isinstance(index, str):
@@ -540,7 +539,7 @@ class Trajectory(HtmlDisplay):
         yield from (point for point in self._all_points() if self._request.is_requested(point.step))
 
     def _all_points(self) -> Iterator[OrbitPoint]:
-        """Yield the stored points, or else all points as they are computed, including those not requested."""
+        """Yield the stored points or, without any, all points as they are computed, including those not requested."""
         yield from self.points if "points" in self.__dict__ else self._computed()
 
     def _computed(self) -> Iterator[OrbitPoint]:
@@ -631,7 +630,7 @@ def _normal_form(
     hamiltonian: CubicHamiltonian | None,
     member: FamilyMember | None,
 ) -> SystemNormalForm | NoNormalForm:
-    """Return the normal form, or the reason why none is used."""
+    """Return the normal form, or the reason why it is not used."""
     map_, eps = request.map, request.eps
     if method == "generic":
         return NoNormalForm("not computed")

@@ -79,7 +79,7 @@ def _stripped(a: Any, length: int) -> int:
 
 
 def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: float, nu: float) -> Any:
-    """a minus the multiple of b that removes its leading term; the factor. `inverse` is that of the last of b."""
+    """Subtract the multiple of b that removes the leading term of a; return its factor. `inverse` is 1/b[-1]."""
     u, v = a[0, length_a - 1], a[1, length_a - 1]
     c0 = (u * inverse[0] + nu * v * inverse[1]) % p
     c1 = (u * inverse[1] + v * inverse[0]) % p
@@ -104,7 +104,7 @@ def _inverse_of_last(b: Any, length: int, p: float, nu: float, inverses: Any) ->
 
 
 def _gcd(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any) -> Any:
-    """A gcd and its length; both arrays are used up."""
+    """Return a gcd and its length; both arrays are overwritten."""
     while length_b > 1:
         inverse = _inverse_of_last(b, length_b, p, nu, inverses)
         while length_a >= length_b:
@@ -116,7 +116,7 @@ def _gcd(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inve
 
 
 def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any, into: Any) -> int:
-    """The quotient of a by b goes to `into`, the rest stays in a; the length of the rest."""
+    """Divide a by b: write the quotient to `into`, leave the remainder in a, and return its length."""
     inverse = _inverse_of_last(b, length_b, p, nu, inverses)
     _clear(into, max(length_a, 1))
     while length_a >= length_b:
@@ -127,7 +127,7 @@ def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, i
 
 
 def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: float, nu: float, M: Any) -> int:
-    """The matrix (M | -r) at the curve X, whose polynomials have this length; the length of its entries.
+    """Write (M | -r) at the curve X, whose polynomials have this length, to M; return the length of its entries.
 
     Each row of `terms` is (i, j, k, place): entry (i, j) has monomial k with the coefficient values[place].
     """
@@ -217,11 +217,11 @@ def walk(
     start: Any, exponents: Any, terms: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float,
     max_length: int, degrees: Any,
 ) -> None:  # fmt: skip
-    """degrees[m, s] becomes the degree of the image of the line start[m] by s + 1 steps of map m.
+    """Write to degrees[m, s] the degree of the image of the line start[m] under s + 1 steps of map m.
 
     start[m, j] are the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
-    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials longer than `max_length`, and with
-    degrees -1 where the iterate exists nowhere.
+    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials exceed `max_length`; degrees are -1
+    if the iterate is defined nowhere.
     """
     n = start.shape[1] - 1
     power = exponents[0].sum()

@@ -34,7 +34,7 @@ Members = NDArray[np.int64]
 
 
 class Family:
-    """A map with symbols modulo an odd prime p < 2^13, every coefficient a table over monomials in symbols and eps.
+    """A map with symbols modulo an odd prime p < 2^13; each coefficient is a table over monomials in symbols and eps.
 
     Raises InputError for values out of range, BadPrime if the prime divides a denominator.
     """
@@ -79,10 +79,10 @@ class Family:
     ) -> NDArray[np.int64]:
         """The degrees d_1, ..., d_terms of each member, one a row, on one random line each.
 
-        `members` are residues of the symbols, one member a row; one more column is that of eps. Else `eps` is an exact
-        number, or None for a random element of GF(p^2) for each member. `max_length` is the largest number of
+        `members` are residues of the symbols, one member a row; an additional column contains eps. Without it `eps` is
+        an exact number, or None for a random element of GF(p^2) for each member. `max_length` is the largest number of
         coefficients that a polynomial may have before common factors are removed; beyond it degrees are -2 (TOO_LARGE),
-        and -1 (NOWHERE) where the iterate exists nowhere. The `kernel` is "numpy" or "numba", `jobs` are threads.
+        and -1 (NOWHERE) if the iterate is defined nowhere. The `kernel` is "numpy" or "numba", `jobs` are threads.
         """
         generator = np.random.default_rng(rng.getrandbits(64))
         p, count = self.prime, len(members)
@@ -114,7 +114,7 @@ class Family:
     def units(self, degrees: Sequence[int]) -> float:
         """The work for one member whose iterates, from the 0th on, have these degrees, in units (algebra/work.py).
 
-        Fitted to the compiled kernel, in dimensions 2 to 5; the other one counts as much and takes longer.
+        The units were fitted to the compiled kernel in dimensions 2 to 5; the slower kernel counts the same units.
         """
         lengths = (self.dim * self.degree * d + 1 for d in degrees[:-1])
         return sum(2 + length / 2 + self.dim * length**2 / 400 for length in lengths)

@@ -59,8 +59,7 @@ class DriftCurve:
     """The error of a function along the orbits of a method: the maximum in each bin of steps, and its step.
 
     The error is exactly 0 if all values in the bin are equal to the initial values. Bins without values are omitted;
-    `undefined` counts points at which the function is undefined. `last` is the error at the last step (NaN if there is
-    none).
+    `undefined` counts points at which the function is undefined. `last` is the error at the last step (or NaN).
     """
 
     method: str
@@ -97,7 +96,7 @@ class MethodRun:
     systems of all orbits, `repeated` steps in which an implicit method needed more iterations, `failures` orbits that
     ended because Newton's method found no solution. `errors` are those at the time of the reference, by decreasing step
     size; `order` is the slope between the last two errors above rounding (None: there are none). `seconds` is None
-    unless a clock was given.
+    without a clock.
     """
 
     method: str
@@ -265,22 +264,21 @@ def compare(
     Args:
         system: a quadratic system.
         start, x0: one initial point or several, exact numbers; floats are taken exactly. By default a random small one.
-        eps: an exact number, half the time step, also of all other methods.
+        eps: half the time step of all methods, an exact number.
         time_step, h: the time step 2 eps, instead of eps.
         steps, n: the number of steps over which the drift is measured, by default 10,000.
         methods: names in `METHODS`, by default kahan, midpoint, rk4, gauss4, suzuki4 and yoshida6.
         integrals: functions, texts or pairs (name, text); by default known integrals, or those of a quick search.
-        linear_bins: bins of equal length for the drift; by default they grow with the step.
-        orders: measure errors and orders, which needs the solution as reference.
+        linear_bins: whether the bins of the drift have equal lengths; by default they grow with the step.
+        orders: whether to measure errors and orders, for which the solution is computed as reference.
         seed: the random seed of the initial point.
         kernel: "numpy" or "numba" (default: numba if installed); the numbers are the same.
-        clock: a function such as `time.perf_counter`, by which the seconds of each method are measured.
+        clock: a function such as `time.perf_counter` that measures the seconds of each method; by default none.
         progress: called with a sentence at each stage.
 
     Returns:
         A `Comparison`: errors |I(x_n) - I(x_0)|/|I(x_0)| of functions, of which the maximum over each of about 200 bins
-        of steps and over all initial points is kept, and errors against a Taylor solution in balls. All are measured
-        in floating point.
+        of steps and over all initial points is kept, and errors against a Taylor solution in balls. All are measured.
 
     Raises:
         InputError: for invalid values, and if a function is undefined at an initial point.

@@ -30,7 +30,7 @@ _EFFORT = -2  # of the search for integrals: it takes at most a few seconds
 
 
 class OfTheImage:
-    """An integral that depends on x and its image x~ under the Kahan map: the modified H, or one of the commutant."""
+    """An integral that depends on x and its image x~ under the Kahan map: the modified H, or x^T M x~/eps."""
 
     def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
         self.name, self.label = function.name, label
@@ -70,8 +70,7 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     """Return the known integrals of the Kahan map of a system by name, and H of the differential equation.
 
     These are the integrals claimed in the file; the modified H of a cubic Hamiltonian; for a member of the family the
-    integrals of the commutant; and last the plain H, which the Kahan map does not conserve. `eps` is half the time step
-    (exact).
+    integrals of the commutant; and last H itself, which the Kahan map does not conserve. `eps` is half the time step.
 
     >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
@@ -106,18 +105,18 @@ def watched_functions(
     >>> watched_functions(load("euler_top"), fmpq(1, 10))[1]
     {'(-F1 + 1)/eps^2': 'declared', 'x2^2 + 2*x3^2': 'flow', '(-F2/2 + 1/2)/eps^2': 'declared', 'x1^2 - x3^2': 'flow'}
     """
-    found: list[WatchedFunction]
+    known: list[WatchedFunction]
     if file.hamiltonian is None and not measured_integrals(file):
         progress("searching for integrals")
         search = find_integrals(file, effort=_EFFORT)
-        found = [PointFunction(I.name, normalized(I.function, file.dim).function, eps) for I in search.integrals]
+        known = [PointFunction(I.name, normalized(I.function, file.dim).function, eps) for I in search.integrals]
     else:
-        found = known_functions(file, eps)
+        known = known_functions(file, eps)
     declared, hamiltonian = measured_integrals(file), file.hamiltonian
     of_flow = [] if hamiltonian is None else [_as_function(hamiltonian, primitive_part(hamiltonian.H)[1])]
     functions: list[WatchedFunction] = []
     origins: dict[str, str] = {}
-    for function in found:
+    for function in known:
         functions.append(function)
         name = function.name
         of_theorem = "theorem" if hamiltonian else "found"

@@ -171,10 +171,10 @@ def plot_drift(result: Comparison, style: Style | None = None, *, scale: str = "
 
 
 def clipped_from(result: Comparison, name: str) -> float:
-    """Return the error of a function above which errors are not plotted, but shown as an arrow at the top.
+    """Return the bound above which errors of a function are shown as an arrow at the top.
 
-    It is a thousand, or ten times the largest error of the completed orbits if that is larger: a diverging orbit would
-    flatten all other curves.
+    It is a thousand, or ten times the largest error of the completed orbits if that is larger; without it a diverging
+    orbit would flatten all other curves.
     """
     whole = {run.method for run in result.runs if not run.early}
     completed = [curve.errors for curve in result.curves if curve.function == name and curve.method in whole]

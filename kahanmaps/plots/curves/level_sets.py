@@ -25,7 +25,7 @@ Levels = tuple[tuple[FloatArray, ...], ...]  # for each level the pieces of its 
 
 
 def levels_through(function: PointFunction, starts: FloatArray) -> tuple[float, ...]:
-    """Return the distinct finite values at initial points (n, dim) in increasing order, up to rounding errors."""
+    """Return the finite values at initial points (n, dim), in increasing order, without repetition up to rounding."""
     values = np.sort(function(starts))
     kept: list[float] = []
     for value in values[np.isfinite(values)].tolist():
@@ -82,8 +82,7 @@ def zero_curves(
 ) -> tuple[FloatArray, ...]:
     """Compute the zero set of a function of points (..., 2) in a window: pieces of curves, arrays (n, 2) of vertices.
 
-    The pieces are computed on a grid, and each vertex is moved onto the curve. `on_grid` are the values on the grid, if
-    they are known.
+    The pieces are computed on a grid, and each vertex is moved onto the curve. `on_grid` are known values on the grid.
 
     >>> (circle,) = zero_curves(lambda x: (x**2).sum(axis=-1) - 1, ((-2, 2), (-2, 2)))
     >>> bool(np.allclose((circle**2).sum(axis=1), 1, rtol=1e-12))

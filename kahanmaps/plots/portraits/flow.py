@@ -1,8 +1,7 @@
 """The differential equation of a portrait: its direction, equilibria, separatrices and solutions as curves.
 
-Curves are followed by their length, not by time: x' = f/|f| by RK4 with steps of a fraction of the window, so that
-they pass through what would be a pole in time, and are as smooth as can be seen everywhere. Around an equilibrium are
-the starts of a picture of which nothing else is known.
+Curves are parametrized by their length, not by time: RK4 for x' = f/|f| with steps of a fraction of the window, so that
+they pass through poles of the solution and look smooth everywhere. Default initial points lie around an equilibrium.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class Equilibrium:
 
     @property
     def kind(self) -> str:
-        """The kind by the eigenvalues: a center of the linear part need not be one, because of terms of degree 2."""
+        """The kind by the eigenvalues; a center of the linear part need not be a center of the field."""
         values, real = self.values, self.values.real
         least = _ZERO * max(float(np.abs(values).max()), _ZERO)
         if (np.abs(values) <= least).any():
@@ -108,8 +107,8 @@ class Flow:
 def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) -> Flow:
     """Compute arrows, equilibria and separatrices of a planar system, in a window of the plane of its two variables.
 
-    `plane` says which variable is along which axis. In another dimension the directions at a point of the picture are
-    many, and there is nothing.
+    `plane` are the indices of the variables along the axes. In higher dimensions the result is empty, since a point of
+    the picture has no single direction.
 
     >>> saddle = plane_flow(QuadraticSystem.from_text(["x", "y"], ["x", "-y"]), (0, 1), ((-1, 1), (-1, 1)))
     >>> [kind for kind, _ in saddle.equilibria], len(saddle.separatrices)
@@ -149,9 +148,9 @@ def plane_flow(system: QuadraticSystem, plane: Sequence[int], window: Window) ->
 def projected_solutions(
     system: QuadraticSystem, eps: fmpq, axes: Sequence[PointFunction | str], trajectories: Trajectories, backward: bool
 ) -> tuple[FloatArray, ...]:
-    """The solutions through the starts of orbits, as long as these are followed and around them, along some axes.
+    """Return the solutions through the initial points of orbits, over the same time and around them, along some axes.
 
-    Raises InputError where an axis is the step.
+    Raises InputError if an axis is the step.
     """
     functions = [axis for axis in axes if not isinstance(axis, str)]
     if len(functions) < len(axes):
@@ -166,8 +165,8 @@ def projected_solutions(
 def solution(f: VectorField, start: FloatArray, box: Window, time: float | None = None) -> FloatArray:
     """The solution through a start, as a curve (points, dim) that ends where it closes or leaves the box.
 
-    `box` has a range for each variable, and the curve may leave it by its own size; `time` (default: any), negative
-    for the past, is how long it is followed.
+    `box` has a range for each variable, beyond which the curve may extend by the size of the box; `time` (negative for
+    the past) limits the time of the solution, by default not at all.
 
     >>> rotation = VectorField(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
     >>> circle = solution(rotation, np.array([1.0, 0.0]), ((-2, 2), (-2, 2)))
@@ -222,9 +221,9 @@ def automatic_starts(
 ) -> FloatArray:
     """Choose sixteen initial points (16, dim) for a picture, deterministically; eps is half the time step.
 
-    Around an equilibrium, the most stable one that is found: on a ray in the plane of these two variables, or where
-    the field is homogeneous (and points of a ray move alike) on a circle; other coordinates are moved a little. They
-    are as far out as all their orbits stay nearby for 300 steps.
+    They lie around the most stable equilibrium that is found: on a ray in the plane of these two variables or, if the
+    field is homogeneous (so that all points of a ray move alike), on a circle; other coordinates are shifted a little.
+    Their distance is the largest for which all orbits stay nearby for 300 steps.
 
     >>> lotka_volterra = QuadraticSystem.from_text(["x", "y"], ["x - x*y", "x*y - y"])
     >>> starts = automatic_starts(lotka_volterra, "1/20")

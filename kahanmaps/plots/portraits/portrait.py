@@ -1,6 +1,6 @@
-"""A phase portrait: orbits projected to two or three axes, with a color for each point; drawn as dots or lines.
+"""A phase portrait: orbits projected to two or three axes, with a color for each point, drawn as dots or lines.
 
-The flow and level curves are below the orbits, a bar for the colors beside them.
+The flow and level curves are drawn below the orbits, and a color bar beside them.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ class Portrait:
     """The data that a portrait shows.
 
     `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN where there is no point; `labels` and
-    `window` are one for each axis. `values` (records, orbits) color the points by `value_label`; None is by orbit.
-    `left_out` counts the points outside the window, `undefined` those of living orbits where an axis or the color has
-    a pole. `euler` are points (records, orbits, 2 or 3) of explicit Euler, `levels` curves and `flow` what is drawn of
-    the differential equation, below the points. `joined` are, for each orbit, pairs (count, 2) of records that are
-    neighbours on its curve; successive ones where it is None.
+    `window` have an entry for each axis. `values` (records, orbits) are the values of `value_label` that color the
+    points; None means a color for each orbit. `left_out` counts the points outside the window, `undefined` the points
+    of orbits that have not ended at which an axis or the color has a pole. `euler` are points (records, orbits, 2 or 3)
+    of the explicit Euler method, `levels` are curves, and `flow` is drawn below the points. `joined` has for each orbit
+    the pairs (count, 2) of records that are neighbours on its curve; None means successive records.
     """
 
     points: FloatArray
@@ -83,8 +83,7 @@ def portrait_of(
     """Project orbits to two or three axes: functions of the point, or the word "step".
 
     `color` is "orbit", "step" or a function of the point; the window is chosen if none is given. `join` looks for the
-    neighbours of each point on the curve of its orbit, unless an axis is the step. Raises InputError for another number
-    of axes.
+    neighbours of each point on the curve of its orbit, unless an axis is the step. Raises InputError otherwise.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> result = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
@@ -134,11 +133,11 @@ def _steps(trajectories: Trajectories) -> FloatArray:
 
 
 def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
-    """Pairs (count, 2) of rows of `points` (n, dim) that are neighbours on their curve; None where they lie on none.
+    """Return pairs (count, 2) of rows of `points` (n, dim) that are neighbours on a curve; None if there is no curve.
 
-    Every point is joined to the nearest one, and to the nearest of those on its other side: for points that lie densely
-    enough on a smooth curve, in any dimension and with any number of components, that is the curve (Dey and Kumar's
-    NN-crust). NaN is passed over, and so is what comes after the first 2000 points.
+    Every point is joined to its nearest neighbour, and to the nearest point on its other side. For points that lie
+    densely enough on a smooth curve, in any dimension and with any number of components, this reconstructs the curve
+    (Dey and Kumar's NN-crust). NaN and points after the first 2000 are ignored.
 
     >>> turn = 2.4 * np.arange(12)
     >>> pairs = neighbours(np.stack([np.cos(turn), np.sin(turn)], axis=1))
@@ -199,9 +198,9 @@ _EQUILIBRIA: dict[str, dict[str, Any]] = {
 def plot_portrait(
     portrait: Portrait, style: Style, *, lines: bool = False, equal: bool = False, note: str = ""
 ) -> Figure:
-    """Draw a portrait: dots, or with `lines` orbits joined; `equal` gives both axes the same unit.
+    """Draw a portrait: dots or, with `lines`, joined orbits; `equal` gives both axes the same unit.
 
-    `note` is printed above the right corner. Raises InputError for more than a million points to be joined.
+    `note` is printed above the right corner. Raises InputError if more than a million points are to be joined.
     """
     count = portrait.points[..., 0].size
     if lines and count > _MAX_JOINED:
@@ -297,7 +296,7 @@ def plot_portrait(
 
 
 def _draw_few(axes: Any, shown: FloatArray, lines: bool, portrait: Portrait) -> None:
-    """Draw each orbit in its own color, and with its own mark where it has few points."""
+    """Draw each orbit in its own color, and with its own mark if it has few points."""
     count = shown.shape[0] * shown.shape[1]
     for k, orbit in enumerate(shown.swapaxes(0, 1)):
         how: dict[str, Any] = {"color": COLORS[k], "zorder": 2}
@@ -361,7 +360,7 @@ def _inside(shown: FloatArray, window: Window) -> FloatArray:
 def _make_room(axes: Any, window: Window | None) -> None:
     """Format axes in space: light planes, few ticks, and labels inside the picture, which layouts do not ensure.
 
-    With a window the box has the proportions of its sides. Of the twelve edges matplotlib draws those of three planes.
+    With a window the box has the proportions of the window. matplotlib draws the edges of three planes only.
     """
     from matplotlib.ticker import MaxNLocator
 

@@ -29,9 +29,9 @@ _LITTLE_WORK, _FEW_STEPS = 10_000_000, 20_000
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """Orbits side by side: `points` (records, orbits, dim), NaN where an orbit has ended; `steps` (records,).
+    """Several orbits: `points` (records, orbits, dim), NaN after the end of an orbit; `steps` (records,).
 
-    `ended` says how many orbits ended early and why, in words.
+    `ended` has sentences on the number of orbits that ended early, and the reason.
     """
 
     variables: tuple[str, ...]
@@ -54,14 +54,14 @@ def ensemble_for(
     backward: bool = False,
     form: NormalForm | None = None,
 ) -> FloatEnsemble:
-    """The ensemble that walks these starts (n, dim), by the kernel that is done first; eps is half the time step."""
+    """Return the ensemble of these initial points (n, dim) with the faster kernel; eps is half the time step."""
     work = len(starts) * steps * (1 + given.dim**3 // 8)
     kernel = "numpy" if work < _LITTLE_WORK and steps < _FEW_STEPS else None
     return FloatEnsemble(given, eps, starts, backward=backward, form=form, kernel=kernel)
 
 
 def field_of(file: SystemFile) -> QuadraticSystem | None:
-    """The vector field whose Kahan map a file has, real approximations for algebraic parameters; None without one."""
+    """Return the vector field of a file with real approximations of algebraic parameters; None if it has no field."""
     map_ = file.map.real_approximation
     return map_.system if isinstance(map_, KahanFamily) and not map_.system.symbols else None
 
@@ -69,9 +69,9 @@ def field_of(file: SystemFile) -> QuadraticSystem | None:
 def ensemble_of_file(
     file: SystemFile, eps: fmpq | None, starts: FloatArray, steps: int, *, backward: bool = False
 ) -> FloatEnsemble:
-    """The ensemble for the map of a file, in its normal form where it has one; `eps` is None for a map without it."""
-    found = float_normal_form(file)
-    form = None if isinstance(found, NoNormalForm) else found.form
+    """Return the ensemble for the map of a file, in normal form if it has one; `eps` is None for a map without eps."""
+    normal_form = float_normal_form(file)
+    form = None if isinstance(normal_form, NoNormalForm) else normal_form.form
     return ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
 
 

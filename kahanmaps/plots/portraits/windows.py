@@ -27,10 +27,10 @@ _CELLS = {1: 400, 2: 24, 3: 10}  # along each axis
 def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
     """Return a window for points (n, d) that ignores a few points far away.
 
-    Along each axis, the range of all points; or where some of the outer tenth at either end are farther away than three
-    times the length that the others and the `starts` fill, that length and half of it at either end. Where most orbits
-    go to infinity, so that this is 10^12 times what the starts reach, ten times their reach. NaN is passed over; a
-    range of length 0 is widened.
+    Along each axis it is the range of all points. If some points of the outer tenth at either end are farther away than
+    three times the range of the others and of `starts`, it is this range, extended by half of its length at either end.
+    If this exceeds 10^12 times the range of the `starts`, since most orbits go to infinity, it is ten times the latter.
+    NaN is ignored; a range of length 0 is widened.
 
     >>> window_of(np.array([[0.0], [1.0]]))
     ((-0.04, 1.04),)
@@ -54,7 +54,7 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
 
 
 def main_range(values: FloatArray, required: FloatArray | None = None) -> tuple[float, float]:
-    """The range of the values as `window_of` chooses it, without a margin; `required` are the initial points.
+    """Return the range of values that `window_of` determines, without a margin; `required` are the initial points.
 
     >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
     ((1.0, 2.0), (4.5, 5.5))
@@ -101,10 +101,10 @@ def outside(points: FloatArray, window: Window) -> int:
 
 
 def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
-    """The `count` variables, in order, whose plane or space points (n, dim) fill most; of equals the first ones.
+    """Return the `count` variables, in order, in whose plane or space the points (n, dim) spread most.
 
-    Each variable is scaled to its own window, and the boxes of a grid that hold a point are counted. Of more than 16
-    variables the first 16 that vary are compared.
+    Each variable is scaled to its own window, and the boxes of a grid that contain a point are counted. Of equal
+    results the first is taken; of more than 16 variables only the first 16 that vary are compared.
 
     >>> t = np.linspace(0, 6, 200)
     >>> fullest_axes(np.stack([t, t, 0 * t, np.sin(5 * t)], axis=1), 2)

@@ -57,7 +57,7 @@ class AffineDarboux(ResultPart):
 
 @dataclass(frozen=True)
 class AffineDarbouxList(ResultPart):
-    """Affine Darboux functions, each one exact. `complete`: there are no others over Q; else `reason` says why not.
+    """Affine Darboux functions, each one exact. `complete`: there are no others over Q; otherwise `reason` says why.
 
     Constants and the affine integrals (cofactor 0) are left out. The list is complete unless a random line is parallel
     to an invariant hyperplane: its direction has random integers up to 10^6, so that for a given hyperplane this has a
@@ -147,8 +147,8 @@ def affine_darboux(system: SystemLike, *, seed: int = 0) -> AffineDarbouxList:
 
     Returns:
         An `AffineDarbouxList`. The list is not complete if the extactic determinant vanishes identically (there may be
-        infinitely many, as for x' = x, y' = y), or if more than 12 variables remain without the affine integrals: then
-        it has only those among the factors of the right-hand sides. Source: pereira-2001.
+        infinitely many, as for x' = x, y' = y), or if more than 12 variables remain after the affine integrals are
+        eliminated: then it has only the l among the factors of the right-hand sides. Source: pereira-2001.
 
     >>> result = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x*(2 - y)", "y*(3*x - 1)"]))
     >>> [(str(d.function), str(d.cofactor)) for d in result.functions], result.complete
@@ -276,7 +276,7 @@ def under_map(system: QuadraticSystem, function: fmpq_mpoly, eps: fmpq) -> str:
     Returns:
         "invariant" if det(I - eps f') and det(I + eps f') are not identically 0 on l = 0: the restriction of the map to
         the hyperplane is birational then. "undefined" if det(I - eps f') is 0 there; "contracted" if det(I + eps f')
-        is: the image of l = 0 is then of lower dimension. "undecided" if these are too long to expand.
+        is: the image of l = 0 is then of lower dimension. "undecided" if these determinants are too long to expand.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
     >>> x, y = system.rhs[0].context().gens()

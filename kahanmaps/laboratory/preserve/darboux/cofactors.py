@@ -56,8 +56,7 @@ class Cofactor:
     """A candidate cofactor: a function of x formed from a polynomial g in the variables, symbols and eps, by `kind`.
 
     "reversed": g(x~, -eps)/g(x, eps); "factor": g(x, eps); "pole": 1/g(x, eps); "denominator": g(x~, eps)/g(x, eps).
-    Without a polynomial the cofactor is det dPhi. `weight` is about the least degree of a polynomial with this
-    cofactor.
+    Without a polynomial the cofactor is det dPhi. `weight` approximates the least degree of a P with this cofactor.
     """
 
     name: str
@@ -246,7 +245,7 @@ def cofactor_space(
 def cofactor_spaces(
     sample: Sample, product: CofactorProduct, degree: int, models: Sequence[DarbouxSpace] = ()
 ) -> list[tuple[int, DarbouxSpace]]:
-    """Return each number c with its space of P with P(x~) = c C(x) P(x), for cofactors C known up to a number.
+    """Return each number c with its space of P with P(x~) = c C(x) P(x), for C known up to a numerical factor.
 
     With `models` only monomials of their elements are used. Numbers c outside the field of the prime are left out. If
     the cofactors of the sample are known exactly, only c = 1 is tried.
@@ -346,8 +345,7 @@ class SpaceSearch:
     """The result of a search on one map: a list of spaces for each step.
 
     The products in the steps refer to `cofactors`, which were tried up to `cofactor_degree`; `searched` are the degrees
-    of relations along orbits whose span was searched. `cut` says which cofactors were skipped because the budget was
-    spent.
+    of relations along orbits whose span was searched. `cut` says which cofactors the budget did not allow.
     """
 
     steps: list[SearchStep] = field(default_factory=list)
@@ -392,7 +390,7 @@ def search_cofactors(
     The search ends when `required` independent integrals are known, when it takes too much work, or when the `budget`
     is spent. A space counts only if it gives an integral independent of those of the `known_spaces` and of earlier
     spaces. The cofactors are products of the `cofactors`, or of the `denominators`; at last, if the `cofactors` are
-    known up to numbers only, their products times any number.
+    known only up to a numerical factor, their products times any number.
 
     To save unknowns: if P/Q = c on an orbit, then P - c Q is a relation along this orbit, so only its coordinates in a
     basis of these relations are unknown. And Q is, up to a factor, the difference of relations along two orbits, which

@@ -1,7 +1,7 @@
 """The search for discrete Darboux polynomials of a map: P of bounded degree with P(x~) = C(x) P(x), for many C.
 
-C runs through the products of the cofactors in cofactors.py, times any number if these are known up to numbers only. A
-space of such P is listed unless products of elements of other spaces span it. Source: celledoni-2019.
+C runs through the products of the cofactors in cofactors.py, times any number if these are known only up to a numerical
+factor. A space of such P is listed unless products of elements of other spaces span it. Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -53,8 +53,7 @@ Law = tuple[CofactorProduct, int]  # a product of cofactors and its numerical fa
 class DarbouxPolynomials(LatexDisplay, ResultPart):
     """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
 
-    For a flow it is K in P' = K P. The verdict concerns the identity for all P: proved by expansion, or supported at
-    random points.
+    For a flow it is K in P' = K P. The verdict on the identity for all P is proved (expanded) or supported.
     """
 
     cofactor: str
@@ -74,7 +73,7 @@ class DarbouxPolynomials(LatexDisplay, ResultPart):
 
 @dataclass(frozen=True)
 class DarbouxSearch(Search):
-    """The result of `darboux_polynomials`: spaces by the weight of the cofactor; `reason` if the search ended early."""
+    """The result of `darboux_polynomials`: spaces in the order of the weights of their cofactors."""
 
     _parts, _noun = "spaces", ("cofactor", "cofactors")
 
@@ -116,7 +115,7 @@ def darboux_polynomials(
     number, which may contain the symbols and eps.
 
     Args:
-        system: the system.
+        system: the map; a differential equation stands for its Kahan map.
         max_degree: the largest degree of the polynomials, and of the products of cofactors.
         symbols: names of parameters that stay symbols in the formulas; the others have the values of the file.
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
@@ -126,7 +125,7 @@ def darboux_polynomials(
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with the cofactor that is tried.
-        on_result: called with the spaces so far after each, for searches that may be interrupted.
+        on_result: called with the spaces so far after each new one, for searches that may be interrupted.
 
     Returns:
         A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). A space spanned by
@@ -226,7 +225,7 @@ def _closed_form(
 ) -> DarbouxPolynomials | str:
     """Return the first of the spaces in closed form, or the reason why there is none.
 
-    The cofactors of the other spaces differ from that of the first by a number.
+    The cofactors of the other spaces are that of the first times a number.
     """
     text, bases, reason = product.text(cofactors), list[list[fmpq_mpoly]](), ""
     # Interpolating all spaces at once distinguishes those with the same zero pattern. If that fails, try the first

@@ -1,1 +1,1 @@
-"""The vector field as the limit of small steps: what it preserves, and which invariants of the map tend to that."""
+"""The flow as the limit eps -> 0 of the map: its invariants, and the invariants of the map that tend to them."""

@@ -5,20 +5,20 @@ into a matrix, one order in each row. If the solution starts on P = 0, every row
 the matrix has a smaller rank there than at random points, and P divides its minors, the extactic determinants
 (pereira-2001). These are interpolated on a random line modulo a prime. On the line a P of degree d has d zeros, with
 conjugate zeros in one irreducible factor, and P vanishes along the solutions from all of them. So, for each choice of
-factors whose degrees add up to d, compute the space of polynomials that vanish along the solutions from their zeros; P
-lies in one of these spaces. Several lines give smaller spaces, by intersection. If all spaces are 0, there is no P. If
-a space has dimension 1, its element is lifted to Q, and whether it divides f . grad P is decided exactly.
+factors whose degrees add up to d, the search computes the space of polynomials that vanish along the solutions from
+their zeros; P lies in one of these spaces. Several lines give smaller spaces, by intersection. If all spaces are 0,
+there is no P. If a space has dimension 1, its element P is lifted to Q, and an exact division shows whether P divides f
+. grad P.
 
 Lifting uses Newton's iteration: P and K modulo p solve f . grad P = K P, usually as a simple solution, so that they are
 determined modulo powers of p. If the coefficients are residues of rational numbers there, P is found. If they are
 residues of algebraic numbers, P is one of several conjugate polynomials, and their product has a higher degree.
-Polynomials for which neither holds are combined with those modulo the next prime. A degree is settled by a prime modulo
-which no polynomial remains open.
+Polynomials for which neither holds are combined with those modulo the next prime. A degree is settled once every
+polynomial modulo some prime is lifted or irrational.
 
 Weights w of the variables form a grading if all terms x^a of all x_i' have the same w . a - w_i. Then the cofactor K of
 a P is homogeneous, and it is the cofactor of every homogeneous part of P. The quotients of these parts are integrals,
-so a P that belongs to no integral is homogeneous in every grading. Hence there is a separate search for the monomials
-of each weight.
+so a P that belongs to no integral is homogeneous in every grading. Hence the monomials of each weight are searched.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def flow_polynomials(
         field: the vector field x' = f(x), exact. A symbol s counts as a variable with s' = 0.
         max_degree: the largest degree of the polynomials in variables and symbols; by default up to 4, as long as there
             are at most 21 monomials (of one weight, if the field has gradings).
-        budget: the work of the search; None means no limit.
+        budget: the work limit; None means no limit.
         seed: the random seed of lines and primes.
 
     Returns:
@@ -146,8 +146,7 @@ def gradings(field: PolynomialField) -> list[tuple[int, ...]]:
 def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tuple[int, ...]]:
     """Return the possible supports of an irreducible polynomial of this degree, as lists of indices of monomials.
 
-    The monomials of a support have one weight in each grading and no common variable, and at least one of them has the
-    full degree.
+    The monomials of a support have one weight in each grading, no common variable, and one of them has the full degree.
     """
     exponents, by_weight = exponents_up_to(n, degree), dict[tuple[int, ...], list[int]]()
     for k, exponent in enumerate(exponents):
@@ -162,7 +161,7 @@ def _supports(n: int, degree: int, weights: Sequence[Sequence[int]]) -> list[tup
 
 @dataclass
 class _Search:
-    """The search for polynomials of a degree with given monomials; `known` holds those found so far, by text."""
+    """The search for polynomials of one degree with given monomials; `known` has those found so far, by text."""
 
     field: PolynomialField
     degree: int
@@ -234,7 +233,7 @@ class _Search:
         return [_monic(space[0], flow.prime) for space in common if len(space) == 1], False
 
     def _lifts(self, residues: Sequence[int], modulus: int) -> bool:
-        """Lift residues to rational coefficients; add the polynomial to `known` and return True if it is one."""
+        """Lift residues to rational coefficients; add a Darboux polynomial to `known`, and return whether it is one."""
         values = rational_vector(residues, modulus)
         if values is None:
             return False

@@ -1,4 +1,4 @@
-"""Limits of integrals of a map as eps -> 0: which integrals of its differential equation it conserves, deforms, loses.
+"""Limits of integrals of a map as eps -> 0: the integrals of its flow that the map conserves, deforms or loses.
 
 An integral of a map x + 2 eps f(x) + ... has an expansion eps^v (I_0 + eps^k I_1 + ...), and its leading term I_0 is
 an integral of the flow: f . grad I_0 = 0. If I_0 depends on the leading terms J_0, ... of other integrals,
@@ -118,7 +118,7 @@ class FlowAndMap:
 
     @property
     def reason(self) -> str:
-        """Why no density of the flow is known."""
+        """The reason why no density of the flow is known."""
         return "" if self.density_search is None else self.density_search.reason
 
     @property
@@ -212,8 +212,8 @@ def flow_and_map(
 
     Args:
         search: the integrals of the map, for every eps.
-        densities: the densities of the map, if known: a limit of one of them is reported in preference to a density of
-            the flow from a search.
+        densities: the densities of the map, if known: the limit of one of them is preferred to a density that a search
+            finds.
         flow: the integrals of the flow. By default they are searched for up to a low degree, unless the limits of the
             integrals of the map are already the largest possible number.
         known: the number of integrals that the map is known to have, if `search` shows fewer.
@@ -221,7 +221,7 @@ def flow_and_map(
         progress: called with a sentence at each stage of the search.
 
     Returns:
-        The comparison, exact except for statements marked as measured; None for other maps and for a single eps.
+        The comparison, exact except for statements marked as measured; None for other maps and at a single eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -386,7 +386,7 @@ def _truncate_at_third_order(P: fmpq_mpoly) -> fmpq_mpoly:
 
 
 class _NoLimit(KahanmapsError):
-    """The search found no combination of an integral with others that has a limit independent of theirs."""
+    """No combination of an integral with others was found whose limit is independent of the limits of the others."""
 
 
 def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:

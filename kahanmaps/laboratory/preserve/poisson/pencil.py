@@ -67,8 +67,7 @@ class BasePoints:
 class Pencil:
     """The curves I = c of a planar map for generic c (measured), where I is the integral of this name.
 
-    `components` is the number of components of a curve; `degree`, `genus` and `base_points` are those of the pencil of
-    components.
+    `components` is the number of components of a curve; `degree`, `genus` and `base_points` are those of components.
     """
 
     integral: str
@@ -120,7 +119,7 @@ def pencil_of(
         integral: a function that is not constant, in two variables and eps.
         eps: half the time step, an exact number; None: a random residue replaces it.
         seed: the random seed.
-        effort: the work before the computation is given up: each step above 1 doubles it, each step below halves it.
+        effort: each increase by 1 doubles the work limit, at which the computation is given up.
 
     Returns:
         The `Pencil`; None if the degree is above 12, the work limit was reached, or a consistency check failed.
@@ -161,7 +160,7 @@ def _require(condition: bool) -> None:
 
 
 class _Reduced:
-    """The plane modulo a prime, in random coordinates; `points` counts base points by (multiplicity, whether near)."""
+    """The plane modulo a prime, in random coordinates; `points` counts base points by (multiplicity, is near)."""
 
     def __init__(self, field: PrimeField, rng: random.Random, budget: Budget) -> None:
         self.field, self.prime, self._rng, self._budget = field, field.prime, rng, budget
@@ -246,10 +245,9 @@ class _Reduced:
         self.points[1, True] += conjugates * (chain - 1)
 
     def _resolve(self, K: Any, f: _Local, g: _Local, max_intersection: int, *, exact: bool, near: bool) -> None:
-        """Count a point over K that two curves may share, and the points infinitely near to it.
+        """Count the common point of two curves over K, if it is one, and their common points infinitely near to it.
 
-        The intersection number is at most `max_intersection`, or equal to it if `exact`: terms of a higher degree than
-        that are not needed.
+        The intersection number is at most `max_intersection`, or equal to it if `exact`; this bounds degrees.
         """
         _require(not self._budget.is_spent)
         count_work(50 + 10 * (len(f) + len(g)) * K.degree())

@@ -68,11 +68,11 @@ Exponents = tuple[int, ...]
 
 @dataclass(frozen=True)
 class FoundTensor(LatexDisplay, ResultPart):
-    """A tensor that the map preserves, with the verdicts on that and on the Jacobi identity (`jacobi`).
+    """A tensor that the map preserves, with the verdicts on its invariance and on the Jacobi identity (`jacobi`).
 
     `rank` is the rank at random points. `casimirs` names the known integrals that are Casimirs and, if there are more
     Casimirs among functions of the integrals, formulas such as I1/I2. `in_involution` names a largest set of integrals
-    in involution with each other; `involution` is the verdict on that, None without any.
+    in involution; `involution` is the verdict on their brackets, None without any.
     """
 
     name: str
@@ -158,7 +158,7 @@ class PoissonSearch(Search):
 
     @property
     def note(self) -> str:
-        """A sentence on the compatibility of the tensors; empty where that was not tested."""
+        """A sentence on the compatibility of the tensors; empty if it was not tested."""
         if self.pencil is None:
             return ""
         if self.pencil.holds:
@@ -210,20 +210,19 @@ def find_poisson(
         eps: half the time step, an exact number: formulas then hold at this eps only. None: formulas contain eps.
         time_step, h: the time step 2 eps, instead of eps.
         denominator: a function of the variables and eps by which the entries are divided. None: no denominator; if
-            there is no such tensor, the factors of a density that is a product are tried, if that is little work.
+            there is no such tensor, and this is little work, the factors of a density are tried.
         integrals: the integrals whose brackets are computed; None: they are searched for, if there is a tensor.
         effort: the work that the search may take: each step above 1 doubles it, each step below halves it.
         seed: the random seed.
         progress: called with a sentence at each stage of the search.
-        on_result: called with the tensors so far after each, for searches that may be interrupted.
+        on_result: called with the tensors so far after each new one, for searches that may be interrupted.
 
     Returns:
         A `PoissonSearch`; formulas are exact, proved or supported. Combinations of products of polynomial integrals and
         other tensors are left out. That there is none up to a degree is measured.
 
     Raises:
-        InputError: for unknown symbols, eps = 0, a negative degree, and a denominator that is identically 0 at this
-            eps.
+        InputError: for unknown symbols, eps = 0, a negative degree, and a denominator that vanishes at this eps.
 
     >>> from kahanmaps.documents.catalog import load
     >>> result = find_poisson(load("lotka_volterra"))
@@ -403,8 +402,7 @@ def tensor_space(
 ) -> DarbouxSpace:
     """Compute all bivectors sum P_ij d_i d_j of degree at most `degree` that the map preserves, modulo its prime.
 
-    They are polynomials in x and the d_i; the basis may be empty. With a `support` only its monomials are used.
-    Raises NoPoint.
+    They are polynomials in x and the d_i; the basis may be empty. A `support` restricts the monomials. Raises NoPoint.
     """
     n, prime = map_.dim, map_.prime
     places, pairs = places_of(2 * n, degree + 2), list(combinations(range(n), 2))

@@ -50,7 +50,8 @@ def elliptic_steps(
     """Search for elliptic curves that contain the orbit of `start`, and return its steps; None if none is found.
 
     `bits` is the length of the points; only coefficients that are much shorter are of use. Raises TooLongRelation if
-    those of a curve are longer, but may be of use once the points have grown; not if `most_primes` are too few.
+    the coefficients of a curve are longer than that, but may be of use once the points have grown; it is not raised if
+    `most_primes` primes do not suffice to decide this.
     """
     factors = map_over.factors
     period = next(  # the shortest initial sequence of factors of which all factors are a repetition
@@ -97,7 +98,8 @@ class Numbers(NamedTuple):
 class _Search:
     """The search modulo primes for the sections of each curve, for each group of coordinates that is new on it.
 
-    `earlier` contains, for each curve in turn, the group one step before of which a group is a copy; None if it is new.
+    `earlier` contains for each curve, in turn, and each of its groups the index of the group one step before of which
+    it is a copy; None if it is new.
     """
 
     def __init__(self, factors: Sequence[ElementaryMap], start: IntegerPoint, stride: int) -> None:

@@ -80,8 +80,7 @@ def points_needed(size: int) -> list[int]:
 def curve(points: Rows, prime: int, known_sections: Sections | None = None) -> Curve | None:
     """Search for the elliptic curve of an orbit whose points have last coordinate 1; return None if there is none.
 
-    Raises ArithmeticError if the dimensions are those of a curve, but the sequences are not: then the prime or the
-    initial point is special.
+    Raises ArithmeticError if only the dimensions are those of a curve: the prime or the initial point is special.
     """
     constructions = [known_sections] if known_sections else list(_constructions(points, prime))
     for sections in constructions:
@@ -145,7 +144,7 @@ def _table(points: Rows, coordinates: Sequence[int], count: int, lag: int, prime
 
 
 def _together(points: Rows, count: int, lag: int) -> list[tuple[list[int], ...]]:
-    """Return each point with the count - 1 points before it, `lag` steps apart, nearest first."""
+    """Return each point with the `count` - 1 points before it, `lag` steps apart, nearest first."""
     first = (count - 1) * lag
     return [tuple(points[n - k * lag] for k in range(count)) for n in range(first, len(points))]
 

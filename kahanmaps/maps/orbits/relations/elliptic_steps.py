@@ -1,7 +1,7 @@
-"""Steps along an orbit on an elliptic curve: its coordinates are forms in the terms of two Somos sequences.
+"""Steps along an orbit on an elliptic curve, whose coordinates are forms in the terms of two Somos sequences.
 
-The terms have 1/d of the length of the coordinates, d the degree of the forms: a step is some short products, and no
-gcd of long integers.
+If the forms have degree d, the terms have 1/d of the length of the coordinates: a step consists of a few short
+products, without a gcd of long integers.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class EllipticSteps:
 
     @property
     def stride(self) -> int:
-        """The number of steps of factors that T belongs to."""
+        """The number of steps of factors by which T translates."""
         return len(self._groups)
 
     @property

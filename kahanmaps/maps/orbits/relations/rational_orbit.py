@@ -43,7 +43,7 @@ class RationalOrbit:
     """The points of an orbit over Q: iterate once.
 
     The orbit ends where the map is not defined, or after a point with more than `max_bits` bits. Points that are not
-    requested may be None, where that saves time. `relations` are used from step `since` on; both are None before.
+    requested may be None. `relations` are used from step `since` on; both are None before they are found.
     """
 
     def __init__(
@@ -112,6 +112,6 @@ class RationalOrbit:
 def relations(map_over: Map, start: IntegerPoint, point: IntegerPoint) -> Relations | None:
     """Search for relations along the orbit of `start`, of which `point` is a later point.
 
-    Raises TooLongRelation if there are relations whose coefficients are still too long.
+    Raises TooLongRelation if there are relations, but their coefficients are longer than the points so far.
     """
     return elliptic_steps(map_over, start, point.bits) or bilinear_forms(map_over, point)
