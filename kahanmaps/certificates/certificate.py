@@ -33,18 +33,20 @@ from kahanmaps.certificates.identities import (
 )
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
-from kahanmaps.checks.claims import Certainty
+from kahanmaps.checks.claims import Certainty, Finding, Report
 from kahanmaps.checks.settings import claimed_function, claimed_functions, claimed_tensor
 from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Separated, separated
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
 from kahanmaps.laboratory.preserve.results import Search
+from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries, linear_symmetries
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.implicit import MapFamily
@@ -58,6 +60,7 @@ CHECKERS: dict[str, Callable[..., str]] = {
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
 TENSOR = "poisson"
 ENTROPY = "entropy"  # positive algebraic entropy, hence not integrable
+DETERMINANT = "determinant"  # that dx/det(I - eps f') is invariant, where the file claims another density
 UNPROVED = "Pi"  # J - eps^2 f'^2 J, where no theorem says that it is invariant
 ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
 
@@ -139,7 +142,7 @@ def certificate(
         is_required = claims is not None
         if claims is None:
             claims = [] if proved and not everything else [*known, *(searches if everything else ())]
-            unwanted = {UNPROVED} | (set() if file.is_quadratic else {"symmetry"})
+            unwanted = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry"})
             has_integral = bool(formulas.integrals) or formulas.H is not None  # hence no positive entropy
             unwanted |= {ENTROPY} if has_integral or checker == "rocq" or not everything else set()
             claims = [name for name in claims if name not in unwanted]
@@ -182,18 +185,17 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
     """
     formulas, data = _prepared(file, "gp")
     names = [name for name, _ in _known_claims(formulas, _Planes(file, data))]
-    special = {"measure": {VOLUME}, "poisson": {TENSOR, UNPROVED}}
+    special = {"measure": {VOLUME, DETERMINANT}, "poisson": {TENSOR, UNPROVED}}
     if check in special:
         return [name for name in names if name in special[check]]
-    return [name for name in names if name not in (VOLUME, TENSOR, UNPROVED, ENTROPY)]
+    return [name for name in names if name not in (VOLUME, DETERMINANT, TENSOR, UNPROVED, ENTROPY)]
 
 
 def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
-    """Write a proof that another program checks, of what a search has found and proved.
+    """Write a proof that another program checks, of what a check or a search has proved about a map.
 
     Args:
-        result: what `find_integrals`, `find_density`, `find_poisson`, `darboux_polynomials` or `find_symmetry` returns,
-            for every eps.
+        result: what `analyze`, `verify`, a check or a search returns, for every eps, or a finding of a report.
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         command: the command line that writes this script, for the comment on top.
 
@@ -201,6 +203,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
         The text of the script, exact, as that of `certificate`. Symbols of the search stay symbols.
 
     Raises:
+        FalseClaim: for a claim that is not true.
         InputError: where nothing is proved, for results at one eps or about the flow, and for identities that are too
             long.
 
@@ -208,20 +211,57 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
     >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])
     quit(!ok)
     """
-    if not isinstance(result, Search | Symmetries):
-        raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
-    if isinstance(result, Symmetries):
+    result = getattr(result, "finding", result)  # that of a commuting system
+    if isinstance(result, Report | Finding):
+        return _of_check(result, checker, command)
+    parts: list[Any] = [result]
+    if isinstance(result, Analysis):
+        parts = [result.integrals, result.densities, result.poisson, result.symmetries, result.commuting]
+    if isinstance(result, Analysis | Search):
+        file, symbols = result.file, result.symbols
+    elif isinstance(result, Symmetries | CommutingSystems):
         file, symbols = SystemFile.from_system(result.system, "system"), result.system.symbols
     else:
-        file, symbols = result.file, result.symbols
-        if result.flow or result.eps is not None:
-            what = "the flow" if result.flow else f"eps = {result.eps}"
-            raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
+        raise InputError(
+            f"a {type(result).__name__} has no certificate: it proves nothing about a map, or is a part of a result; "
+            "type result.certificate(checker) of the search or check, or km.certificate(system, checker)"
+        )
+    is_of_flow, eps = getattr(result, "flow", False) is True, getattr(result, "eps", None)
+    if is_of_flow or eps is not None:
+        what = "the flow" if is_of_flow else f"eps = {eps}"
+        raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
     formulas, data = _prepared(file, checker, symbols)
-    claims = _claims_of(result, data)
+    claims, skipped = list[Claim](), list[str]()
+    finds: dict[str, Callable[[], list[Any]]] = {
+        type(part).__name__: partial(_claims_of, part, data) for part in parts if part is not None
+    }
+    if isinstance(result, Analysis) and result.conclusion.kind == "not integrable" and data.dim == 2:
+        inverse = data.with_rows(formulas.map.inverse_rows)
+        if checker != "rocq":
+            finds[ENTROPY] = lambda: [positive_entropy(data, inverse)]
+    for name, find in finds.items():
+        try:
+            claims += find()
+        except FalseClaim:
+            raise
+        except InputError as error:  # of all results of an analysis those that are short enough
+            if parts == [result]:
+                raise
+            skipped.append(f"Not in this certificate: {name}: {error}")
     if not claims:
         raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
-    return CHECKERS[checker](claims, formulas.header(command))
+    return CHECKERS[checker](claims, [*formulas.header(command), *skipped])
+
+
+def _of_check(result: Report | Finding, checker: str, command: str) -> str:
+    """The certificate of a check, or of one of its claims."""
+    arguments = dict(result.certified)
+    if "why_not" in arguments or not arguments:
+        about = "no other program is told how to check these claims" if isinstance(result, Report) else result.claim
+        raise InputError(arguments.get("why_not", f"no certificate is known for this claim: {about}"))
+    if known := arguments.pop("known", ""):
+        arguments["claims"] = known_claims(arguments["system"], known)
+    return certificate(checker=checker, command=command, **arguments)
 
 
 def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
@@ -238,8 +278,8 @@ def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tu
     return formulas, map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
 
 
-def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim]:
-    """The claims that maps commute, in separate coordinates if there are any."""
+def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[Claim]:
+    """The claims that maps commute, in separate coordinates if there are any; their names begin with the label."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
@@ -260,10 +300,10 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim
         moved = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
         in_planes = [data.with_rows(as_map(system).rows) for system in moved]
         pairs = enumerate(zip(in_planes, given, strict=True), 1)
-        claims += [affine_symmetry(z, f"coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
+        claims += [affine_symmetry(z, f"{label}coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
         given = in_planes
     pairs_of = combinations(range(len(given)), 2)
-    claims += [commuting(f"maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
+    claims += [commuting(f"{label}maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
     return claims
 
 
@@ -282,8 +322,9 @@ def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Ca
         yield name, one(bilinear_integral, name, form)
     if formulas.density is not None:
         yield VOLUME, one(invariant_volume, VOLUME, formulas.density)
-    elif H is not None:
-        yield VOLUME, lambda: [invariant_volume(data, VOLUME, _polynomial(data.determinant))]
+    if H is not None:
+        volume = VOLUME if formulas.density is None else DETERMINANT
+        yield volume, lambda: [invariant_volume(data, volume, _polynomial(data.determinant))]
     if data.dim == 2:
         yield ENTROPY, lambda: [positive_entropy(data, data.with_rows(formulas.map.inverse_rows))]
     if file.hamiltonian is not None:
@@ -342,6 +383,10 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
         polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
         functions = [(f"D{k}", _polynomial(P)) for k, P in enumerate(polynomials, 1)]
         return [claim for name, P in functions for claim in planes.claims(darboux_polynomial, name, P)]
+    if isinstance(result, CommutingSystems):
+        file = SystemFile.from_system(result.system, "system")
+        systems = [field.system for field in result.nontrivial if field.finding.verdict is proved]
+        return [claim for k, g in enumerate(systems, 1) for claim in _commuting(file, data, g, f"g{k}_")]
     assert isinstance(result, Symmetries)
     symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
     return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]

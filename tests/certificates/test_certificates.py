@@ -53,11 +53,20 @@ from kahanmaps.certificates.identities import (
     invariant_tensor,
     map_data,
 )
+from kahanmaps.checks.commute import check_commute
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.paper.verify import VerifyOptions, verify
 
 PROGRAMS = {
     "rocq": (["coqc"], ".v", r"(Definition c1 : R := )", r"\1 1 + "),
@@ -431,7 +440,24 @@ def test_results_about_one_eps_or_the_flow_have_no_certificate():
         certificate_of(find_densities("lotka_volterra", eps="1/2"), "gp")
     with pytest.raises(InputError, match="for every eps: found a result for the flow"):
         certificate_of(find_densities("lotka_volterra", flow=True), "gp")
-    refuses("expected the result of a search, got str", certificate_of, "lotka_volterra", "gp")
+    refuses("a str has no certificate: it proves nothing about a map", certificate_of, "lotka_volterra", "gp")
+
+
+@pytest.mark.parametrize("checker", ["gp", "sympy", pytest.param("rocq", marks=pytest.mark.slow)])
+def test_findings_and_results_write_certificates_of_what_they_prove(checker, tmp_path):
+    member = verify("paper_m2", options=VerifyOptions(sections=(6,)))
+    theorem = next(finding for finding in member if finding.claim.startswith("Theorem 9: The Kahan maps"))
+    results = {
+        "F2: ": check_integrals("euler_top")[1],
+        "maps_1_and_2_commute: ": theorem,
+        "D1: ": darboux_polynomials("lotka_volterra", 1),
+        "volume: ": check_measure("paper_m2"),
+        "P: ": check_poisson("lotka_volterra", [["0", "x*y"], ["-x*y", "0"]])[0],
+    }
+    for name, result in results.items():
+        text = result.certificate(checker)
+        assert checker == "rocq" or f" {name}" in text
+        assert run(checker, text, tmp_path).returncode == 0
 
 
 def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note(monkeypatch):
@@ -477,3 +503,36 @@ def test_rows_of_the_equation_have_no_common_factor():
     formulas, data = _prepared(load("qrt_asymmetric"), "gp")
     assert [len(entry) for row in formulas.equation for entry in row] == [4, 0, 4, 0, 46, 54]
     assert [len(entry) for row in data.rows for entry in row] == [4, 0, 4, 0, 20, 27]
+
+
+def test_the_certificate_of_a_finding_is_about_its_claim():
+    report = check_integrals("paper_m2")
+    by_claim = {finding.claim.partition(" is conserved")[0]: finding for finding in report}
+    for claim, says in {"modified H": "modified_hamiltonian", "H~": "H0", "H~_1": "H1", "I2": "I2"}.items():
+        text = by_claim[claim].certificate("gp")
+        assert re.findall(r"^\\\\ (\w+): P", text, flags=re.MULTILINE)[0] == says
+    refuses(re.escape("K~_+- is a linear combination of H0, H1"), by_claim["K~_+-"].certificate, "gp")
+    assert "maps_1_and_2_commute" in check_commute("paper_m2")[0].certificate("gp")
+    field, *_ = commuting_systems("paper_m2")
+    assert field.certificate("gp") == field.finding.certificate("gp")
+
+
+def test_an_analysis_writes_one_certificate_of_all_that_it_proves():
+    text = analyze("lotka_volterra").certificate("gp")
+    assert [f" {name}" in text for name in ("volume_1: ", "T1: ", "entropy: ")] == [True] * 3
+
+
+@pytest.mark.parametrize(
+    ("result", "message"),
+    [
+        (lambda: check_integrals("euler_top", eps="1/10"), "for every eps: found a claim for eps = 1/10"),
+        (lambda: check_integrals("euler_top", "x1")[0], "I1 is not conserved"),
+        (lambda: check_commute("paper_m2")[1], "the maps do not commute"),
+        (lambda: verify(m=1), "no certificate is known for this claim: no other program is told how"),
+        (lambda: degree_growth("euler_top"), "a DegreeGrowth has no certificate"),
+        (lambda: find_integrals("euler_top")[0], "a FoundIntegral has no certificate: .* a part of a result; type"),
+        (lambda: analyze("lotka_volterra", eps="1/3"), "for every eps: found a result for eps = 1/3"),
+    ],
+)
+def test_what_has_no_certificate_says_why_in_one_sentence(result, message):
+    refuses(message, result().certificate, "gp")
