@@ -8,9 +8,10 @@ from functools import cached_property, partial
 from itertools import combinations
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import integer
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.certificates.chains import commuting, periodic
 from kahanmaps.certificates.combinations import (
@@ -36,9 +37,10 @@ from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
 from kahanmaps.checks.claims import Certainty, Finding, Report
 from kahanmaps.checks.settings import claimed_function, claimed_functions, claimed_tensor
 from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
+from kahanmaps.documents.expressions import formula_text
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Separated, separated
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
@@ -48,6 +50,7 @@ from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch,
 from kahanmaps.laboratory.preserve.results import Search
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries, linear_symmetries
+from kahanmaps.laboratory.vector_field.equivalence import Equivalence, equivalent_system
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
@@ -75,6 +78,8 @@ def certificate(
     tensor: Any = None,
     everything: bool = False,
     commute: SystemLike | None = None,
+    equivalent: SystemLike | None = None,
+    by: Sequence[Any] = (),
     period: int | None = None,
     effort: int = 1,
     command: str = "",
@@ -86,9 +91,9 @@ def certificate(
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
-            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for
-            positive entropy of a map of the plane, for gp and sympy. None for all that need no search, or for the
-            following alone if these are given.
+            (Darboux polynomials up to degree 2), "symmetry" and "equivalence" (to a system of the catalogue) for what a
+            search finds and proves; "entropy" for positive entropy of a map of the plane, for gp and sympy. None for
+            all that need no search, or for the following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         density: phi, as `check_measure` takes it.
         tensor: a Poisson tensor, as `check_poisson` takes it.
@@ -96,6 +101,8 @@ def certificate(
         commute: another system or map, in the same variables: certify that the two maps commute. For members of the
             commuting family this is written in coordinates in which the planes separate; "associates" stands for all
             pairs of rational associated systems.
+        equivalent: another quadratic system g, of the same dimension: certify that T takes the Kahan map to that of g.
+        by: T, one polynomial of degree 1 in the variables for each variable of g, as text.
         period: certify that this iterate of the map is the identity.
         effort: the limit for the length of the identities; each increment by 1 doubles it.
         command: the command line that writes this script, for the comment on top.
@@ -121,9 +128,14 @@ def certificate(
         formulas, data = _prepared(file, checker)
         planes, proved = _Planes(file, data), list[Claim]()
         if commute is not None:
-            if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
+            if (
+                any(other is not None for other in (claims, integrals, density, tensor, period, equivalent))
+                or everything
+            ):
                 raise InputError("a certificate that two maps commute cannot be combined with other claims")
             proved = _commuting(file, data, commute)
+        if equivalent is not None:
+            proved.append(_equivalence(file, data, as_file(equivalent), by))
         if period is not None:
             if integer(period, "period") < 1:
                 raise InputError(f"found period = {period}, expected a positive integer")
@@ -142,7 +154,7 @@ def certificate(
         is_required = claims is not None
         if claims is None:
             claims = [] if proved and not everything else [*known, *(searches if everything else ())]
-            unwanted = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry"})
+            unwanted = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry", "equivalence"})
             has_integral = bool(formulas.integrals) or formulas.H is not None  # hence no positive entropy
             unwanted |= {ENTROPY} if has_integral or checker == "rocq" or not everything else set()
             claims = [name for name in claims if name not in unwanted]
@@ -171,9 +183,7 @@ def certificate(
                 f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
                 f"or search with kahanmaps find-integrals {file.name} --toml"
             )
-        return CHECKERS[checker](
-            proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
-        )
+        return _written(checker, proved, formulas.header(command), skipped)
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
@@ -217,8 +227,11 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
     parts: list[Any] = [result]
     if isinstance(result, Analysis):
         parts = [result.integrals, result.densities, result.poisson, result.symmetries, result.commuting]
+        parts.append(None if result.symbols else result.equivalent)
     if isinstance(result, Analysis | Search):
         file, symbols = result.file, result.symbols
+    elif isinstance(result, Equivalence) and result.file is not None:
+        file, symbols = result.file, ()
     elif isinstance(result, Symmetries | CommutingSystems):
         file, symbols = SystemFile.from_system(result.system, "system"), result.system.symbols
     else:
@@ -247,10 +260,17 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
         except InputError as error:  # of all results of an analysis those that are short enough
             if parts == [result]:
                 raise
-            skipped.append(f"Not in this certificate: {name}: {error}")
+            skipped.append(f"{name}: {error}")
     if not claims:
         raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
-    return CHECKERS[checker](claims, [*formulas.header(command), *skipped])
+    return _written(checker, claims, formulas.header(command), skipped)
+
+
+def _written(checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str]) -> str:
+    """The script; the comment on top also says what the claims are about, and which ones it does not have."""
+    pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
+    about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
+    return CHECKERS[checker](claims, [*header, *about, *(f"Not in this certificate: {text}" for text in skipped)])
 
 
 def _of_check(result: Report | Finding, checker: str, command: str) -> str:
@@ -305,6 +325,24 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = 
     pairs_of = combinations(range(len(given)), 2)
     claims += [commuting(f"{label}maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
     return claims
+
+
+def _equivalence(file: SystemFile, data: MapData, other: SystemFile, by: Sequence[Any]) -> AffineSymmetry:
+    """The claim that the affine map takes the Kahan map of the file to that of the other system."""
+    n = file.dim
+    if not (file.is_quadratic and other.is_quadratic) or other.dim != n or len(by) != n:
+        raise InputError(
+            f"found {file.name}, {other.name} and {counted(len(by), 'polynomial')}, expected two quadratic systems of "
+            "the same dimension, and for each variable of the second a polynomial in those of the first"
+        )
+    T = [parse_polynomial(formula_text(text), file.variables, file.parameters) for text in by]
+    if any(degree_in(P, n) > 1 for P in T):
+        raise InputError(f"found {', '.join(map(str, by))}, expected polynomials of degree at most 1")
+    zero = (0,) * n
+    S = fmpq_mat([[P.derivative(j)[zero] for j in range(n)] for P in T])
+    target = data.with_rows(as_map(other.system.renamed(file.variables)).rows)
+    about = f"T takes the map of {file.name} to that of {other.name}"
+    return affine_symmetry(data, "equivalence", S, [P[zero] for P in T], target=target, about=about)
 
 
 def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
@@ -364,7 +402,9 @@ class _Planes:
 
 
 def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> list[Claim]:
-    """What the result of a search proves about the map."""
+    """What the result of a search proves about the map; None is that of one that found nothing."""
+    if result is None:
+        return []
     proved = Certainty.PROVED
     if isinstance(result, IntegralSearch):
         planes = planes or _Planes(result.file, data)
@@ -383,6 +423,9 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
         polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
         functions = [(f"D{k}", _polynomial(P)) for k, P in enumerate(polynomials, 1)]
         return [claim for name, P in functions for claim in planes.claims(darboux_polynomial, name, P)]
+    if isinstance(result, Equivalence):
+        target, about = data.with_rows(as_map(result.system).rows), f"f is {result.text}"
+        return [affine_symmetry(data, "equivalence", result.P, result.q, target=target, about=about)]
     if isinstance(result, CommutingSystems):
         file = SystemFile.from_system(result.system, "system")
         systems = [field.system for field in result.nontrivial if field.finding.verdict is proved]
@@ -398,6 +441,7 @@ _SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
     TENSOR: find_poisson,
     "darboux": partial(darboux_polynomials, max_degree=2),
     "symmetry": linear_symmetries,
+    "equivalence": equivalent_system,
 }
 
 

@@ -55,6 +55,7 @@ class AffineSymmetry(EquationClaim):
     matrix: tuple[tuple[int, ...], ...]
     multiple: int
     reversing: bool
+    about: str = ""  # for the comment on top: what the target is
 
 
 @dataclass(frozen=True)
@@ -130,14 +131,22 @@ def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
 
 
 def affine_symmetry(
-    data: MapData, name: str, S: fmpq_mat, shift: Sequence[fmpq], reversing: bool = False, target: MapData | None = None
+    data: MapData,
+    name: str,
+    S: fmpq_mat,
+    shift: Sequence[fmpq],
+    reversing: bool = False,
+    target: MapData | None = None,
+    about: str = "",
 ) -> AffineSymmetry:
     """The identity for T(x) = S x + shift, which takes the map to the target, by default to itself, or its inverse.
 
     Raises:
-        FalseClaim: if it does not.
+        FalseClaim: if it does not, or is not invertible.
     """
     target = target or data
+    if S.det() == 0:
+        raise FalseClaim(f"{name} is not invertible: no certificate can be written")
     n, names = data.dim, data.two_points
     context = ring(names)
     gens = context.gens()
@@ -152,11 +161,12 @@ def affine_symmetry(
     own = data.residual(names, 0, n)
     for row, value in zip(matrix, moved, strict=True):
         if value * multiple != sum((c * P for c, P in zip(row, own, strict=True)), context.constant(0)):
-            raise FalseClaim(f"{name} is no {'reversing ' * reversing}symmetry: no certificate can be written")
+            what = f"is no {'reversing ' * reversing}symmetry" if target is data else "takes the map to another one"
+            raise FalseClaim(f"{name} {what}: no certificate can be written")
     image = tuple(
         ring(data.names).constant(0) + divisor * _affine(S, shift, ring(data.names).gens(), i) for i in range(n)
     )
-    return AffineSymmetry(name, data, target, image, divisor, matrix, multiple, reversing)
+    return AffineSymmetry(name, data, target, image, divisor, matrix, multiple, reversing, about)
 
 
 def changed_function(

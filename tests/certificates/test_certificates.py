@@ -66,6 +66,7 @@ from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_po
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
 from kahanmaps.paper.verify import VerifyOptions, verify
 
 PROGRAMS = {
@@ -185,6 +186,49 @@ def test_commuting_maps_are_accepted_and_refused_with_one_coefficient_changed(sy
     wrong = replace(point, numerators=(point.numerators[0] + 1, *point.numerators[1:]))
     false = replace(chain, values=(*chain.values[:-1], wrong))
     assert run(checker, CHECKERS[checker]([false]), tmp_path).returncode != 0
+
+
+EQUIVALENT = System("x' = y + 1; y' = 24*(x - 2)^2 - 8")  # to weierstrass at g2 = 64, by 4 x - 8, 4 y + 4
+FASTER = System("x' = 3*x - 3*x*y; y' = 3*x*y - 3*y")  # lotka_volterra at eps/c with c = 1/3
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
+    result = equivalent_system(EQUIVALENT)
+    text = result.certificate(checker)
+    assert "equivalence: f is equivalent to weierstrass at g2 = 64 after (x, y) -> (4*x - 8, 4*y + 4)" in text
+    assert run(checker, text, tmp_path).returncode == 0
+    (claim,) = _claims_of(result, _prepared(EQUIVALENT, checker)[1])
+    one = claim.image[0] ** 0
+    singular = replace(claim, image=(one * 0, one * 0), matrix=((0, 0), (0, 0)))
+    shifted = replace(claim, image=(claim.image[0] + one, claim.image[1]))
+    target = claim.target.rows
+    other = replace(claim, target=replace(claim.target, rows=((*target[0][:-1], target[0][-1] + 1), target[1])))
+    for wrong in (changed(claim), singular, shifted, other):
+        assert run(checker, CHECKERS[checker]([wrong]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", ["gp", "sympy"])
+def test_an_equivalence_by_a_given_map_and_one_that_changes_eps(checker, tmp_path):
+    found = equivalent_system(FASTER)
+    texts = [certificate(EQUIVALENT, checker, equivalent=load("weierstrass", {"g2": 64}), by=["4*x - 8", "4*y + 4"])]
+    texts += [found.certificate(checker), certificate(FASTER, checker, ["equivalence"])]
+    assert "T takes the map of inline to that of weierstrass" in texts[0]
+    for text in texts:
+        assert run(checker, text, tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("by", "message"),
+    [
+        (["4*x - 8", "4*y"], "equivalence takes the map to another one"),
+        (["4*x - 8"], "weierstrass and 1 polynomial, expected two quadratic systems of the same dimension"),
+        (["x^2", "y"], "found x.2, y, expected polynomials of degree at most 1"),
+        (["0", "0"], "equivalence is not invertible"),
+    ],
+)
+def test_a_map_that_is_no_equivalence_has_no_certificate(by, message):
+    refuses(message, certificate, EQUIVALENT, "gp", equivalent=load("weierstrass", {"g2": 64}), by=by)
 
 
 @pytest.mark.parametrize("checker", PROGRAMS)

@@ -70,9 +70,24 @@ def test_commuting_maps_and_periods(kahanmaps):
     assert kahanmaps("certificate paper_m2 --for gp --commute associates --claim volume").status == 2
 
 
+def test_equivalent_systems(kahanmaps):
+    command = """certificate "u' = 2*v; v' = 3*u^2 - 1" --for gp --equivalent weierstrass -p g2=4 --by 'u; 2*v'"""
+    first = kahanmaps(command)
+    assert (first.status, first.err) == (0, "-p g2: set in both systems\n")
+    assert "equivalence: T takes the map of inline to that of weierstrass" in first.out
+    (line,) = [line for line in first.out.splitlines() if "kahanmaps certificate" in line]
+    assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
+    outcome = kahanmaps(command.replace("2*v'", "3*v'"))
+    assert (outcome.status, outcome.out) == (1, "")
+    assert "refuted: equivalence takes the map to another one" in outcome.err
+    for rest in ("--equivalent harmonic", "--by u", "--equivalent harmonic --by u --commute harmonic"):
+        assert kahanmaps(f"certificate harmonic --for gp {rest}").status == 2
+
+
 @pytest.mark.parametrize(
     ("command", "status", "says"),
     [
+        ("analyze \"x' = y + 1; y' = 24*(x-2)^2 - 8\"", 0, "equivalence: f is equivalent to weierstrass at g2 = 64"),
         ("check-integrals euler_top", 0, "F2: P/Q is an integral"),
         ("check-integrals euler_top --integral J=F1", 0, "J: P/Q is an integral"),
         ("check-measure lotka_volterra --density 3*x*y", 0, "volume: dx/phi is invariant"),
@@ -104,6 +119,7 @@ def test_checks_and_searches_write_a_certificate_of_what_they_prove(command, sta
         ("check-poisson henon_heiles", ".gp", 1, "is not written: Pi is no Poisson tensor"),
         ("find-integrals lorenz", ".v", 3, "is not written: nothing is proved in this result about lorenz"),
         ("check-integrals euler_top", ".txt", 2, "expected a file that ends with .v, .gp or .py"),
+        ("analyze euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),
         ("check-integrals euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),
         ("find-integrals euler_top --flow", ".gp", 2, "--certificate cannot be combined with --flow"),
         ("find-density euler_top --flow", ".gp", 2, "--flow cannot be combined with --certificate"),
