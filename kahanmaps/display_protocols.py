@@ -57,7 +57,7 @@ class Certified:
             checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
 
         Returns:
-            The text of the script, exact, as that of `km.certificate`.
+            The text of the script, exact, as that of `km.certificate`, with the same attributes.
 
         Raises:
             InputError: why there is no certificate, as for results at one eps, or for what is measured.

@@ -60,12 +60,40 @@ CHECKERS: dict[str, Callable[..., str]] = {
     "gp": partial(script_certificate, GP),
     "sympy": partial(script_certificate, PYTHON),
 }
+# Measured seconds of the programs: to start, for each byte of the text, and for each term that is multiplied out.
+_SECONDS = {"rocq": (1.7, 2.2e-4, 7e-5), "gp": (0.05, 5e-6, 0.0), "sympy": (0.6, 0.0, 1.8e-5)}
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
 TENSOR = "poisson"
 ENTROPY = "entropy"  # positive algebraic entropy, hence not integrable
 DETERMINANT = "determinant"  # that dx/det(I - eps f') is invariant, where the file claims another density
 UNPROVED = "Pi"  # J - eps^2 f'^2 J, where no theorem says that it is invariant
 ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
+
+
+class Certificate(str):
+    """The text of a certificate, with the names of its claims.
+
+    `seconds` is an estimate of the processor time that the program takes to check it, from the sizes of the identities.
+    """
+
+    __slots__ = ("claims", "seconds")
+    claims: tuple[str, ...]
+    seconds: float
+
+    @classmethod
+    def of(cls, checker: str, claims: Sequence[Claim], header: Sequence[str], terms: int) -> Certificate:
+        """Write the script; `terms` is the number of terms of the products that it multiplies out."""
+        text = cls(CHECKERS[checker](claims, header))
+        text.claims = tuple(claim.name for claim in claims)
+        start, by_byte, by_term = _SECONDS[checker]
+        text.seconds = start + by_byte * len(text.encode()) + by_term * terms
+        return text
+
+    @property
+    def summary(self) -> str:
+        """The number of claims and bytes, and the time to check them."""
+        time = f"about {self.seconds:.2g} seconds" if self.seconds >= 1 else "less than a second"
+        return f"{counted(len(self.claims), 'claim')}, {len(self.encode())} bytes, {time} to check"
 
 
 def certificate(
@@ -83,7 +111,7 @@ def certificate(
     period: int | None = None,
     effort: int = 1,
     command: str = "",
-) -> str:
+) -> Certificate:
     """Write a proof that another program checks: integrals, invariant volume forms and further claims, for every eps.
 
     Args:
@@ -109,7 +137,8 @@ def certificate(
 
     Returns:
         The text of the script, exact. It defines the map by its equation M(x, eps) x~ = r(x, eps), states each claim,
-        and proves it by identities of polynomials, without kahanmaps. The time step is 2 eps.
+        and proves it by identities of polynomials, without kahanmaps. The time step is 2 eps. This text has further
+        attributes: `claims`, their names, and `seconds`, an estimate of the time that the program takes.
 
     Raises:
         FalseClaim: for a claim that is not true.
@@ -123,7 +152,7 @@ def certificate(
     """
     if isinstance(claims, str):
         raise InputError(f"found claims = {claims!r}, expected a list: claims=[{claims!r}]")
-    with limited(effort):
+    with limited(effort) as limits:
         file = as_file(system)
         formulas, data = _prepared(file, checker)
         planes, proved = _Planes(file, data), list[Claim]()
@@ -183,7 +212,7 @@ def certificate(
                 f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
                 f"or search with kahanmaps find-integrals {file.name} --toml"
             )
-        return _written(checker, proved, formulas.header(command), skipped)
+        return _written(checker, proved, formulas.header(command), skipped, limits.terms)
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
@@ -201,7 +230,7 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
     return [name for name in names if name not in (VOLUME, DETERMINANT, TENSOR, UNPROVED, ENTROPY)]
 
 
-def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
+def certificate_of(result: Any, checker: str, *, command: str = "") -> Certificate:
     """Write a proof that another program checks, of what a check or a search has proved about a map.
 
     Args:
@@ -252,28 +281,32 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
         inverse = data.with_rows(formulas.map.inverse_rows)
         if checker != "rocq":
             finds[ENTROPY] = lambda: [positive_entropy(data, inverse)]
-    for name, find in finds.items():
-        try:
-            claims += find()
-        except FalseClaim:
-            raise
-        except InputError as error:  # of all results of an analysis those that are short enough
-            if parts == [result]:
+    with limited(1) as limits:
+        for name, find in finds.items():
+            try:
+                claims += find()
+            except FalseClaim:
                 raise
-            skipped.append(f"{name}: {error}")
+            except InputError as error:  # of all results of an analysis those that are short enough
+                if parts == [result]:
+                    raise
+                skipped.append(f"{name}: {error}")
     if not claims:
         raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
-    return _written(checker, claims, formulas.header(command), skipped)
+    return _written(checker, claims, formulas.header(command), skipped, limits.terms)
 
 
-def _written(checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str]) -> str:
+def _written(
+    checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
+) -> Certificate:
     """The script; the comment on top also says what the claims are about, and which ones it does not have."""
     pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
     about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
-    return CHECKERS[checker](claims, [*header, *about, *(f"Not in this certificate: {text}" for text in skipped)])
+    left_out = [f"Not in this certificate: {text}" for text in skipped]
+    return Certificate.of(checker, claims, [*header, *about, *left_out], terms)
 
 
-def _of_check(result: Report | Finding, checker: str, command: str) -> str:
+def _of_check(result: Report | Finding, checker: str, command: str) -> Certificate:
     """The certificate of a check, or of one of its claims."""
     arguments = dict(result.certified)
     if "why_not" in arguments or not arguments:

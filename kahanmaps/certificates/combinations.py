@@ -57,6 +57,15 @@ class AffineSymmetry(EquationClaim):
     reversing: bool
     about: str = ""  # for the comment on top: what the target is
 
+    @property
+    def inverse(self) -> list[tuple[fmpq_mpoly, int]]:
+        """The inverse of T, each coordinate as a polynomial over Z and its divisor."""
+        n, zero, letters = self.data.dim, (0,) * len(self.data.names), ring(self.data.names).gens()
+        S = fmpq_mat([[P.derivative(j)[zero] for j in range(n)] for P in self.image]).inv()
+        moved = [self.divisor * x - P[zero] for x, P in zip(letters, self.image, strict=False)]
+        images = [sum((S[i, j] * moved[j] for j in range(n)), letters[0] * 0) for i in range(n)]
+        return [(P * common_denominator(P), int(common_denominator(P))) for P in images]
+
 
 @dataclass(frozen=True)
 class ChangedFunction(EquationClaim):

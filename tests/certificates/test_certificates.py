@@ -521,6 +521,20 @@ def test_the_limit_of_the_length_doubles_with_the_effort():
     refuses("found the effort 99, expected an integer from -20 to 40", certificate, file, "gp", ["F"], effort=99)
 
 
+# Seconds of processor time that Coq took, of which it takes 2 to start.
+MEASURED = [("lyness", 2.6), ("zander_111", 4.3), ("planar_cubic_hamiltonian", 6.3), ("euler_top", 12.8)]
+MEASURED += [("qrt_asymmetric", 14.8), ("repaired_icosahedral", 31.4), ("volterra_periodic_4", 37.2)]
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds"), [*MEASURED[:4], *(pytest.param(*case, marks=pytest.mark.slow) for case in MEASURED[4:])]
+)
+def test_the_time_that_is_said_beforehand_is_that_of_coq_within_a_factor_of_3(name, seconds):
+    text = certificate(load(name), "rocq", everything=True)
+    assert seconds / 3 < text.seconds < 3 * seconds
+    assert str(len(text)) in text.summary
+
+
 @pytest.mark.parametrize("claim", ["euler_top F1", "zander_111 F", "repaired_icosahedral F"])
 def test_the_conserved_polynomials_have_the_same_cofactor_over_Z(claim):
     name, integral = claim.split()

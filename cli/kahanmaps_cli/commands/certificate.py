@@ -8,10 +8,11 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli.commands.convert import write_text
-from kahanmaps_cli.options import integral_option, load_pair, load_system, quiet_option, system_options
+from kahanmaps_cli.options import integral_option, load_pair, load_system, output_options, system_options
 from kahanmaps_cli.params import Whole
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import as_typed, print_stderr
+from kahanmaps_cli.screen.render import envelope, print_json
 
 _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certificate, which --help does not load
 
@@ -54,8 +55,8 @@ _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certifica
     help="Limit for the length of the identities: each increment by 1 doubles it.",
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
-@quiet_option
-def command(system: str | None, checker: str, output: str | None, quiet: bool, **options: Any) -> int:
+@output_options
+def command(system: str | None, checker: str, output: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Write proofs about the map of SYSTEM that Coq (Rocq), PARI/GP or SymPy checks.
 
     \b
@@ -71,6 +72,9 @@ def command(system: str | None, checker: str, output: str | None, quiet: bool, *
     integral or a Darboux polynomial, that a volume form or a Poisson tensor is invariant, or that the map has a
     symmetry, and proves it by identities of polynomials, without kahanmaps. gp and python print true for each identity,
     and end with a status that is not 0 if one does not hold.
+
+    A line on standard error says how many claims and bytes it has, and estimates the seconds that the program takes to
+    check it. --json prints these numbers, and the text unless it goes to FILE.
 
     Exit status: 0 the certificate is written, 1 a claim is false, 2 usage error.
     """
@@ -120,5 +124,12 @@ def command(system: str | None, checker: str, output: str | None, quiet: bool, *
     except lib.FalseClaim as error:
         print_stderr(f"refuted: {error}")
         return 1
-    write_text(text, f"{file.name}: a certificate for {checker}", output, quiet)
+    if not quiet:
+        print_stderr(f"{file.name}: {text.summary}")
+    if as_json:
+        size = {"lines": len(text.splitlines()), "bytes": len(text.encode()), "seconds": float(f"{text.seconds:.2g}")}
+        more = {"for": checker, "claims": list(text.claims), **size, "text": str(text) if output is None else None}
+        print_json({**envelope("certificate"), "system": file.name, **more})
+    if output is not None or not as_json:
+        write_text(text, f"{file.name}: a certificate for {checker}", output, quiet)
     return 0
