@@ -254,9 +254,13 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
     if isinstance(result, Report | Finding):
         return _of_check(result, checker, command)
     parts: list[Any] = [result]
+    skipped = list[str]()
     if isinstance(result, Analysis):
-        parts = [result.integrals, result.densities, result.poisson, result.symmetries, result.commuting]
-        parts.append(None if result.symbols else result.equivalent)
+        parts = [result.integrals, result.densities, result.poisson]
+        if result.symbols:
+            skipped.append("symmetries, commuting and equivalent systems: they are about the values in the file")
+        else:
+            parts += [result.symmetries, result.commuting, result.equivalent]
     if isinstance(result, Analysis | Search):
         file, symbols = result.file, result.symbols
     elif isinstance(result, Equivalence) and result.file is not None:
@@ -273,7 +277,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
         what = "the flow" if is_of_flow else f"eps = {eps}"
         raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
     formulas, data = _prepared(file, checker, symbols)
-    claims, skipped = list[Claim](), list[str]()
+    claims = list[Claim]()
     finds: dict[str, Callable[[], list[Any]]] = {
         type(part).__name__: partial(_claims_of, part, data) for part in parts if part is not None
     }
@@ -337,6 +341,7 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = 
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
         others = [associate.system for associate in listed_associates(file.member)]
+        others += [others[0].scaled(-1)] if len(others) == 1 else []  # as check_commute does
         maps: list[MapFamily] = [as_map(system) for system in others]
     else:
         second = as_file(other)

@@ -142,7 +142,7 @@ def check_commute(
         proof = theorems.commuting_by_splitting(file.system, g.system)
     identity = commutativity(f, g, settings.eps, ("f", "g"), ratio)
     orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
-    certified = settings.certified(file, commute=second) if is_same_step else {}
+    certified = settings.certified(file, commute=second)
     kahan = "Kahan maps" if file.is_quadratic and second.is_quadratic else "maps"
     finding = certify(
         f"the {kahan} of {file.labelled('f')} and {second.labelled('g')} commute",

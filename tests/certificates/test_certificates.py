@@ -57,8 +57,10 @@ from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
+from kahanmaps.family.random_members import random_member
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
 from kahanmaps.laboratory.growth.degrees import degree_growth
@@ -578,6 +580,15 @@ def test_the_certificate_of_a_finding_is_about_its_claim():
 def test_an_analysis_writes_one_certificate_of_all_that_it_proves():
     text = analyze("lotka_volterra").certificate("gp")
     assert [f" {name}" in text for name in ("volume_1: ", "T1: ", "entropy: ")] == [True] * 3
+    text = analyze("euler_top", symbols=["a1"], effort=-2).certificate("gp")
+    assert "Parameters left as symbols: a1" in text
+    assert "Not in this certificate: symmetries, commuting and equivalent systems" in text
+
+
+def test_a_member_with_one_associated_system_has_the_certificate_that_its_map_and_the_inverse_commute():
+    member = SystemFile.from_member(random_member(1, seed=3))
+    assert certificate(member, "gp", commute="associates").claims == ("maps_1_and_2_commute",)
+    assert check_commute(member).certificate("gp").claims == ("maps_1_and_2_commute",)
 
 
 @pytest.mark.parametrize(
