@@ -45,7 +45,32 @@ class WithoutTruthValue:
         raise TypeError(f"the truth value of {article} {name} is ambiguous: {hint}")
 
 
-class PrintableResult(HtmlDisplay, WithoutTruthValue):
+class Certified:
+    """Base class of results: what they prove about a map has a certificate, or the error says why not."""
+
+    __slots__ = ()
+
+    def certificate(self, checker: str) -> str:
+        """Write a proof of what is proved here about a map, for every eps, that another program checks.
+
+        Args:
+            checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
+
+        Returns:
+            The text of the script, exact, as that of `km.certificate`, with the same attributes.
+
+        Raises:
+            InputError: why there is no certificate, as for results at one eps, or for what is measured.
+
+        >>> from kahanmaps.checks.conserve import check_integrals
+        >>> check_integrals("euler_top").findings[0].certificate("gp").splitlines()[-1]
+        'quit(!ok)'
+        """
+        text: str = import_module("kahanmaps.certificates.certificate").certificate_of(self, checker)
+        return text
+
+
+class PrintableResult(HtmlDisplay, WithoutTruthValue, Certified):
     """Base class of results that `print` shows as the output of their command.
 
     A result with parts is a sequence of them: `_parts` is the name of the attribute, `_noun` the word for one part and
@@ -114,7 +139,7 @@ def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
 _TEXTS = ("text", "sentence", "summary", "claim", "reason", "rhs")
 
 
-class ResultPart(AttributeHints):
+class ResultPart(AttributeHints, Certified):
     """Base class of the parts of results, which are shown by the first of the attributes `_TEXTS` that they have."""
 
     __slots__ = ()

@@ -26,8 +26,6 @@ from .atomic_files import atomic_write as atomic_write
 from .atomic_files import resolved as resolved
 from .atomic_files import write_atomically as write_atomically
 from .certificates.certificate import certificate as certificate
-from .certificates.certificate import certificate_of as certificate_of
-from .certificates.certificate import known_claims as known_claims
 from .certificates.identities import FalseClaim as FalseClaim
 from .checks.claims import Certainty as Certainty
 from .checks.claims import Evidence as Evidence

@@ -8,9 +8,10 @@ from functools import cached_property, partial
 from itertools import combinations
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import integer
+from kahanmaps.algebra.parsing import parse_polynomial
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.certificates.chains import commuting, periodic
 from kahanmaps.certificates.combinations import (
@@ -33,19 +34,23 @@ from kahanmaps.certificates.identities import (
 )
 from kahanmaps.certificates.rocq import rocq_certificate
 from kahanmaps.certificates.scripts import GP, PYTHON, script_certificate
-from kahanmaps.checks.claims import Certainty
+from kahanmaps.checks.claims import Certainty, Finding, Report
 from kahanmaps.checks.settings import claimed_function, claimed_functions, claimed_tensor
 from kahanmaps.checks.theorems import listed_associates, poisson_tensor_invariant
+from kahanmaps.documents.expressions import formula_text
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.documents.inline import as_file
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
+from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Separated, separated
 from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import DarbouxSearch, darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.preserve.poisson.poisson_tensors import PoissonSearch, find_poisson
 from kahanmaps.laboratory.preserve.results import Search
+from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries, linear_symmetries
+from kahanmaps.laboratory.vector_field.equivalence import Equivalence, equivalent_system
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
@@ -55,11 +60,40 @@ CHECKERS: dict[str, Callable[..., str]] = {
     "gp": partial(script_certificate, GP),
     "sympy": partial(script_certificate, PYTHON),
 }
+# Measured seconds of the programs: to start, for each byte of the text, and for each term that is multiplied out.
+_SECONDS = {"rocq": (1.7, 2.2e-4, 7e-5), "gp": (0.05, 5e-6, 0.0), "sympy": (0.6, 0.0, 1.8e-5)}
 VOLUME = "volume"  # the name of the claim that dx/phi is invariant
 TENSOR = "poisson"
 ENTROPY = "entropy"  # positive algebraic entropy, hence not integrable
+DETERMINANT = "determinant"  # that dx/det(I - eps f') is invariant, where the file claims another density
 UNPROVED = "Pi"  # J - eps^2 f'^2 J, where no theorem says that it is invariant
 ASSOCIATES = "associates"  # instead of another system: the associated systems of a member of the commuting family
+
+
+class Certificate(str):
+    """The text of a certificate, with the names of its claims.
+
+    `seconds` is an estimate of the processor time that the program takes to check it, from the sizes of the identities.
+    """
+
+    __slots__ = ("claims", "seconds")
+    claims: tuple[str, ...]
+    seconds: float
+
+    @classmethod
+    def of(cls, checker: str, claims: Sequence[Claim], header: Sequence[str], terms: int) -> Certificate:
+        """Write the script; `terms` is the number of terms of the products that it multiplies out."""
+        text = cls(CHECKERS[checker](claims, header))
+        text.claims = tuple(claim.name for claim in claims)
+        start, by_byte, by_term = _SECONDS[checker]
+        text.seconds = start + by_byte * len(text.encode()) + by_term * terms
+        return text
+
+    @property
+    def summary(self) -> str:
+        """The number of claims and bytes, and the time to check them."""
+        time = f"about {self.seconds:.2g} seconds" if self.seconds >= 1 else "less than a second"
+        return f"{counted(len(self.claims), 'claim')}, {len(self.encode())} bytes, {time} to check"
 
 
 def certificate(
@@ -72,10 +106,12 @@ def certificate(
     tensor: Any = None,
     everything: bool = False,
     commute: SystemLike | None = None,
+    equivalent: SystemLike | None = None,
+    by: Sequence[Any] = (),
     period: int | None = None,
     effort: int = 1,
     command: str = "",
-) -> str:
+) -> Certificate:
     """Write a proof that another program checks: integrals, invariant volume forms and further claims, for every eps.
 
     Args:
@@ -83,23 +119,26 @@ def certificate(
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
-            (Darboux polynomials up to degree 2) and "symmetry" for what a search finds and proves; "entropy" for
-            positive entropy of a map of the plane (gp and sympy only). None: only the claims of the following arguments
-            or, without any, all claims that need no search.
+            (Darboux polynomials up to degree 2), "symmetry" and "equivalence" (to a system of the catalogue) for what a
+            search finds and proves; "entropy" for positive entropy of a map of the plane, for gp and sympy. None for
+            all that need no search, or for the following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         density: phi, as `check_measure` takes it.
         tensor: a Poisson tensor, as `check_poisson` takes it.
         everything: whether to search for all of these claims, too.
         commute: another system or map, in the same variables: certify that the two maps commute. For members of the
-            commuting family the proof uses coordinates in which the planes separate; "associates" stands for all pairs
-            of rational associated systems.
+            commuting family this is written in coordinates in which the planes separate; "associates" stands for all
+            pairs of rational associated systems.
+        equivalent: another quadratic system g, of the same dimension: certify that T takes the Kahan map to that of g.
+        by: T, one polynomial of degree 1 in the variables for each variable of g, as text.
         period: certify that this iterate of the map is the identity.
         effort: each increase by 1 doubles the limit for the length of the identities.
         command: the command line that writes this script, for the comment on top.
 
     Returns:
         The text of the script, exact. It defines the map by its equation M(x, eps) x~ = r(x, eps), states each claim,
-        and proves it by identities of polynomials, without kahanmaps. The time step is 2 eps.
+        and proves it by identities of polynomials, without kahanmaps. The time step is 2 eps. This text has further
+        attributes: `claims`, their names, and `seconds`, an estimate of the time that the program takes.
 
     Raises:
         FalseClaim: for a claim that is not true.
@@ -113,14 +152,19 @@ def certificate(
     """
     if isinstance(claims, str):
         raise InputError(f"found claims = {claims!r}, expected a list: claims=[{claims!r}]")
-    with limited(effort):
+    with limited(effort) as limits:
         file = as_file(system)
         formulas, data = _prepared(file, checker)
         planes, proved = _Planes(file, data), list[Claim]()
         if commute is not None:
-            if any(other is not None for other in (claims, integrals, density, tensor, period)) or everything:
+            if (
+                any(other is not None for other in (claims, integrals, density, tensor, period, equivalent))
+                or everything
+            ):
                 raise InputError("a certificate that two maps commute cannot be combined with other claims")
             proved = _commuting(file, data, commute)
+        if equivalent is not None:
+            proved.append(_equivalence(file, data, as_file(equivalent), by))
         if period is not None:
             if integer(period, "period") < 1:
                 raise InputError(f"found period = {period}, expected a positive integer")
@@ -139,7 +183,7 @@ def certificate(
         is_required = claims is not None
         if claims is None:
             claims = [] if proved and not everything else [*known, *(searches if everything else ())]
-            unwanted = {UNPROVED} | (set() if file.is_quadratic else {"symmetry"})
+            unwanted = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry", "equivalence"})
             has_integral = bool(formulas.integrals) or formulas.H is not None  # hence no positive entropy
             unwanted |= {ENTROPY} if has_integral or checker == "rocq" or not everything else set()
             claims = [name for name in claims if name not in unwanted]
@@ -168,9 +212,7 @@ def certificate(
                 f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
                 f"or search with kahanmaps find-integrals {file.name} --toml"
             )
-        return CHECKERS[checker](
-            proved, [*formulas.header(command), *(f"Not in this certificate: {reason}" for reason in skipped)]
-        )
+        return _written(checker, proved, formulas.header(command), skipped, limits.terms)
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
@@ -182,18 +224,17 @@ def known_claims(file: SystemFile, check: str) -> list[str]:
     """
     formulas, data = _prepared(file, "gp")
     names = [name for name, _ in _known_claims(formulas, _Planes(file, data))]
-    special = {"measure": {VOLUME}, "poisson": {TENSOR, UNPROVED}}
+    special = {"measure": {VOLUME, DETERMINANT}, "poisson": {TENSOR, UNPROVED}}
     if check in special:
         return [name for name in names if name in special[check]]
-    return [name for name in names if name not in (VOLUME, TENSOR, UNPROVED, ENTROPY)]
+    return [name for name in names if name not in (VOLUME, DETERMINANT, TENSOR, UNPROVED, ENTROPY)]
 
 
-def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
-    """Write a proof, checked by another program, of the results that a search has found and proved.
+def certificate_of(result: Any, checker: str, *, command: str = "") -> Certificate:
+    """Write a proof that another program checks, of what a check or a search has proved about a map.
 
     Args:
-        result: a result, for every eps, of `find_integrals`, `find_density`, `find_poisson`, `darboux_polynomials` or
-            `find_symmetry`.
+        result: what `analyze`, `verify`, a check or a search returns, for every eps, or a finding of a report.
         checker: "rocq" (Coq 8.16 or newer), "gp" (PARI/GP) or "sympy".
         command: the command line that writes this script, for the comment on top.
 
@@ -201,26 +242,83 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
         The text of the script, exact, as that of `certificate`. Symbols of the search stay symbols.
 
     Raises:
-        InputError: if nothing is proved, for results at one eps or about the flow, and for too long identities.
+        FalseClaim: for a claim that is not true.
+        InputError: where nothing is proved, for results at one eps or about the flow, and for identities that are too
+            long.
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])
     quit(!ok)
     """
-    if not isinstance(result, Search | Symmetries):
-        raise InputError(f"expected the result of a search, got {type(result).__name__}: use certificate(system, ...)")
-    if isinstance(result, Symmetries):
+    result = getattr(result, "finding", result)  # that of a commuting system
+    if isinstance(result, Report | Finding):
+        return _of_check(result, checker, command)
+    parts: list[Any] = [result]
+    skipped = list[str]()
+    if isinstance(result, Analysis):
+        parts = [result.integrals, result.densities, result.poisson]
+        if result.symbols:
+            skipped.append("symmetries, commuting and equivalent systems: they are about the values in the file")
+        else:
+            parts += [result.symmetries, result.commuting, result.equivalent]
+    if isinstance(result, Analysis | Search):
+        file, symbols = result.file, result.symbols
+    elif isinstance(result, Equivalence) and result.file is not None:
+        file, symbols = result.file, ()
+    elif isinstance(result, Symmetries | CommutingSystems):
         file, symbols = SystemFile.from_system(result.system, "system"), result.system.symbols
     else:
-        file, symbols = result.file, result.symbols
-        if result.flow or result.eps is not None:
-            what = "the flow" if result.flow else f"eps = {result.eps}"
-            raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
+        raise InputError(
+            f"a {type(result).__name__} has no certificate: it proves nothing about a map, or is a part of a result; "
+            "type result.certificate(checker) of the search or check, or km.certificate(system, checker)"
+        )
+    is_of_flow, eps = getattr(result, "flow", False) is True, getattr(result, "eps", None)
+    if is_of_flow or eps is not None:
+        what = "the flow" if is_of_flow else f"eps = {eps}"
+        raise InputError(f"a certificate is about a map, for every eps: found a result for {what}")
     formulas, data = _prepared(file, checker, symbols)
-    claims = _claims_of(result, data)
+    claims = list[Claim]()
+    finds: dict[str, Callable[[], list[Any]]] = {
+        type(part).__name__: partial(_claims_of, part, data) for part in parts if part is not None
+    }
+    if isinstance(result, Analysis) and result.conclusion.kind == "not integrable" and data.dim == 2:
+        inverse = data.with_rows(formulas.map.inverse_rows)
+        if checker != "rocq":
+            finds[ENTROPY] = lambda: [positive_entropy(data, inverse)]
+    with limited(1) as limits:
+        for name, find in finds.items():
+            try:
+                claims += find()
+            except FalseClaim:
+                raise
+            except InputError as error:  # of all results of an analysis those that are short enough
+                if parts == [result]:
+                    raise
+                skipped.append(f"{name}: {error}")
     if not claims:
         raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
-    return CHECKERS[checker](claims, formulas.header(command))
+    return _written(checker, claims, formulas.header(command), skipped, limits.terms)
+
+
+def _written(
+    checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
+) -> Certificate:
+    """The script; the comment on top also says what the claims are about, and which ones it does not have."""
+    pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
+    about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
+    left_out = [f"Not in this certificate: {text}" for text in skipped]
+    return Certificate.of(checker, claims, [*header, *about, *left_out], terms)
+
+
+def _of_check(result: Report | Finding, checker: str, command: str) -> Certificate:
+    """The certificate of a check, or of one of its claims."""
+    arguments = dict(result.certified)
+    if "why_not" in arguments or not arguments:
+        about = "no other program is told how to check these claims" if isinstance(result, Report) else result.claim
+        raise InputError(arguments.get("why_not", f"no certificate is known for this claim: {about}"))
+    if known := arguments.pop("known", ""):
+        arguments["claims"] = known_claims(arguments["system"], known)
+    return certificate(checker=checker, command=command, **arguments)
 
 
 def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tuple[Formulas, MapData]:
@@ -237,12 +335,13 @@ def _prepared(file: SystemFile, checker: str, symbols: Sequence[str] = ()) -> tu
     return formulas, map_data(formulas.equation, formulas.variables, formulas.new, (*formulas.names, "eps"))
 
 
-def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim]:
-    """The claims that two maps commute, in coordinates in which the planes separate if there are any."""
+def _commuting(file: SystemFile, data: MapData, other: SystemLike, label: str = "") -> list[Claim]:
+    """The claims that maps commute, in separate coordinates if there are any; their names begin with the label."""
     if isinstance(other, str) and other == ASSOCIATES:
         if file.member is None:
             raise InputError(f"{file.name} is of kind [{file.kind}]: expected a member of the commuting family")
         others = [associate.system for associate in listed_associates(file.member)]
+        others += [others[0].scaled(-1)] if len(others) == 1 else []  # as check_commute does
         maps: list[MapFamily] = [as_map(system) for system in others]
     else:
         second = as_file(other)
@@ -259,11 +358,29 @@ def _commuting(file: SystemFile, data: MapData, other: SystemLike) -> list[Claim
         moved = [map_.system.composed(T, zero).transformed(T.inv()) for map_ in maps]  # type: ignore[attr-defined]
         in_planes = [data.with_rows(as_map(system).rows) for system in moved]
         pairs = enumerate(zip(in_planes, given, strict=True), 1)
-        claims += [affine_symmetry(z, f"coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
+        claims += [affine_symmetry(z, f"{label}coordinates_{k}", T, zero, target=x) for k, (z, x) in pairs]
         given = in_planes
     pairs_of = combinations(range(len(given)), 2)
-    claims += [commuting(f"maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
+    claims += [commuting(f"{label}maps_{i + 1}_and_{j + 1}_commute", given[i], given[j]) for i, j in pairs_of]
     return claims
+
+
+def _equivalence(file: SystemFile, data: MapData, other: SystemFile, by: Sequence[Any]) -> AffineSymmetry:
+    """The claim that the affine map takes the Kahan map of the file to that of the other system."""
+    n = file.dim
+    if not (file.is_quadratic and other.is_quadratic) or other.dim != n or len(by) != n:
+        raise InputError(
+            f"found {file.name}, {other.name} and {counted(len(by), 'polynomial')}, expected two quadratic systems of "
+            "the same dimension, and for each variable of the second a polynomial in those of the first"
+        )
+    T = [parse_polynomial(formula_text(text), file.variables, file.parameters) for text in by]
+    if any(degree_in(P, n) > 1 for P in T):
+        raise InputError(f"found {', '.join(map(str, by))}, expected polynomials of degree at most 1")
+    zero = (0,) * n
+    S = fmpq_mat([[P.derivative(j)[zero] for j in range(n)] for P in T])
+    target = data.with_rows(as_map(other.system.renamed(file.variables)).rows)
+    about = f"T takes the map of {file.name} to that of {other.name}"
+    return affine_symmetry(data, "equivalence", S, [P[zero] for P in T], target=target, about=about)
 
 
 def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
@@ -281,8 +398,9 @@ def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Ca
         yield name, one(bilinear_integral, name, form)
     if formulas.density is not None:
         yield VOLUME, one(invariant_volume, VOLUME, formulas.density)
-    elif H is not None:
-        yield VOLUME, lambda: [invariant_volume(data, VOLUME, _polynomial(data.determinant))]
+    if H is not None:
+        volume = VOLUME if formulas.density is None else DETERMINANT
+        yield volume, lambda: [invariant_volume(data, volume, _polynomial(data.determinant))]
     if data.dim == 2:
         yield ENTROPY, lambda: [positive_entropy(data, data.with_rows(formulas.map.inverse_rows))]
     if file.hamiltonian is not None:
@@ -322,7 +440,9 @@ class _Planes:
 
 
 def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> list[Claim]:
-    """The claims about the map that the result of a search proves."""
+    """What the result of a search proves about the map; None is that of one that found nothing."""
+    if result is None:
+        return []
     proved = Certainty.PROVED
     if isinstance(result, IntegralSearch):
         planes = planes or _Planes(result.file, data)
@@ -341,6 +461,13 @@ def _claims_of(result: Any, data: MapData, planes: _Planes | None = None) -> lis
         polynomials = [P for P in polynomials if degree_in(P.gcd(data.determinant), data.dim) <= 0]
         functions = [(f"D{k}", _polynomial(P)) for k, P in enumerate(polynomials, 1)]
         return [claim for name, P in functions for claim in planes.claims(darboux_polynomial, name, P)]
+    if isinstance(result, Equivalence):
+        target, about = data.with_rows(as_map(result.system).rows), f"f is {result.text}"
+        return [affine_symmetry(data, "equivalence", result.P, result.q, target=target, about=about)]
+    if isinstance(result, CommutingSystems):
+        file = SystemFile.from_system(result.system, "system")
+        systems = [field.system for field in result.nontrivial if field.finding.verdict is proved]
+        return [claim for k, g in enumerate(systems, 1) for claim in _commuting(file, data, g, f"g{k}_")]
     assert isinstance(result, Symmetries)
     symmetries = [symmetry for symmetry in result.generators if not symmetry.is_trivial]
     return [affine_symmetry(data, f"T{k}", T.S, T.r, T.reversing) for k, T in enumerate(symmetries, 1)]
@@ -352,6 +479,7 @@ _SEARCHES: dict[str, Callable[[SystemFile], Any]] = {
     TENSOR: find_poisson,
     "darboux": partial(darboux_polynomials, max_degree=2),
     "symmetry": linear_symmetries,
+    "equivalence": equivalent_system,
 }
 
 

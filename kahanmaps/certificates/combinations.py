@@ -55,6 +55,16 @@ class AffineSymmetry(EquationClaim):
     matrix: tuple[tuple[int, ...], ...]
     multiple: int
     reversing: bool
+    about: str = ""  # for the comment on top: what the target is
+
+    @property
+    def inverse(self) -> list[tuple[fmpq_mpoly, int]]:
+        """The inverse of T, each coordinate as a polynomial over Z and its divisor."""
+        n, zero, letters = self.data.dim, (0,) * len(self.data.names), ring(self.data.names).gens()
+        S = fmpq_mat([[P.derivative(j)[zero] for j in range(n)] for P in self.image]).inv()
+        moved = [self.divisor * x - P[zero] for x, P in zip(letters, self.image, strict=False)]
+        images = [sum((S[i, j] * moved[j] for j in range(n)), letters[0] * 0) for i in range(n)]
+        return [(P * common_denominator(P), int(common_denominator(P))) for P in images]
 
 
 @dataclass(frozen=True)
@@ -130,14 +140,22 @@ def bilinear_integral(data: MapData, name: str, B: fmpq_mat) -> OrbitIntegral:
 
 
 def affine_symmetry(
-    data: MapData, name: str, S: fmpq_mat, shift: Sequence[fmpq], reversing: bool = False, target: MapData | None = None
+    data: MapData,
+    name: str,
+    S: fmpq_mat,
+    shift: Sequence[fmpq],
+    reversing: bool = False,
+    target: MapData | None = None,
+    about: str = "",
 ) -> AffineSymmetry:
     """The identity by which T(x) = S x + shift takes the map to the target (by default itself) or to its inverse.
 
     Raises:
-        FalseClaim: if it does not.
+        FalseClaim: if it does not, or is not invertible.
     """
     target = target or data
+    if S.det() == 0:
+        raise FalseClaim(f"{name} is not invertible: no certificate can be written")
     n, names = data.dim, data.two_points
     context = ring(names)
     gens = context.gens()
@@ -152,11 +170,12 @@ def affine_symmetry(
     own = data.residual(names, 0, n)
     for row, value in zip(matrix, moved, strict=True):
         if value * multiple != sum((c * P for c, P in zip(row, own, strict=True)), context.constant(0)):
-            raise FalseClaim(f"{name} is no {'reversing ' * reversing}symmetry: no certificate can be written")
+            what = f"is no {'reversing ' * reversing}symmetry" if target is data else "takes the map to another one"
+            raise FalseClaim(f"{name} {what}: no certificate can be written")
     image = tuple(
         ring(data.names).constant(0) + divisor * _affine(S, shift, ring(data.names).gens(), i) for i in range(n)
     )
-    return AffineSymmetry(name, data, target, image, divisor, matrix, multiple, reversing)
+    return AffineSymmetry(name, data, target, image, divisor, matrix, multiple, reversing, about)
 
 
 def changed_function(

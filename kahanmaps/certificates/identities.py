@@ -38,17 +38,25 @@ MAX_TERMS = 20_000  # of one side of an identity, multiplied out: some ten secon
 MAX_PRODUCTS = 20_000_000  # of terms, to multiply one side out: some ten seconds for PARI
 
 
-_MULTIPLE: ContextVar[float] = ContextVar("multiple of the limits", default=1.0)
+@dataclass
+class Limits:
+    """A multiple of the limits, and the number of terms of all products so far."""
+
+    multiple: float = 1.0
+    terms: int = 0
+
+
+_LIMITS: ContextVar[Limits] = ContextVar("limits", default=Limits())  # noqa: B039  # outside of `limited` no terms count
 
 
 @contextmanager
-def limited(effort: int) -> Iterator[None]:
-    """Return limits for the identities of a certificate; each increase of the effort by 1 doubles them."""
-    token = _MULTIPLE.set(units_at(effort, 1.0))
+def limited(effort: int) -> Iterator[Limits]:
+    """Limits for the identities of a certificate: doubled for each step of the effort above 1."""
+    token = _LIMITS.set(limits := Limits(units_at(effort, 1.0)))
     try:
-        yield
+        yield limits
     finally:
-        _MULTIPLE.reset(token)
+        _LIMITS.reset(token)
 
 
 def check_limits(terms: int, products: int = 0) -> None:
@@ -57,11 +65,13 @@ def check_limits(terms: int, products: int = 0) -> None:
     Raises:
         InputError: if these are too many.
     """
+    limits = _LIMITS.get()
+    limits.terms += terms
     for found, limit, what in (
         (products, MAX_PRODUCTS, "take more than {} products of terms to multiply out"),
         (terms, MAX_TERMS, "have more than {} terms when multiplied out"),
     ):
-        if found > (most := round(limit * _MULTIPLE.get())):
+        if found > (most := round(limit * limits.multiple)):
             raise InputError(f"the identities of the certificate {what.format(most)}; raise --effort")
 
 

@@ -241,10 +241,14 @@ class _Script:
         points = [[f"(({self.text(P)}) / {claim.divisor})" for P in side] for side in polynomials]
         first, second = (" ".join(side) for side in (reversed(points) if claim.reversing else points))
         target, letters = ("maps", "e") if is_own else ("target", "ef")
+        onto = " /\\ ".join(f"{image} = {name}" for image, name in zip(points[1], self.old, strict=True))
+        preimage = [f"(({self.text(P)}) / {divisor})" for P, divisor in claim.inverse]
         lines = [
             *self.predicate(),
             *([] if is_own else self.predicate("f", target, claim.target)),
             f"(* {'To the inverse' if claim.reversing else 'Map to map'} by T: {', '.join(points[0])} *)",
+            f"Theorem {theorem}_is_onto : forall {x}, exists {y}, {onto}.",
+            f"Proof. intros {x}. exists {', '.join(preimage)}. {'split; [field |]. ' * (n - 1)}field. Qed.",
             f"Theorem {theorem} : forall {x} {y}, maps {x} {y} ->",
             f"  {target} {first} {second}.",
             "Proof.",

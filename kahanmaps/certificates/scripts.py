@@ -444,6 +444,7 @@ class _Script:
     @prove.register
     def symmetry(self, claim: AffineSymmetry, label: str) -> None:
         self._affine(claim)
+        self.check(f"{label}: T is invertible", "det(derivative(T, old)) != 0")
         self.define("Y", "put(T, old, new)")
         self.define("K", self.matrix([[str(entry) for entry in row] for row in claim.matrix]))
         target = "E" if claim.target is self.data else "Et"

@@ -8,6 +8,9 @@ the field of rational functions, within a budget of products of terms.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from kahanmaps.algebra.functions import DEFAULT_BUDGET, BudgetExceeded, FunctionField
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Witness
 from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
@@ -36,6 +39,7 @@ def certify(
     formula: str = "",
     source: str = "",
     control: bool = False,
+    certified: Mapping[str, Any] | None = None,
 ) -> Finding:
     """Certify a claim that is stated as an identity, and return the finding.
 
@@ -47,6 +51,7 @@ def certify(
         orbit: an exact orbit along which the identity is tried as well.
         formula, source: the formula and its reference, for the report.
         control: whether the claim is expected to be refuted; then it is not expanded.
+        certified: the arguments of `certificate` for the claim.
 
     Returns:
         The finding: proved by the theorem or by expansion, otherwise supported, refuted (with a witness) or undecided.
@@ -62,7 +67,8 @@ def certify(
             raise Contradiction(f"{claim}: {proof.summary}, but it {decision.evidence.summary} {decision.witness}")
         if decision.evidence.data.get("poles_met") and decision.verdict is Certainty.UNDECIDED:
             # A theorem on a map that is defined nowhere, with det(I - eps f') = 0 for all x, says nothing.
-            return Finding(claim, decision.verdict, decision.evidence, (), None, formula, source, control)
+            verdict, evidence = decision.verdict, decision.evidence
+            return Finding(claim, verdict, evidence, (), None, formula, source, control, certified=certified or {})
         verdict, evidence, witness = Certainty.PROVED, proof, None
         if decision.verdict is Certainty.SUPPORTED:
             also.append(_without_bound(decision.evidence))
@@ -78,7 +84,8 @@ def certify(
             if verdict is Certainty.PROVED:
                 raise Contradiction(f"{claim}: {evidence.summary}, but it {orbit_evidence.summary} {orbit_witness}")
             verdict, evidence, witness = Certainty.REFUTED, orbit_evidence, orbit_witness
-    return Finding(claim, verdict, evidence, tuple(also), witness, formula, source, control)
+    also_tuple = tuple(also)
+    return Finding(claim, verdict, evidence, also_tuple, witness, formula, source, control, certified=certified or {})
 
 
 def _without_bound(evidence: Evidence) -> Evidence:

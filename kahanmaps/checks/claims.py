@@ -95,6 +95,8 @@ class Finding(HtmlDisplay, WithoutTruthValue, ResultPart):
     control: bool = False
     place: Mapping[str, Any] = field(default_factory=dict)  # the place of the claim, as plain data
     applies: bool = True  # False: the claim is for generic input and this input is special; its verdict does not count
+    # The arguments of `certificate` for this claim, or `why_not`: the reason why there is none.
+    certified: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def holds(self) -> bool | None:
@@ -139,6 +141,7 @@ class Report(PrintableResult):
     context: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
     ended_early: bool = False  # an orbit that the user requested could not be completed
+    certified: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)  # as in a finding
 
     @property
     def verdict(self) -> Certainty:

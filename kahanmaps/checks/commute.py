@@ -141,6 +141,7 @@ def check_commute(
         proof = theorems.commuting_by_splitting(file.system, g.system)
     identity = commutativity(f, g, settings.eps, ("f", "g"), ratio)
     orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
+    certified = settings.certified(file, commute=second)
     kahan = "Kahan maps" if file.is_quadratic and second.is_quadratic else "maps"
     finding = certify(
         f"the {kahan} of {file.labelled('f')} and {second.labelled('g')} commute",
@@ -150,10 +151,11 @@ def check_commute(
         orbit,
         formula="Phi_f o Phi_g = Phi_g o Phi_f",
         source=SOURCE if proof is not None and "Theorem 9" in proof.summary else "",
+        certified=certified,
     )
     extra_context = {"eps2": format_number(eps2)} if eps2 is not None else {}
     context = settings.context([file, second], orbit=orbit.to_json(), **extra_context)
-    return Report("commute", (finding,), context, notes, settings.cut_short(orbit))
+    return Report("commute", (finding,), context, notes, settings.cut_short(orbit), certified)
 
 
 def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) -> Report:
@@ -180,6 +182,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
         **details: Any,
     ) -> Finding:
         formula = formula.format(*names)
+        details["certified"] = settings.certified(systems[0], commute=systems[1])
         if not is_tried and proof is not None:
             return Finding(claim, Certainty.PROVED, proof, formula=formula, **details)
         identity = commutativity(*systems, settings.eps, names)
@@ -237,4 +240,5 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
             "is able to fail"
         )
     context = settings.context([file], orbit=orbit.to_json(), m=member.m, factors=[str(f) for f in member.factors])
-    return Report("commute", (*findings, control), context, notes, settings.cut_short(orbit))
+    of_all = settings.certified(file, commute="associates")
+    return Report("commute", (*findings, control), context, notes, settings.cut_short(orbit), of_all)

@@ -211,6 +211,7 @@ def check_integrals(
         settings.progress(f"integral {k + 1} of {len(candidates)}")
         claim = f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}"
         details: dict[str, Any] = {"formula": integral.formula, "source": source}
+        details["certified"] = _certified(file, integral, settings, claims)
         if _is_constant(integral, settings):
             at_eps = "" if settings.eps is None else f" at eps = {settings.eps}"
             reason = Evidence(
@@ -229,7 +230,26 @@ def check_integrals(
     if any(not any(e.method == "exact orbit" for e in finding.also) for finding in proved):
         notes.append(f"of the proved integrals the first {tried} were also tried along an orbit")
     context = settings.context([file], orbit=orbit.to_json())
-    return Report("integrals", tuple(findings), context, notes, ended_early=settings.cut_short(orbit))
+    of_theorems = {"known": "integrals"} if known or extra is None else {}
+    certified = settings.certified(file, **of_theorems, **({"integrals": claims} if claims else {}))
+    return Report("integrals", tuple(findings), context, notes, settings.cut_short(orbit), certified)
+
+
+def _certified(
+    file: SystemFile, integral: PhaseFunction, settings: Settings, claims: Mapping[str, RationalFunction]
+) -> dict[str, Any]:
+    """The arguments of `certificate` for an integral."""
+    if isinstance(integral, ClaimedFunction):
+        if integral.name in claims:
+            return settings.certified(file, integrals={integral.name: claims[integral.name]})
+        return settings.certified(file, claims=[integral.name])
+    assert isinstance(integral, ImageFunction)
+    if file.hamiltonian is None or integral.hamiltonian.H != file.hamiltonian.H:  # that of an associated system
+        why = f"{integral.name} is a linear combination of H0, H1, ..., which have certificates"
+        return {"why_not": f"{why}: type km.certificate(system, checker)"}
+    power = integral.power if isinstance(integral, CommutantIntegral) else 0
+    is_form = file.member is not None and not isinstance(integral, ModifiedHamiltonian)
+    return settings.certified(file, claims=[f"H{power}" if is_form else "modified_hamiltonian"])
 
 
 def _is_constant(integral: PhaseFunction, settings: Settings) -> bool:

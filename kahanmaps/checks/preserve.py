@@ -114,11 +114,12 @@ def check_measure(
     """
     file = as_file(system)
     settings, extra = settings_and_claim(settings, extra, eps, time_step, h)
-    candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str]] = []
+    candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str, dict[str, Any]]] = []
 
     def add(function: RationalFunction) -> None:
         proof = theorems.product_density_invariant(file.system, function) if file.is_quadratic else None
-        candidates.append((ClaimedDensity(function, settings.eps, file.map.root), proof, ""))
+        density = ClaimedDensity(function, settings.eps, file.map.root)
+        candidates.append((density, proof, "", settings.certified(file, density=function)))
 
     if extra is not None:
         phi = claimed_function(file, extra)
@@ -127,7 +128,9 @@ def check_measure(
     if known or extra is None:
         if file.hamiltonian is not None:
             proof = theorems.cubic_hamiltonian(file.hamiltonian)
-            candidates.append((DeterminantDensity(file.system), proof, "petrera-suris-2016, eq. (eq: CMOQ measure)"))
+            certified = settings.certified(file, claims=["volume" if file.density is None else "determinant"])
+            source = "petrera-suris-2016, eq. (eq: CMOQ measure)"
+            candidates.append((DeterminantDensity(file.system), proof, source, certified))
         if file.density is not None:
             add(file.density)
     if not candidates:
@@ -135,7 +138,7 @@ def check_measure(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "
             'or give --density EXPRESSION, in Python extra="EXPRESSION" (the measure is dx/phi)'
         )
-    claimed = [density.subject for density, _, _ in candidates]
+    claimed = [density.subject for density, *_ in candidates]
     orbit = run_orbit(file.map, settings, claimed, file.member is not None)
     findings = tuple(
         certify(
@@ -146,11 +149,14 @@ def check_measure(
             orbit,
             formula=density.formula,
             source=source,
+            certified=certified,
         )
-        for density, proof, source in candidates
+        for density, proof, source, certified in candidates
     )
     context = settings.context([file], orbit=orbit.to_json())
-    return Report("measure", findings, context, ended_early=settings.cut_short(orbit))
+    of_theorems = {"known": "measure"} if known or extra is None else {}
+    certified = settings.certified(file, **of_theorems, **({} if extra is None else {"density": phi}))
+    return Report("measure", findings, context, (), settings.cut_short(orbit), certified)
 
 
 def transformation_identity(map_: MapFamily, tensor: PoissonTensor, eps: fmpq | None) -> Identity:
@@ -240,6 +246,7 @@ def check_poisson(
         )
     orbit = run_orbit(file.map, settings, tensor.subject, file.member is not None)
     name, scope = tensor.name, f", {condition}" if condition else ""
+    certified = settings.certified(file, **({"known": "poisson"} if extra is None else {"tensor": extra}))
     law = certify(
         f"the {'Kahan ' * isinstance(file.map, KahanFamily)}map is Poisson for {name}{scope}",
         transformation_identity(file.map, tensor, settings.eps),
@@ -248,6 +255,7 @@ def check_poisson(
         orbit,
         formula=f"dPhi(x) {name}(x) dPhi(x)^T = {name}(x~), {tensor.formula}",
         source=source,
+        certified=certified,
     )
     jacobi = certify(
         f"{name} is a Poisson tensor{scope}",
@@ -256,6 +264,7 @@ def check_poisson(
         proof,
         formula=f"sum_l {name}_il d_l {name}_jk + cyclic = 0",
         source=source,
+        certified=certified,
     )
     context = settings.context([file], orbit=orbit.to_json())
-    return Report("poisson", (law, jacobi), context, ended_early=settings.cut_short(orbit))
+    return Report("poisson", (law, jacobi), context, (), settings.cut_short(orbit), certified)

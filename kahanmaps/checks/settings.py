@@ -77,6 +77,12 @@ class Settings:
         """Return whether an orbit that the user requested ended early."""
         return self.orbit_is_requested and not run.end.is_complete
 
+    def certified(self, system: Any, **arguments: Any) -> dict[str, Any]:
+        """Return the arguments of `certificate` for a claim; at one eps the reason why there is none."""
+        if self.eps is not None:
+            return {"why_not": f"a certificate is about a map, for every eps: found a claim for eps = {self.eps}"}
+        return {"system": system, **arguments}
+
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
         """Return the data needed to reproduce the check, including the systems."""
         return {

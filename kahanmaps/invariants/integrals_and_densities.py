@@ -254,7 +254,7 @@ class CommutantIntegral(ImageFunction):
 
     def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
         super().__init__(hamiltonian)
-        self.matrix = (A**power).transpose()
+        self.power, self.matrix = power, (A**power).transpose()
         self.name = f"{letter}~_{power}"
         self.formula = f"{self.name} = eps^(-1) x^T J {'A^T' if power == 1 else f'(A^T)^{power}'} x~"
 

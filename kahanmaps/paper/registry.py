@@ -83,6 +83,7 @@ class Claim:
     symplectic: bool = True  # keeps its form under symplectic changes of coordinates and extensions of the field
     theorem: str = ""  # the theorem that proves it for all data without expansion; its hypotheses hold by construction
     formal: Callable[[], Pairs] | None = None  # identities of formal_proofs.py that prove it in every dimension
+    certified: str = ""  # the names of the claims of `certificate` that it is about, {} for 0, ..., m - 1
     statement: str = ""  # of a claim that is tested for several variations: the statement, and the variation
     variation: str = ""
     misprint: str = ""  # not empty: this is the form printed, it fails, and here is why

@@ -39,6 +39,7 @@ from kahanmaps.checks.certify import Contradiction
 from kahanmaps.checks.claims import Certainty, Evidence, Finding, Report, Witness
 from kahanmaps.checks.decide import Decision, Trial, decide
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost, counted
 from kahanmaps.family.associated import FamilyMember
@@ -145,6 +146,7 @@ def verify(
     settings, options = Settings.of(settings, eps, time_step, h), options or VerifyOptions()
     if (system is None) == (m is None):
         raise InputError("expected a member of the family, or m: half the dimension of the one in general")
+    file = None
     if system is None:
         if m is None or not 1 <= m <= MAX_M:
             raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M}")
@@ -180,10 +182,11 @@ def verify(
             "chi": format_univariate(chi_of(member.A)),
             "factors": [str(factor) for factor in member.factors],
         }
-    verifier = Verifier(member, member.m if member is not None else m or 0, settings, options)
+    verifier = Verifier(member, member.m if member is not None else m or 0, settings, options, file)
     findings = verifier.findings()
     context |= {"order": options.order, "controls": options.controls}
-    return Report("verify", tuple(findings), context, verifier.notes())
+    certified = {} if file is None or options.controls or options.beyond else settings.certified(file)
+    return Report("verify", tuple(findings), context, verifier.notes(), certified=certified)
 
 
 class Verifier:
@@ -192,8 +195,15 @@ class Verifier:
     For a given member, or (None) for the member in general, with half the dimension `m`.
     """
 
-    def __init__(self, member: FamilyMember | None, m: int, settings: Settings, options: VerifyOptions) -> None:
-        self.member, self.m, self.settings, self.options = member, m, settings, options
+    def __init__(
+        self,
+        member: FamilyMember | None,
+        m: int,
+        settings: Settings,
+        options: VerifyOptions,
+        file: SystemFile | None = None,
+    ) -> None:
+        self.file, self.member, self.m, self.settings, self.options = file, member, m, settings, options
         self.roots = None if member is None else specialize.rational_roots(member)
         self._seed = settings.seed if member is None else derive_seed(settings.seed, member.A, member.H, settings.eps)
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}
@@ -494,7 +504,7 @@ class Verifier:
             evidence = Evidence("control", f"control {name}: {CONTROLS[name].breaks}; {what}")
             finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
             place = {**finding.place, "violated_hypothesis": name, "violation": CONTROLS[name].breaks}
-            controls.append(replace(finding, control=True, place=place))
+            controls.append(replace(finding, control=True, place=place, certified={}))
         # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
         return [finding for finding in controls if finding.is_as_expected] or controls
 
@@ -537,7 +547,15 @@ class Verifier:
         source = "" if claim.section in SECTION_NAMES.values() else f"petrera-suris-2016, {claim.place}"
         if claim.label:
             source += f" [{claim.label}]"
-        return Finding(title, verdict, evidence, also, witness, claim.formula, source, bool(claim.misprint), place)
+        certified: dict[str, Any] = {}
+        if self.file is not None and claim.certified:
+            names = [name.format(k) for name in claim.certified.split() for k in range(self.m if "{}" in name else 1)]
+            arguments = {"commute": "associates"} if names == ["associates"] else {"claims": names}
+            certified = self.settings.certified(self.file, **arguments)
+        is_misprint = bool(claim.misprint)
+        return Finding(
+            title, verdict, evidence, also, witness, claim.formula, source, is_misprint, place, certified=certified
+        )
 
 
 class ClaimAtPoints:

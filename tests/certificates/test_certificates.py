@@ -53,11 +53,23 @@ from kahanmaps.certificates.identities import (
     invariant_tensor,
     map_data,
 )
+from kahanmaps.checks.commute import check_commute
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import System
 from kahanmaps.errors import InputError
+from kahanmaps.family.random_members import random_member
+from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degree_bounds import bound_dynamical_degree
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.preserve.darboux.darboux_polynomials import darboux_polynomials
 from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
+from kahanmaps.paper.verify import VerifyOptions, verify
 
 PROGRAMS = {
     "rocq": (["coqc"], ".v", r"(Definition c1 : R := )", r"\1 1 + "),
@@ -176,6 +188,49 @@ def test_commuting_maps_are_accepted_and_refused_with_one_coefficient_changed(sy
     wrong = replace(point, numerators=(point.numerators[0] + 1, *point.numerators[1:]))
     false = replace(chain, values=(*chain.values[:-1], wrong))
     assert run(checker, CHECKERS[checker]([false]), tmp_path).returncode != 0
+
+
+EQUIVALENT = System("x' = y + 1; y' = 24*(x - 2)^2 - 8")  # to weierstrass at g2 = 64, by 4 x - 8, 4 y + 4
+FASTER = System("x' = 3*x - 3*x*y; y' = 3*x*y - 3*y")  # lotka_volterra at eps/c with c = 1/3
+
+
+@pytest.mark.parametrize("checker", PROGRAMS)
+def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
+    result = equivalent_system(EQUIVALENT)
+    text = result.certificate(checker)
+    assert "equivalence: f is equivalent to weierstrass at g2 = 64 after (x, y) -> (4*x - 8, 4*y + 4)" in text
+    assert run(checker, text, tmp_path).returncode == 0
+    (claim,) = _claims_of(result, _prepared(EQUIVALENT, checker)[1])
+    one = claim.image[0] ** 0
+    singular = replace(claim, image=(one * 0, one * 0), matrix=((0, 0), (0, 0)))
+    shifted = replace(claim, image=(claim.image[0] + one, claim.image[1]))
+    target = claim.target.rows
+    other = replace(claim, target=replace(claim.target, rows=((*target[0][:-1], target[0][-1] + 1), target[1])))
+    for wrong in (changed(claim), singular, shifted, other):
+        assert run(checker, CHECKERS[checker]([wrong]), tmp_path).returncode != 0
+
+
+@pytest.mark.parametrize("checker", ["gp", "sympy"])
+def test_an_equivalence_by_a_given_map_and_one_that_changes_eps(checker, tmp_path):
+    found = equivalent_system(FASTER)
+    texts = [certificate(EQUIVALENT, checker, equivalent=load("weierstrass", {"g2": 64}), by=["4*x - 8", "4*y + 4"])]
+    texts += [found.certificate(checker), certificate(FASTER, checker, ["equivalence"])]
+    assert "T takes the map of inline to that of weierstrass" in texts[0]
+    for text in texts:
+        assert run(checker, text, tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("by", "message"),
+    [
+        (["4*x - 8", "4*y"], "equivalence takes the map to another one"),
+        (["4*x - 8"], "weierstrass and 1 polynomial, expected two quadratic systems of the same dimension"),
+        (["x^2", "y"], "found x.2, y, expected polynomials of degree at most 1"),
+        (["0", "0"], "equivalence is not invertible"),
+    ],
+)
+def test_a_map_that_is_no_equivalence_has_no_certificate(by, message):
+    refuses(message, certificate, EQUIVALENT, "gp", equivalent=load("weierstrass", {"g2": 64}), by=by)
 
 
 @pytest.mark.parametrize("checker", PROGRAMS)
@@ -431,7 +486,24 @@ def test_results_about_one_eps_or_the_flow_have_no_certificate():
         certificate_of(find_densities("lotka_volterra", eps="1/2"), "gp")
     with pytest.raises(InputError, match="for every eps: found a result for the flow"):
         certificate_of(find_densities("lotka_volterra", flow=True), "gp")
-    refuses("expected the result of a search, got str", certificate_of, "lotka_volterra", "gp")
+    refuses("a str has no certificate: it proves nothing about a map", certificate_of, "lotka_volterra", "gp")
+
+
+@pytest.mark.parametrize("checker", ["gp", "sympy", pytest.param("rocq", marks=pytest.mark.slow)])
+def test_findings_and_results_write_certificates_of_what_they_prove(checker, tmp_path):
+    member = verify("paper_m2", options=VerifyOptions(sections=(6,)))
+    theorem = next(finding for finding in member if finding.claim.startswith("Theorem 9: The Kahan maps"))
+    results = {
+        "F2: ": check_integrals("euler_top")[1],
+        "maps_1_and_2_commute: ": theorem,
+        "D1: ": darboux_polynomials("lotka_volterra", 1),
+        "volume: ": check_measure("paper_m2"),
+        "P: ": check_poisson("lotka_volterra", [["0", "x*y"], ["-x*y", "0"]])[0],
+    }
+    for name, result in results.items():
+        text = result.certificate(checker)
+        assert checker == "rocq" or f" {name}" in text
+        assert run(checker, text, tmp_path).returncode == 0
 
 
 def test_a_claim_that_takes_too_many_products_is_refused_or_left_out_with_a_note(monkeypatch):
@@ -449,6 +521,20 @@ def test_the_limit_of_the_length_doubles_with_the_effort():
     refuses("have more than 625 terms when multiplied out", certificate, file, "gp", ["F"], effort=-4)
     assert "F: P/Q is an integral" in certificate(file, "gp", ["F"], effort=1)
     refuses("found the effort 99, expected an integer from -20 to 40", certificate, file, "gp", ["F"], effort=99)
+
+
+# Seconds of processor time that Coq took, of which it takes 2 to start.
+MEASURED = [("lyness", 2.6), ("zander_111", 4.3), ("planar_cubic_hamiltonian", 6.3), ("euler_top", 12.8)]
+MEASURED += [("qrt_asymmetric", 14.8), ("repaired_icosahedral", 31.4), ("volterra_periodic_4", 37.2)]
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds"), [*MEASURED[:4], *(pytest.param(*case, marks=pytest.mark.slow) for case in MEASURED[4:])]
+)
+def test_the_time_that_is_said_beforehand_is_that_of_coq_within_a_factor_of_3(name, seconds):
+    text = certificate(load(name), "rocq", everything=True)
+    assert seconds / 3 < text.seconds < 3 * seconds
+    assert str(len(text)) in text.summary
 
 
 @pytest.mark.parametrize("claim", ["euler_top F1", "zander_111 F", "repaired_icosahedral F"])
@@ -477,3 +563,45 @@ def test_rows_of_the_equation_have_no_common_factor():
     formulas, data = _prepared(load("qrt_asymmetric"), "gp")
     assert [len(entry) for row in formulas.equation for entry in row] == [4, 0, 4, 0, 46, 54]
     assert [len(entry) for row in data.rows for entry in row] == [4, 0, 4, 0, 20, 27]
+
+
+def test_the_certificate_of_a_finding_is_about_its_claim():
+    report = check_integrals("paper_m2")
+    by_claim = {finding.claim.partition(" is conserved")[0]: finding for finding in report}
+    for claim, says in {"modified H": "modified_hamiltonian", "H~": "H0", "H~_1": "H1", "I2": "I2"}.items():
+        text = by_claim[claim].certificate("gp")
+        assert re.findall(r"^\\\\ (\w+): P", text, flags=re.MULTILINE)[0] == says
+    refuses(re.escape("K~_+- is a linear combination of H0, H1"), by_claim["K~_+-"].certificate, "gp")
+    assert "maps_1_and_2_commute" in check_commute("paper_m2")[0].certificate("gp")
+    field, *_ = commuting_systems("paper_m2")
+    assert field.certificate("gp") == field.finding.certificate("gp")
+
+
+def test_an_analysis_writes_one_certificate_of_all_that_it_proves():
+    text = analyze("lotka_volterra").certificate("gp")
+    assert [f" {name}" in text for name in ("volume_1: ", "T1: ", "entropy: ")] == [True] * 3
+    text = analyze("euler_top", symbols=["a1"], effort=-2).certificate("gp")
+    assert "Parameters left as symbols: a1" in text
+    assert "Not in this certificate: symmetries, commuting and equivalent systems" in text
+
+
+def test_a_member_with_one_associated_system_has_the_certificate_that_its_map_and_the_inverse_commute():
+    member = SystemFile.from_member(random_member(1, seed=3))
+    assert certificate(member, "gp", commute="associates").claims == ("maps_1_and_2_commute",)
+    assert check_commute(member).certificate("gp").claims == ("maps_1_and_2_commute",)
+
+
+@pytest.mark.parametrize(
+    ("result", "message"),
+    [
+        (lambda: check_integrals("euler_top", eps="1/10"), "for every eps: found a claim for eps = 1/10"),
+        (lambda: check_integrals("euler_top", "x1")[0], "I1 is not conserved"),
+        (lambda: check_commute("paper_m2")[1], "the maps do not commute"),
+        (lambda: verify(m=1), "no certificate is known for this claim: no other program is told how"),
+        (lambda: degree_growth("euler_top"), "a DegreeGrowth has no certificate"),
+        (lambda: find_integrals("euler_top")[0], "a FoundIntegral has no certificate: .* a part of a result; type"),
+        (lambda: analyze("lotka_volterra", eps="1/3"), "for every eps: found a result for eps = 1/3"),
+    ],
+)
+def test_what_has_no_certificate_says_why_in_one_sentence(result, message):
+    refuses(message, result().certificate, "gp")

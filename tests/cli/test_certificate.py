@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 
@@ -10,7 +11,8 @@ import pytest
 
 def test_the_command_in_the_comment_writes_the_same_certificate_again(kahanmaps):
     first = kahanmaps("certificate --vars=x,y '--image=y; (3 + y)/x' --for gp --integral '(x+1)*(y+1)*(x+y+3)/(x*y)'")
-    assert (first.status, first.err) == (0, "")
+    size = len(first.out)
+    assert (first.status, first.err) == (0, f"inline: 1 claim, {size} bytes, less than a second to check\n")
     (line,) = [line for line in first.out.splitlines() if "kahanmaps certificate" in line]
     assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
 
@@ -26,8 +28,21 @@ def test_a_certificate_goes_to_a_file(kahanmaps, tmp_path):
     path = tmp_path / "top.v"
     outcome = kahanmaps("certificate euler_top --for rocq --claim F1 -o", path)
     assert (outcome.status, outcome.out) == (0, "")
-    assert outcome.err == f"{path}: euler_top: a certificate for rocq, {len(path.read_text().splitlines())} lines\n"
+    text = path.read_text()
+    first, second = outcome.err.splitlines()
+    assert first == f"euler_top: 1 claim, {len(text)} bytes, about 3.2 seconds to check"
+    assert second == f"{path}: euler_top: a certificate for rocq, {len(text.splitlines())} lines"
     assert kahanmaps("certificate euler_top --for rocq --claim F1 -q -o", path).err == ""
+    record = json.loads(kahanmaps("certificate euler_top --for rocq --claim F1 --json -o", path).out)
+    assert [record[key] for key in ("for", "claims", "bytes", "seconds", "text")] == [
+        "rocq",
+        ["F1"],
+        len(text),
+        3.2,
+        None,
+    ]
+    record = json.loads(kahanmaps("certificate euler_top --for gp --claim F1 --json").out)
+    assert (record["text"].splitlines()[-1], len(record["text"])) == ("quit(!ok)", record["bytes"])
 
 
 def test_a_claim_that_is_too_long_says_what_to_raise(kahanmaps):
@@ -60,7 +75,7 @@ def test_all_certifies_what_searches_prove(kahanmaps):
 
 def test_commuting_maps_and_periods(kahanmaps):
     first = kahanmaps("""certificate "x' = y; y' = -x" --for gp --commute "x' = 2*y; y' = -2*x" """)
-    assert (first.status, first.err) == (0, "")
+    assert (first.status, first.err.split(", ")[0]) == (0, "inline: 1 claim")
     (line,) = [line for line in first.out.splitlines() if "kahanmaps certificate" in line]
     assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
     assert "is the image of point 4 under f" in kahanmaps("certificate lyness -p a=1 --for gp --period 5").out
@@ -70,9 +85,24 @@ def test_commuting_maps_and_periods(kahanmaps):
     assert kahanmaps("certificate paper_m2 --for gp --commute associates --claim volume").status == 2
 
 
+def test_equivalent_systems(kahanmaps):
+    command = """certificate "u' = 2*v; v' = 3*u^2 - 1" --for gp --equivalent weierstrass -p g2=4 --by 'u; 2*v'"""
+    first = kahanmaps(command)
+    assert (first.status, first.err.splitlines()[0]) == (0, "-p g2: set in both systems")
+    assert "equivalence: T takes the map of inline to that of weierstrass" in first.out
+    (line,) = [line for line in first.out.splitlines() if "kahanmaps certificate" in line]
+    assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
+    outcome = kahanmaps(command.replace("2*v'", "3*v'"))
+    assert (outcome.status, outcome.out) == (1, "")
+    assert "refuted: equivalence takes the map to another one" in outcome.err
+    for rest in ("--equivalent harmonic", "--by u", "--equivalent harmonic --by u --commute harmonic"):
+        assert kahanmaps(f"certificate harmonic --for gp {rest}").status == 2
+
+
 @pytest.mark.parametrize(
     ("command", "status", "says"),
     [
+        ("analyze \"x' = y + 1; y' = 24*(x-2)^2 - 8\"", 0, "equivalence: f is equivalent to weierstrass at g2 = 64"),
         ("check-integrals euler_top", 0, "F2: P/Q is an integral"),
         ("check-integrals euler_top --integral J=F1", 0, "J: P/Q is an integral"),
         ("check-measure lotka_volterra --density 3*x*y", 0, "volume: dx/phi is invariant"),
@@ -91,6 +121,7 @@ def test_checks_and_searches_write_a_certificate_of_what_they_prove(command, sta
     assert outcome.status == status
     text = path.read_text()
     assert says in text
+    assert f" {len(text)} bytes, less than a second to check\n" in outcome.err
     assert outcome.err.endswith(f"a certificate for gp, {len(text.splitlines())} lines\n")
     if shutil.which("gp") is not None:
         done = subprocess.run(["gp", "-q", path], capture_output=True, text=True, stdin=subprocess.DEVNULL)
@@ -104,6 +135,7 @@ def test_checks_and_searches_write_a_certificate_of_what_they_prove(command, sta
         ("check-poisson henon_heiles", ".gp", 1, "is not written: Pi is no Poisson tensor"),
         ("find-integrals lorenz", ".v", 3, "is not written: nothing is proved in this result about lorenz"),
         ("check-integrals euler_top", ".txt", 2, "expected a file that ends with .v, .gp or .py"),
+        ("analyze euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),
         ("check-integrals euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),
         ("find-integrals euler_top --flow", ".gp", 2, "--certificate cannot be combined with --flow"),
         ("find-density euler_top --flow", ".gp", 2, "--flow cannot be combined with --certificate"),

@@ -10,6 +10,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.runs.certificates import certificate_option, require_every_eps, write_certificate
 from kahanmaps_cli.runs.search import symbols_and_eps
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json
@@ -24,6 +25,7 @@ from kahanmaps_cli.signals import INTERRUPTED, end_interrupts
 @opt.effort_options
 @opt.seed_option
 @click.option("--markdown", is_flag=True, help="Print the report in Markdown.")
+@certificate_option
 @opt.output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
     """Analyze the map of SYSTEM: what it preserves, how fast its iterates grow in complexity, and a verdict.
@@ -53,6 +55,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     """
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
+    require_every_eps(options)
     symbols, eps = symbols_and_eps(options)
     arguments = {"symbols": symbols, "eps": eps, **opt.given(options, "effort", "seed"), "processes": 2}
     file = opt.load_system(system, {**options, "quiet": quiet})
@@ -91,7 +94,8 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     if result.interrupted:
         print_stderr("interrupted: the verdict rests on the results so far")
         return INTERRUPTED
-    return 3 if result.conclusion.kind == "undecided" else 0
+    status = 3 if result.conclusion.kind == "undecided" else 0
+    return write_certificate({**options, "quiet": quiet}, file.name, result.certificate, status)
 
 
 class _Report:

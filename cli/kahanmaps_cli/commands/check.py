@@ -20,7 +20,6 @@ from kahanmaps_cli.screen.progress import Progress
 from kahanmaps_cli.screen.render import print_report
 
 _ARGUMENT_IS_FIRST = "kahanmaps: the argument stands before the inline system"
-_CLAIM_OF_CERTIFICATE = {"check-integrals": "integrals", "check-measure": "density", "check-poisson": "tensor"}
 _STATUS = "Exit status: 0 {} (proved or supported), 1 refuted, 2 usage error, 3 undecided or stopped early."
 
 
@@ -29,7 +28,7 @@ def command(name: str) -> click.Command:
     check = CHECKS[name]
 
     def run(system: str | None, other: str | None = None, eps2: Any = None, claim: Any = None, **options: Any) -> int:
-        is_swapped, proof, measured = False, dict[str, Any](), None
+        is_swapped, measured = False, None
         require_every_eps(options)
         if check.is_of_pair:
             system, other = opt.in_order(system, other, options)
@@ -45,7 +44,6 @@ def command(name: str) -> click.Command:
                     options |= {"start": None, "steps": None}  # which are those of the float orbit
                 settings = opt.settings_from(options, progress, options["start"] and start)
                 report = check(file, second, settings, eps2)
-                proof["commute"] = "associates" if second is None else second
             else:
                 file, start = opt.load_with_start(options, partial(opt.load_system, system), system)
                 settings = opt.settings_from(options, progress, start)
@@ -56,15 +54,8 @@ def command(name: str) -> click.Command:
                 elif option is not None:
                     claim = option.read(file, claim) if claim else None
                 report = check(file, settings, claim, **extra)
-                if option is not None and claim is not None:
-                    proof[_CLAIM_OF_CERTIFICATE[name]] = claim
         status = print_report(report, options["as_json"], options["verbose"], options["quiet"], measured)
-
-        def write(checker: str) -> str:
-            known: dict[str, Any] = {} if proof else {"claims": lib.known_claims(file, name.removeprefix("check-"))}
-            return lib.certificate(file, checker, **proof, **known)
-
-        return write_certificate(options, file.name, write, status)
+        return write_certificate(options, file.name, report.certificate, status)
 
     run = opt.check_options(certificate_option(run))
     if check.is_of_pair:

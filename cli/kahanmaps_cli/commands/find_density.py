@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import click
@@ -48,4 +47,4 @@ def command(system: str | None, **options: Any) -> int:
     further = f"note\t{result.further}" if result.further else ""
     print_search("find-density", result, search, options, [("phi", phi, "") for phi in result.shown], further)
     status = 0 if result.densities else 3
-    return write_certificate(options, file.name, partial(lib.certificate_of, result), status)
+    return write_certificate(options, file.name, result.certificate, status)

@@ -131,8 +131,7 @@ def command(system: str | None, **options: Any) -> int:
             )
         for status, text in () if comparison is None else comparison.lines(others=False):
             print_stdout(f"{status}\t{formula(text)}")
-    write = partial(lib.certificate_of, result)
-    return write_certificate(options, file.name, write, 3 if result.reason else 0)
+    return write_certificate(options, file.name, result.certificate, 3 if result.reason else 0)
 
 
 def _count(result: Any) -> str:
@@ -151,7 +150,7 @@ def _darboux(system: str | None, options: dict[str, Any]) -> int:
         print_stdout(f"Darboux polynomials: {result.file.name}{scope(result)}")
         print_stdout("\n".join("\t".join(map(formula, line.split("\t"))) for line in str(result).split("\n")))
     status = 3 if result.reason else 0
-    return write_certificate(options, file.name, partial(lib.certificate_of, result), status)
+    return write_certificate(options, file.name, result.certificate, status)
 
 
 def _bases(system: str | None, options: dict[str, Any]) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import click
@@ -54,4 +53,4 @@ def command(system: str | None, **options: Any) -> int:
         for integral in result.integrals:
             print_stdout(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
     status = 0 if result.tensors else 3
-    return write_certificate(options, file.name, partial(lib.certificate_of, result), status)
+    return write_certificate(options, file.name, result.certificate, status)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import click
@@ -46,5 +45,4 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     status = print_list(
         "find-symmetry", heading, symmetries, search, lib.Settings().context([file], **search.work), as_json
     )
-    write = partial(lib.certificate_of, symmetries)
-    return write_certificate({**options, "quiet": quiet}, file.name, write, status)
+    return write_certificate({**options, "quiet": quiet}, file.name, symmetries.certificate, status)

@@ -155,10 +155,7 @@ def command(system: str | None, **options: Any) -> int:
         print_report(report, as_json, verbose, options["quiet"])
     else:
         _print_terminal(report, verbose)
-    status = exit_status(report)
-    if options["certificate"] is None:
-        return status
-    return write_certificate(options, file.name, lambda checker: lib.certificate(file, checker), status)
+    return write_certificate(options, report.context["system"], report.certificate, exit_status(report))
 
 
 def markdown(report: lib.Report) -> str:

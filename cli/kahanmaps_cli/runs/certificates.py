@@ -37,7 +37,7 @@ def require_every_eps(options: dict[str, Any]) -> None:
         raise click.UsageError("a certificate is about every eps: give --certificate or --eps, not both")
 
 
-def write_certificate(options: dict[str, Any], name: str, write: Callable[[str], str], status: int = 0) -> int:
+def write_certificate(options: dict[str, Any], name: str, write: Callable[[str], Any], status: int = 0) -> int:
     """Write the certificate if one is requested; return the exit status, 3 instead of 0 if there is none."""
     path = options["certificate"]
     if path is None:
@@ -48,5 +48,7 @@ def write_certificate(options: dict[str, Any], name: str, write: Callable[[str],
     except lib.InputError as error:
         print_stderr(f"{path} is not written: {error}")
         return status or 3
+    if not options["quiet"]:
+        print_stderr(f"{name}: {text.summary}")
     write_text(text, f"{name}: a certificate for {checker}", path, options["quiet"])
     return status

@@ -44,14 +44,15 @@ def certify_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) ->
     >>> str(certify_field(f, f.scaled(-1), Settings()).verdict), str(certify_field(f, f.scaled(2), Settings()).verdict)
     ('proved', 'refuted')
     """
-    claim = "the Kahan maps of f and g commute"
+    claim, certified = "the Kahan maps of f and g commute", {"system": f, "commute": g}
     for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
         if g == f.scaled(factor):
-            return Finding(claim, theorems.PROVED, Evidence(theorems.METHOD, why), formula=_FORMULA)
+            evidence = Evidence(theorems.METHOD, why)
+            return Finding(claim, theorems.PROVED, evidence, formula=_FORMULA, certified=certified)
     count_work(2_000 + 350 * f.dim**2)
     identity = commutativity(f, g, None, ("f", "g"))
     proof = theorems.commuting_by_splitting(f, g) or proof_by_affine_lemma(f, [g]) or _in_dimension_one(f, g)
-    return certify(claim, identity, settings, proof, formula=_FORMULA)
+    return certify(claim, identity, settings, proof, formula=_FORMULA, certified=certified)
 
 
 def certify_family(f: QuadraticSystem, space: CommutingSpace, family: SolutionComponent, settings: Settings) -> Finding:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -24,6 +24,7 @@ from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.work import Budget, count_work
 from kahanmaps.display_protocols import ResultPart
 from kahanmaps.documents.catalog import load, names, titles
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.inline import as_file
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.defaults import budget_for
@@ -51,6 +52,12 @@ class Equivalence(ResultPart):
     P: fmpq_mat
     q: tuple[fmpq, ...]
     c: fmpq
+    file: SystemFile | None = field(default=None, repr=False, compare=False)  # of f
+
+    @property
+    def system(self) -> QuadraticSystem:
+        """The system g/c in the variables of f, whose map at eps is that of g at eps/c."""
+        return load(self.name, self.parameters).system.renamed(self.variables).scaled(1 / self.c)
 
     @property
     def text(self) -> str:
@@ -123,7 +130,7 @@ def equivalent_system(
             if budget.is_spent:
                 return None
             if (equivalence := _solve_for_equivalence(f, g, frame, permutation, is_scaled, budget)) is not None:
-                return equivalence
+                return replace(equivalence, file=file)
     return None
 
 

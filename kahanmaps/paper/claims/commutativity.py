@@ -28,7 +28,7 @@ def both_maps(o: PaperObjects) -> Pairs:
         yield x_hat, o.plus_eps_jac(g, x_hat) * o.x
 
 
-@claim("Theorem 9", "th commute", "B H map", blockwise=True)
+@claim("Theorem 9", "th commute", "B H map", blockwise=True, certified="associates")
 def commutativity(o: PaperObjects) -> Pairs:
     """The Kahan maps of any two associated vector fields commute
     Phi_f o Phi_g = Phi_g o Phi_f"""

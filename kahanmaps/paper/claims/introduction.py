@@ -42,7 +42,7 @@ def hamiltonians_are_independent(o: PaperObjects) -> Pairs:
     yield o.rank(o.columns([o.grad(o.x, i) for i in range(o.m)])), o.m
 
 
-@claim("Sect. 1", "", "H f inhomogeneous", blockwise=True)
+@claim("Sect. 1", "", "H f inhomogeneous", blockwise=True, certified="H{}")
 def perturbed_hamiltonians_are_conserved(o: PaperObjects) -> Pairs:
     """The map of f_0 has integrals H~_0, ..., H~_{m-1}, perturbations of the H_i
     H~_i = eps^{-1} x^T J (A^T)^i x~ is conserved"""

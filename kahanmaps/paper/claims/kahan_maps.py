@@ -182,7 +182,7 @@ def integral_of_any_cubic_hamiltonian(o: PaperObjects) -> Pairs:
         yield system.modified_H(system.step(system.f, o.x)), system.modified_H(o.x)
 
 
-@claim("(12)", "eq: CMOQ measure", "f map", blockwise=True)
+@claim("(12)", "eq: CMOQ measure", "f map", blockwise=True, certified="volume")
 def invariant_measure(o: PaperObjects) -> Pairs:
     """The map of a Hamiltonian system has an invariant measure
     dx/det(I - eps f') is invariant"""

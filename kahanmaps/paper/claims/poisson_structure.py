@@ -50,7 +50,7 @@ def coefficients_of_the_powers(o: PaperObjects) -> Pairs:
     yield o.df * o.df, total
 
 
-@claim("Theorem 12 (76)", "Pois prop", "H map", distinct_roots=True, blockwise=True)
+@claim("Theorem 12 (76)", "Pois prop", "H map", distinct_roots=True, blockwise=True, certified="poisson")
 def poisson_map(o: PaperObjects) -> Pairs:
     """The map of f is Poisson
     dPhi Pi(x) dPhi^T = Pi(x~)"""
