@@ -37,12 +37,14 @@ ORBITS = {
 def test_j_invariant_and_height_agree_with_pari(name):
     orbit = km.geometry(name, *ORBITS[name])
     model, point = f"[{orbit.curve.a4},{orbit.curve.a6}]", f"[{orbit.point[0]},{orbit.point[1]}]"
-    script = f"E=ellinit({model}); print(ellisoncurve(E,{point})); print(E.j); print(ellheight(E,{point})/2)"
+    script = f"E=ellinit({model}); print(ellisoncurve(E,{point})); print(E.j); print(ellheight(E,{point})/2);"
+    script += "print(ellminimalmodel(E).disc); print(#ellglobalred(E)[4]~)"
     lines = subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
     assert lines[0] == "1"
     assert fmpq(*map(int, (lines[1] + "/1").split("/")[:2])) == orbit.j
     assert abs(float(lines[2]) - float(orbit.height.mid())) < 1e-12
     assert float(orbit.height.rad()) < 1e-15
+    assert [orbit.bad_primes.minimal_discriminant, len(orbit.bad_primes.bad)] == [int(line) for line in lines[3:]]
 
 
 def j_of_quartic(a, b, c, d, e):
@@ -195,7 +197,7 @@ def test_periodic_and_special_orbits_have_a_curve(parameters, start, order):
     """For a = 1 all orbits of Lyness' map have period 5; the sequence U of the orbit of (1, 2) has a zero."""
     system = km.load("lyness").subs(**parameters)
     orbit = km.geometry(system, start)
-    assert (orbit.genus, orbit.iterate, orbit.order) == (1, 1, order)
+    assert (orbit.genus, orbit.iterate, orbit.order, orbit.is_dense) == (1, 1, order, order is None)
     if order:
         assert (order * orbit.rotation - 1).contains(0)
         assert orbit.height_constant is None

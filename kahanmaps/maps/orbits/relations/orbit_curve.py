@@ -31,6 +31,7 @@ from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.algebra.matrices import nullspace, rank
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number
+from kahanmaps.algebra.reduction import BadPrimes, bad_primes
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve
 from kahanmaps.maps.implicit import Map, MapFamily
@@ -55,7 +56,8 @@ class OrbitCurve(PrintableResult):
     this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B,
     `height` is the canonical height of that point. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and
     trace = 2 for a parabolic map. `rotation` is the rotation number in (0, 1/2] up to sign; None if kappa is real.
-    `steps` is 2 if that iterate exchanges two real components: then `rotation` is about its square.
+    `steps` is 2 if that iterate exchanges two real components: then `rotation` is about its square. `bad_primes` are
+    those of the curve over Q.
     `height_constant` is the C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits
     (over one common denominator the integers may be longer).
     """
@@ -70,6 +72,20 @@ class OrbitCurve(PrintableResult):
     steps: int = 1
     trace: fmpq | None = None
     height_constant: float | None = None
+    bad_primes: BadPrimes | None = None
+
+    @property
+    def components(self) -> int | None:
+        """The number of real components of the curve of genus 1: 1, or 2 if the discriminant is positive."""
+        return None if self.curve is None else 2 if self.curve.discriminant > 0 else 1
+
+    @property
+    def is_dense(self) -> bool:
+        """Whether the orbit is dense in the real components of its curves that it visits (proved).
+
+        It is if its translation of a circle, or rotation, has infinite order.
+        """
+        return self.rotation is not None and self.order is None
 
     @property
     def j(self) -> fmpq | None:
@@ -80,20 +96,34 @@ class OrbitCurve(PrintableResult):
     def text(self) -> str:
         which = "" if self.iterate == 1 else f", iterate {self.iterate} of the map"
         lines = [f"curve of the orbit\tgenus {self.genus} (proved){which}"]
-        if self.curve is not None and self.point is not None and self.height is not None:
+        if (
+            self.curve is not None
+            and self.point is not None
+            and self.height is not None
+            and self.bad_primes is not None
+        ):
             order = "infinite order" if self.order is None else f"order {self.order}"
+            minimal = self.bad_primes.minimal_discriminant
             lines += [
                 f"  Weierstrass model\ty^2 = x^3 + A x + B, A = {self.curve.a4}, B = {self.curve.a6}",
                 f"  j-invariant\t{format_number(self.curve.j)}",
+                f"  discriminant\t{16 * self.curve.discriminant}" + ("" if minimal is None else f", minimal {minimal}"),
+                f"  bad primes\t{self.bad_primes.text}",
                 f"  translation\t({', '.join(map(format_number, self.point))}), {order} (proved: multiples up to 12)",
                 f"  canonical height\t{self.height.str(12)}",
             ]
+            visits = {1: "", 2: ", the orbit stays on one" if self.steps == 1 else ", the orbit visits both in turn"}
+            side = {1: "", 2: ", the translation point is on the " + ("egg", "unbounded one")[self.steps == 1]}
+            n = self.components or 1
+            lines.append(f"  real components\t{n}{visits[n]}{side[n]}")
         if self.trace is not None:
             kind = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
             lines.append(f"  multiplier\t{kind}, infinite order (proved)")
         if self.rotation is not None:
             of_second = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
             lines.append(f"  rotation number\t{self.rotation.str(12)}{of_second}")
+            dense = "dense in the real components that it visits (proved: infinite order)"
+            lines.append(f"  orbit\t{dense if self.is_dense else 'finite (proved)'}")
         if self.height_constant is not None:
             lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically, of the largest coordinate")
         return "\n".join(lines)
@@ -110,6 +140,10 @@ class OrbitCurve(PrintableResult):
             "A": None if self.curve is None else format_number(self.curve.a4),
             "B": None if self.curve is None else format_number(self.curve.a6),
             "j": exact(self.j),
+            "discriminant": None if self.curve is None else format_number(16 * self.curve.discriminant),
+            "bad_primes": None if self.bad_primes is None else self.bad_primes.to_json(),
+            "components": self.components,
+            "dense": self.is_dense,
             "point": None if self.point is None else [format_number(x) for x in self.point],
             "order": self.order,
             "height": None if self.height is None else self.height.str(15),
@@ -205,7 +239,8 @@ def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
     height = canonical_height(curve, point)
     rotation, steps = _rotation(curve, point)
     constant = found.degree * float(height.mid()) / (iterate * iterate * math.log(2))
-    return OrbitCurve(1, iterate, curve, point, curve.order(point), height, rotation, steps, height_constant=constant)
+    order, bad = curve.order(point), bad_primes(curve)
+    return OrbitCurve(1, iterate, curve, point, order, height, rotation, steps, None, constant, bad)
 
 
 def _rotation(curve: EllipticCurve, point: AffinePoint) -> tuple[arb, int]:
@@ -271,10 +306,9 @@ def _on_level_curve(
             degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
             order, (rotation, steps) = curve.order(point), _rotation(curve, point)
             height = canonical_height(curve, point) if order is None else arb(0)
-            constant = degree * float(height.mid()) / math.log(2)
-            return OrbitCurve(
-                1, 1, curve, point, order, height, rotation, steps, height_constant=constant if order is None else None
-            )
+            constant = degree * float(height.mid()) / math.log(2) if order is None else None
+            bad = bad_primes(curve)
+            return OrbitCurve(1, 1, curve, point, order, height, rotation, steps, None, constant, bad)
     return None
 
 
