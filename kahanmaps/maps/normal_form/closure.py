@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import isqrt
 from typing import Any
 
-from flint import arb, fmpq, fmpq_poly, fmpz_mat
+from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import RR
 
@@ -84,10 +84,12 @@ def excluded_relations(numbers: Sequence[arb]) -> int:
     >>> excluded_relations([arb(2).sqrt()]) > 10**6, excluded_relations([arb(1) / 3]) < 3
     (True, True)
     """
-    d = len(numbers)
-    with RR(128).working():
-        scaled = [int((_SCALE * x.mid()).floor().unique_fmpz()) for x in numbers]
-    rows = [[int(i == k) for k in range(d)] + [x] for i, x in enumerate(scaled)]
+    d, rows = len(numbers), list[list[int | fmpz]]()
+    for k, x in enumerate(numbers):
+        with RR(128).working():
+            integer = (_SCALE * x).mid().floor().unique_fmpz()
+        assert integer is not None  # a midpoint is an exact number
+        rows.append([int(i == k) for i in range(d)] + [integer])
     reduced = fmpz_mat([*rows, [0] * d + [_SCALE]]).lll().tolist()
     orthogonal: list[list[fmpq]] = []
     lengths: list[fmpq] = []
@@ -98,6 +100,6 @@ def excluded_relations(numbers: Sequence[arb]) -> int:
             vector = [x - factor * y for x, y in zip(vector, other, strict=True)]
         orthogonal.append(vector)
         lengths.append(sum((x * x for x in vector), fmpq(0)))
-    # The last entry of a relation is at most d N times the error 2 of [C rho], and d N^2 (1 + 4 d) bounds its square.
+    # [C rho] has at most the error 3, so the last entry of a relation is at most 3 d N.
     least = min(lengths)
-    return isqrt(int((least.p - 1) // (least.q * d * (1 + 4 * d))))
+    return isqrt(int((least.p - 1) // (least.q * d * (1 + 9 * d))))

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from flint import arb, fmpq, fmpq_mat
@@ -53,26 +54,62 @@ class OrbitCurve(PrintableResult):
     """The curve of an orbit, and the map on it; everything but the balls is exact and proved.
 
     The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers are about
-    this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B,
-    `height` is the canonical height of that point. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and
-    trace = 2 for a parabolic map. `rotation` is the rotation number in (0, 1/2] up to sign; None if kappa is real.
-    `steps` is 2 if that iterate exchanges two real components: then `rotation` is about its square. `bad_primes` are
-    those of the curve over Q.
-    `height_constant` is the C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits
-    (over one common denominator the integers may be longer).
+    this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B; `degree` is that of the
+    coordinates on it. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and trace = 2 for a parabolic map.
     """
 
     genus: int
     iterate: int
     curve: EllipticCurve | None = None
     point: AffinePoint | None = None
-    order: int | None = None
-    height: arb | None = None
-    rotation: arb | None = None
-    steps: int = 1
+    degree: int = 0
     trace: fmpq | None = None
-    height_constant: float | None = None
-    bad_primes: BadPrimes | None = None
+
+    @cached_property
+    def order(self) -> int | None:
+        """The order of the translation or of kappa, None if it is infinite."""
+        return None if self.curve is None or self.point is None else self.curve.order(self.point)
+
+    @cached_property
+    def height(self) -> arb | None:
+        """The canonical height of the point."""
+        if self.curve is None or self.point is None:
+            return None
+        return canonical_height(self.curve, self.point) if self.order is None else arb(0)
+
+    @property
+    def height_constant(self) -> float | None:
+        """The C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits.
+
+        Over one common denominator the integers may be longer.
+        """
+        if self.height is None or self.order is not None:
+            return None
+        return self.degree * float(self.height.mid()) / (self.iterate**2 * math.log(2))
+
+    @cached_property
+    def _rotation(self) -> tuple[arb | None, int]:
+        if self.curve is not None and self.point is not None:
+            return _rotation(self.curve, self.point)
+        if self.trace is None or abs(self.trace) >= 2:
+            return None, 1
+        with RR(128).working():  # kappa = exp(2 pi i rho)
+            return arb.atan2(arb(4 - self.trace**2).sqrt(), arb(self.trace)) / (2 * arb.pi()), 1
+
+    @property
+    def rotation(self) -> arb | None:
+        """The rotation number in (0, 1/2] up to sign; None if kappa is real."""
+        return self._rotation[0]
+
+    @property
+    def steps(self) -> int:
+        """1, or 2 if the iterate exchanges two real components; then `rotation` is about its square."""
+        return self._rotation[1]
+
+    @cached_property
+    def bad_primes(self) -> BadPrimes | None:
+        """The bad primes of the curve over Q."""
+        return None if self.curve is None else bad_primes(self.curve)
 
     @property
     def components(self) -> int | None:
@@ -236,11 +273,7 @@ def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
     if curve.discriminant == 0:
         return _on_singular_cubic(curve, point, iterate)
     curve, point = curve.short_model(point)
-    height = canonical_height(curve, point)
-    rotation, steps = _rotation(curve, point)
-    constant = found.degree * float(height.mid()) / (iterate * iterate * math.log(2))
-    order, bad = curve.order(point), bad_primes(curve)
-    return OrbitCurve(1, iterate, curve, point, order, height, rotation, steps, None, constant, bad)
+    return OrbitCurve(1, iterate, curve, point, found.degree)
 
 
 def _rotation(curve: EllipticCurve, point: AffinePoint) -> tuple[arb, int]:
@@ -266,11 +299,11 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
     a, b, c = curve.a2, curve.a4, curve.a6
     square = a * a - 3 * b  # (r - s)^2
     if square == 0:
-        return _rational(iterate, fmpq(2))
+        return OrbitCurve(0, iterate, trace=fmpq(2))
     r = (9 * c - a * b) / (2 * square)
     x, y = point
     m_squared, w = 3 * r + a, x - r  # r - s, as 2 r + s = -a
-    return _rational(iterate, 2 * (y * y + m_squared * w * w) / (y * y - m_squared * w * w))
+    return OrbitCurve(0, iterate, trace=2 * (y * y + m_squared * w * w) / (y * y - m_squared * w * w))
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
@@ -304,11 +337,7 @@ def _on_level_curve(
             # The degree of the coordinates one by one, or with a common denominator, as in the search.
             is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
             degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
-            order, (rotation, steps) = curve.order(point), _rotation(curve, point)
-            height = canonical_height(curve, point) if order is None else arb(0)
-            constant = degree * float(height.mid()) / math.log(2) if order is None else None
-            bad = bad_primes(curve)
-            return OrbitCurve(1, 1, curve, point, order, height, rotation, steps, None, constant, bad)
+            return OrbitCurve(1, 1, curve, point, degree)
     return None
 
 
@@ -363,13 +392,4 @@ def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> Orbi
             forms.append(entry)
     if len(nullspace(QQ, fmpq_mat(len(forms), unknowns, [x for row in forms for x in row]))) != 1:
         return None
-    return _rational(1, (p + s) ** 2 / (p * s - q * r) - 2)
-
-
-def _rational(iterate: int, trace: fmpq) -> OrbitCurve:
-    """Return the result for a rational curve: kappa = exp(2 pi i rho) if the trace is between -2 and 2."""
-    rotation = None
-    if abs(trace) < 2:
-        with RR(128).working():
-            rotation = arb.atan2(arb(4 - trace * trace).sqrt(), arb(trace)) / (2 * arb.pi())
-    return OrbitCurve(0, iterate, trace=trace, rotation=rotation)
+    return OrbitCurve(0, 1, trace=(p + s) ** 2 / (p * s - q * r) - 2)
