@@ -294,7 +294,7 @@ def test_relations_are_excluded_only_below_the_first_one(third, coefficient):
         numbers = [arb(2).sqrt(), arb(3).sqrt()]
         numbers.append((numbers[0] + numbers[1]) / third if third else arb(5).sqrt())
     bound = excluded_relations(numbers)
-    assert bound < coefficient if coefficient else bound > 500
+    assert bound < coefficient if coefficient else bound > 300
 
 
 @pytest.mark.skipif(shutil.which("gp") is None, reason="PARI/GP (gp) is not installed")

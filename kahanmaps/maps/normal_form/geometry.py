@@ -48,8 +48,8 @@ class Rotation:
     """The rotation of an orbit on its level curve over one real root, or one pair of complex roots, of chi.
 
     `number` is the rotation number in (0, 1/2], up to sign: a step is a rotation of the circle by this part of a turn.
-    If the level curve has two real components, the map exchanges them (`steps` = 2), and the number is that of its
-    second iterate. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of
+    It is that of the iterate number `steps` of the map: 2 if the level curve has two real components, which the map
+    exchanges. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of
     the translation in a reduced basis of the periods. `flow` is the rotation number of the time-2 eps map of the flow,
     2 eps times its frequency. `phase_error` is `number` minus `flow`, the error of the phase in one step; None if there
     is a singular level between the initial point and smaller eps. `component` is the component of the closed level
