@@ -1,5 +1,6 @@
 """The curve of an orbit: models and heights against PARI, level curves and exact orbits, rotation against floats."""
 
+import json
 import math
 import shutil
 import subprocess
@@ -13,7 +14,9 @@ from planar_helpers import mean_turn
 import kahanmaps as km
 from kahanmaps import InputError
 from kahanmaps.algebra.elliptic_curves import EllipticCurve, canonical_height
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import UnknownCurve
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
@@ -120,6 +123,26 @@ def test_a_rational_curve_has_a_multiplier():
     assert float(orbit.rotation) == pytest.approx(math.atan(0.1) / math.pi, abs=1e-15)
     parabolic = km.geometry(km.System("x' = 1; y' = x"), [1, 2], "1/10")
     assert (parabolic.genus, parabolic.trace, parabolic.rotation) == (0, 2, None)
+
+
+@pytest.mark.parametrize(
+    ("image", "start", "trace"),
+    [
+        (["x + 1", "y + x^2"], [1, 2], 2),
+        (["2*x", "8*y"], [1, 3], fmpq(5, 2)),
+        (["(3*x - 4)/(4*x + 3)", "625*y/(4*x + 3)^4"], [1, 3], fmpq(-14, 25)),
+        (["2*x", "3*y"], [1, 3], None),
+    ],
+)
+def test_rational_curves_with_a_coordinate_as_parameter_are_found(image, start, trace):
+    """Three curves like y = x^3, y = 3 x^3 and y = 3 (1 + x^2)^2/4; y = 3 x^(log 3/log 2) is not algebraic."""
+    map_over = parse_system(f'variables = ["x", "y"]\n[map]\nimage = {json.dumps(image)}').map.at(fmpq(1), QQ)
+    if trace is None:
+        with pytest.raises(UnknownCurve, match="rational curves of degree at most 6"):
+            orbit_curve(map_over, start)
+    else:
+        orbit = orbit_curve(map_over, start)
+        assert (orbit.genus, orbit.trace, orbit.is_dense) == (0, trace, abs(trace) < 2)
 
 
 @pytest.mark.parametrize("t", [fmpq(3), fmpq(2, 5), fmpq(-7, 2)])

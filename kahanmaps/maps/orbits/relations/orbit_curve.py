@@ -6,7 +6,7 @@ curve and T: on y^2 + a1 x y + a3 y = x^3 + a2 x^2 with T = (0, 0) the division 
 
     psi_2 = a3,      psi_3 = a2 a3^2,      psi_4 = a3^4 (a1 a2 - a3)                            (ward-1948).
 
-If this cubic is singular, or the orbit lies on a rational normal curve, the map acts on a projective line. There it
+If this cubic is singular, or the orbit lies on another rational curve, the map acts on a projective line. There it
 multiplies a coordinate by the multiplier kappa, or adds a constant. Source: docs/mathematics.md, "Orbits on elliptic
 curves".
 """
@@ -46,6 +46,7 @@ _LATER, _APART = 16, 8  # steps after which the search starts again, up to the f
 _SHORT = 2000  # ... points have at most this number of bits
 _LEVEL_POINTS = 8  # of an orbit, from which the translation of a level curve is computed
 _PERIODS = 24  # up to this period an orbit is recognized as periodic: twice the largest order of a torsion point
+_MAX_RATIONAL_DEGREE = 6  # of rational curves that are not rational normal curves
 _ACCURACY = 1e-15  # of rotation numbers
 
 
@@ -242,7 +243,8 @@ def orbit_curve(
     if result is None:
         raise UnknownCurve(
             "undecided: no curve of genus 0 or 1 was found that contains the orbit; the search covers curves of "
-            "genus 1 on which the coordinates have degree at most 8, singular plane cubics, and rational normal curves"
+            "genus 1 on which the coordinates have degree at most 8, singular plane cubics, rational normal curves, "
+            f"and rational curves of degree at most {_MAX_RATIONAL_DEGREE} on which a coordinate is a parameter"
         )
     return result
 
@@ -311,7 +313,8 @@ def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | Non
     dim = map_over.dim
     top = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]
-    while len(points) < max(_PERIODS, top * dim + dim + 2, (dim + 1) ** 2) + dim:
+    degree = max(dim, _MAX_RATIONAL_DEGREE)
+    while len(points) < max(_PERIODS, top * degree + degree + 2, (dim + 1) * (degree + 1)) + dim:
         image = map_over.integer_step(points[-1])  # type: ignore[arg-type]
         if image is None or image.exceeding(_BITS):  # on a rational curve the length grows linearly
             return [*points, None]
@@ -342,54 +345,58 @@ def _on_level_curve(
 
 
 def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> OrbitCurve | None:
-    """Return the multiplier of an orbit on a rational normal curve: one of degree d in a space of dimension d.
+    """Return the multiplier of an orbit on a rational curve, on which the map acts as z -> (p z + q)/(r z + s).
 
-    Hyperplanes through d - 1 points of the orbit give a coordinate z of the curve, on which the map acts by a matrix.
     The coordinates are forms of degree d in (z : 1); substituted into the equation of the map they give a form of known
     degree, which vanishes if it does at more points.
     """
     if len(map_over.factors) > 1 or None in points:  # the points between the factors lie on other curves
         return None
     dim, top = map_over.dim, max(sum(exponent) for exponent in map_over.factors[0].equation.exponents)
-    rows = [[*(fmpq(x) for x in p.numerators), fmpq(p.denominator)] for p in points if p is not None]
+    rows = [[fmpq(p.denominator), *(fmpq(x) for x in p.numerators)] for p in points if p is not None]
     size = dim + 3
-    full = fmpq_mat(size, dim + 1, [x for row in rows[:size] for x in row])
-    degree = rank(QQ, full) - 1
-    if degree < 1:
-        return None
-    chosen: list[int] = []  # coordinates that are independent on the orbit
+    chosen: list[int] = []  # coordinates that are independent on the orbit, first the denominator, which is not 0
     for k in range(dim + 1):
         columns = [*chosen, k]
         if rank(QQ, fmpq_mat(size, len(columns), [row[i] for row in rows[:size] for i in columns])) == len(columns):
             chosen = columns
-    rows = [[row[k] for k in chosen] for row in rows]
-    through = fmpq_mat(degree - 1, degree + 1, [x for row in rows[: degree - 1] for x in row])
-    pencil = nullspace(QQ, through)
-    if len(pencil) != 2:
+    independent, normal = [[row[k] for k in chosen] for row in rows], len(chosen) - 1
+    if normal < 1:
         return None
-    values = [[sum(a * x for a, x in zip(form, row, strict=True)) for form in pencil] for row in rows[degree - 1 :]]
-    if any(second == 0 for _, second in values):
-        return None
-    z = [first / second for first, second in values]
-    # (p z + q)/(r z + s) maps each z to the next.
-    equations = [[z[k], fmpq(1), -z[k] * z[k + 1], -z[k + 1]] for k in range(3)]
-    kernel = nullspace(QQ, fmpq_mat(3, 4, [x for row in equations for x in row]))
-    if len(kernel) != 1:
-        return None
-    p, q, r, s = kernel[0]
-    unknowns = (degree + 1) ** 2
-    enough = max(top * degree + degree + 2, unknowns)
-    z, rows = z[:enough], rows[degree - 1 :][:enough]
-    if any(z[k + 1] * (r * z[k] + s) != p * z[k] + q for k in range(len(z) - 1)) or len(set(z)) < enough:
-        return None
-    last, forms = degree, []
+    # On a rational normal curve hyperplanes through d - 1 points of the orbit give z. Otherwise coordinates are tried.
+    parameters = [([row[k] / row[0] for row in rows], range(normal, _MAX_RATIONAL_DEGREE + 1)) for k in chosen[1:]]
+    through = fmpq_mat(normal - 1, normal + 1, [x for row in independent[: normal - 1] for x in row])
+    if len(pencil := nullspace(QQ, through)) == 2:
+        pairs = [[sum(a * x for a, x in zip(form, row, strict=True)) for form in pencil] for row in independent]
+        if all(second != 0 for _, second in pairs[normal - 1 :]):
+            parameters.insert(0, ([first / second for first, second in pairs[normal - 1 :]], range(normal, normal + 1)))
+    for z, degrees in parameters:
+        equations = [[z[k], fmpq(1), -z[k] * z[k + 1], -z[k + 1]] for k in range(3)]
+        kernel = nullspace(QQ, fmpq_mat(3, 4, [x for row in equations for x in row]))
+        p, q, r, s = kernel[0]
+        if len(kernel) != 1 or len(set(z)) < len(z):
+            continue
+        if any(z[k + 1] * (r * z[k] + s) != p * z[k] + q for k in range(len(z) - 1)):
+            continue
+        for degree in degrees:
+            enough = max(top * degree + degree + 2, len(chosen) * (degree + 1))
+            if _are_forms(z[:enough], independent[len(rows) - len(z) :][:enough], degree):
+                return OrbitCurve(0, 1, trace=(p + s) ** 2 / (p * s - q * r) - 2)
+    return None
+
+
+def _are_forms(z: Sequence[fmpq], rows: Sequence[Sequence[fmpq]], degree: int) -> bool:
+    """Return whether the rows are, up to factors, the values of forms of this degree in (z : 1), and of no others.
+
+    These have no common factor, as there would be others with another factor instead.
+    """
+    width = degree + 1
+    unknowns, equations = len(rows[0]) * width, []
     for value, row in zip(z, rows, strict=True):
-        monomials = [value**k for k in range(degree + 1)]
-        for i in range(last):
-            entry = [fmpq(0)] * unknowns
-            entry[i * (degree + 1) : (i + 1) * (degree + 1)] = [row[last] * x for x in monomials]
-            entry[last * (degree + 1) :] = [-row[i] * x for x in monomials]
-            forms.append(entry)
-    if len(nullspace(QQ, fmpq_mat(len(forms), unknowns, [x for row in forms for x in row]))) != 1:
-        return None
-    return OrbitCurve(0, 1, trace=(p + s) ** 2 / (p * s - q * r) - 2)
+        monomials = [value**k for k in range(width)]
+        for i in range(1, len(row)):
+            equation = [fmpq(0)] * unknowns
+            equation[:width] = [row[i] * x for x in monomials]
+            equation[i * width : (i + 1) * width] = [-row[0] * x for x in monomials]
+            equations.append(equation)
+    return len(nullspace(QQ, fmpq_mat(len(equations), unknowns, [x for row in equations for x in row]))) == 1
