@@ -100,19 +100,21 @@ def cycle_census(
 ) -> Census:
     """Count the cycles of a map on P^n over GF(p) by length: those of all points, or of random ones.
 
-    A system stands for its Kahan map; `eps` is exact, for that half the time step; 2 < `prime` < 2^31. All points are
-    examined up to 2,000,000 of them (half as many with each dimension above 6), unless `samples` says how many random
-    points to follow (500 in larger spaces), for at most `steps` steps each. A TimeLimit ends the census early. The maps
-    of a composition are applied one after the other: a point is indeterminate if one of them is not defined. Above
-    dimension 6 so are points where the forms vanish by a factor that they have in common: it is not divided out there.
-    Raises InputError for a wrong prime, number or dimension, BadPrime where eps or the map has no reduction.
+    A system stands for its Kahan map; `eps` is exact, for that half the time step (a map without eps needs none);
+    2 < `prime` < 2^31. All points are examined up to 2,000,000 of them (half as many with each dimension above 6),
+    unless `samples` says how many random points to follow (500 in larger spaces), for at most `steps` steps each. A
+    TimeLimit ends the census early. The maps of a composition are applied one after the other: a point is indeterminate
+    if one of them is not defined. Above dimension 6 so are points where the forms vanish by a factor that they have in
+    common: it is not divided out there. Raises InputError for a wrong prime, number or dimension, BadPrime where eps or
+    the map has no reduction.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)
     >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
     (993, 3, 613, 377, 21)
     """
-    exact_eps, map_, prime = rational(resolve_eps(eps, time_step, h)), as_map(system), integer(prime, "prime")
+    map_, prime, eps = as_map(system), integer(prime, "prime"), resolve_eps(eps, time_step, h)
+    exact_eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES}, and at least 1")
     space = _ProjectiveMap(map_, exact_eps, prime)
