@@ -138,6 +138,14 @@ SOURCES: dict[str, str] = {
         "T. E. Kouloukas, G. R. W. Quispel, P. Vanhaecke. Liouville integrability and superintegrability of a "
         "generalized Lotka-Volterra system and its Kahan discretization. J. Phys. A 49 (2016), 225201. arXiv:1601.05006"
     ),
+    "laska-1982": (
+        "M. Laska. An algorithm for finding a minimal Weierstrass equation for an elliptic curve. Math. Comp. 38 "
+        "(1982), 257-260"
+    ),
+    "kraus-1989": (
+        "A. Kraus. Quelques remarques a propos des invariants c4, c6 et Delta d'une courbe elliptique. Acta Arith. 54 "
+        "(1989), 75-80"
+    ),
     "mazur-1977": ("B. Mazur. Modular curves and the Eisenstein ideal. Publ. Math. IHES 47 (1977), 33-186."),
     "zander-2021": (
         "R. Zander. On the singularity structure of Kahan discretizations of a class of quadratic vector fields. "

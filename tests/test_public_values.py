@@ -445,6 +445,7 @@ def test_arrays_of_residues_are_exact_or_refused(prime):
         (lambda: km.certificate(FISH, "gp", claims="volume"), r"expected a list: claims=\['volume'\]"),
         (lambda: km.plot.escape("riccati", eps="1/10"), "found 1 variable, expected at least 2"),
         (lambda: km.orbit(FISH, [1, 2], "1/10", 3, max_digits=0), "found a budget of 0 digits"),
+        (lambda: km.heights("mcmillan", "1,2"), "found '1,2', expected an integer, p/q or a decimal"),
         (lambda: km.geometry("paper_m2", [1, 2, 3, 4], 0), "found eps = 0, expected a nonzero number"),
         (lambda: km.geometry("lyness", [0, 0]), "the map is not defined at step 0"),
         (lambda: km.geometry("x' = 1 + x^2", [0], "1/2"), "the map is not defined at step"),

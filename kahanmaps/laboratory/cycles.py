@@ -104,7 +104,7 @@ def cycle_census(
 
     Args:
         system: a map, or a system, which stands for its Kahan map.
-        eps: an exact number, half the time step for a Kahan map.
+        eps: an exact number, half the time step for a Kahan map; a map without eps needs none.
         prime: a prime between 2 and 2^31.
         time_step, h: the time step 2 eps, instead of eps.
         samples: the number of random points; by default all points if there are at most 2,000,000 (half as many with
@@ -124,7 +124,8 @@ def cycle_census(
     >>> census.points, census.indeterminate, census.pre_indeterminate, census.periodic, census.longest
     (993, 3, 613, 377, 21)
     """
-    exact_eps, map_, prime = rational(resolve_eps(eps, time_step, h)), as_map(system), integer(prime, "prime")
+    map_, prime, eps = as_map(system), integer(prime, "prime"), resolve_eps(eps, time_step, h)
+    exact_eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES}, and at least 1")
     space = _ProjectiveMap(map_, exact_eps, prime)

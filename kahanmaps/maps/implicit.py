@@ -46,16 +46,20 @@ from kahanmaps.systems.polynomial import PolynomialField
 
 
 class Map(LatexDisplay):
-    """A composition of birational maps over a field at a fixed eps; `eps` is None if the maps have different ones."""
+    """A composition of birational maps over a field at a fixed eps; `eps` is None if the maps have different ones.
+
+    A map that does not depend on eps has `has_eps` False, and some eps.
+    """
 
     field: Field
     eps: Any
     dim: int
     variables: tuple[str, ...] = ()
+    has_eps: bool = True
 
     def __init__(self, parts: Sequence[Map], eps: Any, variables: tuple[str, ...]) -> None:
         self.parts, self.eps, self.variables = tuple(parts), eps, variables
-        self.field, self.dim = parts[0].field, parts[0].dim
+        self.field, self.dim, self.has_eps = parts[0].field, parts[0].dim, any(part.has_eps for part in parts)
 
     @cached_property
     def factors(self) -> tuple[ElementaryMap, ...]:
@@ -227,9 +231,10 @@ class Map(LatexDisplay):
         coordinates = ",".join(self.field.format(entry) for entry in point)
         if len(coordinates) > 200:
             coordinates = f"{coordinates[:100]}...{coordinates[-80:]}"
+        at_eps = f" for eps = {self.field.format(self.eps)}" if self.has_eps else ""
         return SingularStep(
-            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates} "
-            f"for eps = {self.field.format(self.eps)}: the map is not defined there",
+            f"{det_of(self.denominator_name(False))} = 0 at the point {coordinates}{at_eps}: "
+            "the map is not defined there",
             point,
             self.eps,
         )
@@ -272,7 +277,9 @@ class ElementaryMap(Map):
     def inverse(self) -> ElementaryMap:
         """The inverse map. Raises InputError if it is not known."""
         backward = self._equation.transposed() if self._backward is None else self._backward()
-        return ElementaryMap(backward, self.eps, lambda: self._equation, self.variables)
+        inverse = ElementaryMap(backward, self.eps, lambda: self._equation, self.variables)
+        inverse.has_eps = self.has_eps
+        return inverse
 
     def linear_system(self, x: tuple[Any, ...]) -> tuple[Any, Any]:
         """Return M(x), and r(x) as a column."""
@@ -551,6 +558,7 @@ class ImplicitMap(MapFamily):
         needs_inverse_rows = self.backward is not None or equation.degree > 1
         backward = (lambda: equation_of(self.inverse_rows, over, point)) if needs_inverse_rows else None
         map_at_eps = ElementaryMap(equation, element, backward, self.variables)
+        map_at_eps.has_eps = self.has_eps
         self._last[:] = [] if values else [(over, element, map_at_eps)]  # maps with values of symbols are not cached
         return map_at_eps
 

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError
-from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.function_calls import public_function
 from kahanmaps.hints import AttributeHints
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
@@ -96,16 +94,22 @@ class Plot(AttributeHints):
         file = as_file(system)
         return _axes(plot_invariant_curves(find_invariant_curves(file, as_points(x0, file.variables), eps, n), Style()))
 
-    def rotation(self, system: SystemLike, first: Any, last: Any, *, eps: Any, points: int = 200) -> Axes:
-        """Plot the rotation numbers of a system with a normal form along the segment between two initial points."""
+    def rotation(
+        self,
+        system: SystemLike,
+        first: Any,
+        last: Any,
+        *,
+        eps: Any = None,
+        points: int = 200,
+        against: str | None = None,
+    ) -> Axes:
+        """Plot rotation numbers along the segment between two initial points, against the position or an integral."""
         from kahanmaps.plots.rotation import plot_rotation
 
         file = as_file(system)
-        normal_form = file.normal_form
-        if isinstance(normal_form, NoNormalForm):
-            raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
-        first, last = as_point(first, file.variables), as_point(last, file.variables)
-        return _axes(plot_rotation(normal_form, rational(eps), first, last, Style(), points=points))
+        ends = as_point(first, file.variables), as_point(last, file.variables)
+        return _axes(plot_rotation(file, eps, *ends, Style(), points=points, against=against))
 
     def section(
         self,

@@ -1,7 +1,8 @@
-"""Rotation numbers of a member of the family along a line of initial points, as a picture."""
+"""Rotation numbers along a line of initial points, as a picture."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -9,96 +10,118 @@ import numpy as np
 from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ, integer
-from kahanmaps.errors import InputError, PrecisionLost
-from kahanmaps.family.system_normal_form import SystemNormalForm
-from kahanmaps.maps.normal_form.geometry import rotation_numbers
-from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve, quoted
+from kahanmaps.family.system_normal_form import NoNormalForm
+from kahanmaps.maps.normal_form.geometry import Rotation, rotation_numbers
+from kahanmaps.maps.orbits.relations.orbit_curve import orbit_curve
+from kahanmaps.plots.figures import drawing, label_number, label_of, legend_above, legend_height, new_figure
 from kahanmaps.plots.style import COLORS, LINES, Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.62
-_SPACING = 0.04  # of marked resonances, relative to the height of the axes
+_SPACING = 0.05  # of marked resonances, relative to the height of the axes
 
 
 def plot_rotation(
-    normal_form: SystemNormalForm,
+    file: SystemFile,
     eps: Any,
     first: Sequence[Any],
     last: Sequence[Any],
     style: Style | None = None,
     *,
     points: int = 200,
+    against: str | None = None,
 ) -> Figure:
-    """Plot the rotation numbers of map and flow against the position on the segment from one initial point to another.
+    """Plot the rotation numbers of a map along the segment from one initial point to another.
 
     Args:
-        normal_form: the normal form of the system.
-        eps: half the time step, exact.
+        file: the system or map.
+        eps: half the time step, exact; None for a map without eps.
         first, last: the ends of the segment, exact.
-        points: the number of initial points; singular levels among them are left out.
+        points: the number of initial points; those without a rotation number are left out.
+        against: the declared integral whose value is the horizontal coordinate; None for the position on the segment.
 
-    Solid lines are the rotation numbers of the map, dashed lines those of its second iterate where the map exchanges
-    two real components, dotted lines those of the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal
-    lines mark some 1/n. Only real roots of chi have rotation numbers. Raises InputError if there are none, and for
-    fewer than two points.
+    A system with a normal form has a rotation number for each real root of chi, unless the level is singular; for other
+    maps it is that of the curve of genus 1 or 0 that contains the orbit, if one is found. Solid lines belong to the
+    map, dashed lines to an iterate of it, such as the second one where the map exchanges two real components, dotted
+    lines to the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal lines mark some 1/n.
+
+    Raises InputError if no point has a rotation number, for fewer than two points, and for an unknown integral.
     """
     if integer(points, "points") < 2:
         raise InputError(f"found {points} points, expected at least 2")
-    ends = [[QQ.convert(x) for x in end] for end in (first, last)]
-    if len(ends[0]) != len(ends[1]):
-        raise InputError(f"found points with {len(ends[0])} and {len(ends[1])} coordinates, expected as many")
-    positions = [fmpq(k, points - 1) for k in range(points)]
-    rows: dict[str, list[tuple[float, float, float, int]]] = {}
-    for position in positions:
+    map_over, integrals = file.at(eps), file.integrals
+    if against is not None and against not in integrals:
+        known = ", ".join(integrals) or "it declares none"
+        raise InputError(f"found no integral {quoted(against)} of {file.name}, expected one that it declares: {known}")
+    ends = [[QQ.convert(x) for x in map_over.point(end)] for end in (first, last)]
+    rows: dict[str, list[tuple[float, float, float, int, int]]] = {}
+    for k in range(points):
+        position = fmpq(k, points - 1)
         start = [a + position * (b - a) for a, b in zip(*ends, strict=True)]
+        at = position if against is None else integrals[against].value(QQ, (*start, map_over.eps))
+        rotations: dict[str, Rotation] = {}
         try:
-            rotations = rotation_numbers(normal_form, eps, start)
-        except PrecisionLost:
+            if not isinstance(file.normal_form, NoNormalForm):
+                rotations = rotation_numbers(file.normal_form, map_over.eps, start)
+            elif (curve := orbit_curve(map_over, start, file.map, list(integrals.values()))).rotation is not None:
+                rotations[""] = Rotation("", (curve.rotation,), curve.iterate * curve.steps)
+        except (PrecisionLost, UnknownCurve, InputError):  # an orbit that is finite, ends, or has no known curve
             continue
-        for root, rotation in rotations.items():
-            if rotation.flow is not None:
-                flow = float(rotation.flow.mid()) % 1
-                x, rho = float(position.p) / float(position.q), float(rotation.number.mid())
-                row = (x, rho, min(flow, 1 - flow), rotation.steps)
-                rows.setdefault(root, []).append(row)
+        for root, rotation in rotations.items() if at is not None else ():
+            if len(rotation.numbers) == 1:
+                flow = math.nan if rotation.flow is None else float(rotation.flow.mid()) % 1
+                x, rho = float(at.p) / float(at.q), float(rotation.number.mid())
+                rows.setdefault(root, []).append((x, rho, min(flow, 1 - flow), rotation.steps, k))
     if not rows:
-        raise InputError("found no initial point with a smooth level at a real root of chi, expected at least one")
+        raise InputError(
+            "found no initial point with a rotation number, expected one on a smooth level at a real root of chi, or "
+            "on a curve of genus 1 or 0; kahanmaps geometry says what a single point lies on"
+        )
     if len(rows) > len(COLORS):
         raise InputError(f"found {len(rows)} real roots of chi, expected at most {len(COLORS)} in one picture")
     style = style or Style()
-    lines = sum(3 if any(row[3] == 2 for row in values) else 2 for values in rows.values())
-    gap = 1.5 / max(1, points - 1)
+    legend: list[tuple[str, Any]] = []
+    for k, (root, values) in enumerate(rows.items()):
+        at_root = f", $t = {root}$" if root else ""
+        for steps in sorted({row[3] for row in values}):
+            name = {1: "map", 2: "its second iterate"}.get(steps, f"its iterate {steps}")
+            legend.append((name + at_root, {"color": COLORS[k], "linestyle": LINES[min(steps - 1, 1)]}))
+        if root:
+            legend.append(("flow" + at_root, {"color": COLORS[k], "linewidth": 0.6, "linestyle": ":"}))
     with drawing(style):
-        figure = new_figure(style, _ASPECT + legend_height(["its second iterate, t = 1"] * lines, style, max_columns=2))
+        height = legend_height([name for name, _ in legend], style, max_columns=2)
+        figure = new_figure(style, _ASPECT + height)
         axes = figure.subplots()
-        for k, (root, values) in enumerate(rows.items()):
+        for k, values in enumerate(rows.values()):
             table = np.array(values)
             # No line leads across a level that was left out, or to one with another number of components.
-            breaks = 1 + np.flatnonzero((np.diff(table[:, 0]) > gap) | (np.diff(table[:, 3]) != 0))
+            breaks = 1 + np.flatnonzero((np.diff(table[:, 4]) > 1) | (np.diff(table[:, 3]) != 0))
             for part in np.split(table, breaks):
-                line = LINES[1] if part[0, 3] == 2 else LINES[0]
+                line = LINES[min(int(part[0, 3]) - 1, 1)]
                 axes.plot(part[:, 0], part[:, 1], marker="." * (len(part) == 1), color=COLORS[k], linestyle=line)
                 folds = 1 + np.flatnonzero(np.abs(np.diff(part[:, 2])) > 0.25)
                 for piece in np.split(part, folds):
                     axes.plot(piece[:, 0], piece[:, 2], color=COLORS[k], linewidth=0.6, linestyle=":", zorder=1.5)
-            axes.plot([], [], color=COLORS[k], linestyle=LINES[0], label=f"map, $t = {root}$")
-            if (table[:, 3] == 2).any():
-                axes.plot([], [], color=COLORS[k], linestyle=LINES[1], label=f"its second iterate, $t = {root}$")
-            axes.plot([], [], color=COLORS[k], linewidth=0.6, linestyle=":", label=f"flow, $t = {root}$")
+        for name, properties in legend:
+            axes.plot([], [], label=name, **properties)
         low, high = axes.get_ylim()
         low, high = max(low, 0), min(high, 0.5)
         axes.set_ylim(low, high)
-        axes.set_xlim(0, 1)
+        if against is None:
+            axes.set_xlim(0, 1)
         for n in range(2, 1000):
             if 1 / (n - 1) - 1 / n < _SPACING * (high - low):
                 break
             if low < 1 / n < high:
                 axes.axhline(1 / n, color="0.75", linewidth=0.4, zorder=1)
-                at: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
-                axes.annotate(f"1/{n}", (1, 1 / n), (2, 0), **at)
-        axes.set_xlabel("position on the segment of initial points")
-        axes.set_ylabel(rf"rotation number $\rho$, $\varepsilon = {label_number(QQ.convert(eps))}$")
+                beside: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
+                axes.annotate(f"1/{n}", (1, 1 / n), (2, 0), **beside)
+        axes.set_xlabel("position on the segment of initial points" if against is None else label_of(against))
+        eps = rf", $\varepsilon = {label_number(map_over.eps)}$" if file.map.has_eps else ""
+        axes.set_ylabel(rf"rotation number $\rho${eps}")
         legend_above(figure, *axes.get_legend_handles_labels(), style, max_columns=2)
     return figure

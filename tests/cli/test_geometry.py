@@ -10,6 +10,18 @@ def test_text_and_json_have_the_same_curve(kahanmaps):
     assert f"j-invariant\t{plane['j']}\n" in text
     assert "rotation number\t[0.0367013173715" in text
     assert plane["rotations"][0]["numbers"][0].startswith("[0.0367013173715")
+    assert "translation\t(0, 134992/16875), infinite order" in text
+    assert plane["point"] == ["0", "134992/16875"]
+    assert "  bad primes\t2, 5, 11, 13, 59\n" in text
+    assert plane["bad_primes"]["bad"] == ["2", "5", "11", "13", "59"]
+
+
+def test_components_and_density_are_proved_or_supported(kahanmaps):
+    text = kahanmaps("geometry nahm_tetrahedral --start 1,2 --eps 1/10").out
+    assert "real components\t1\norbit\tdense in the real components that it visits (proved: " in text
+    record = kahanmaps("geometry paper_m2 --start 1,2,3,5 --eps 1/10 --json").json
+    assert record["components"] == 2
+    assert (record["closure"]["dense"], record["closure"]["status"]) == (None, "supported")
 
 
 def test_a_system_that_is_not_declared_as_a_member_is_recognized(kahanmaps):

@@ -126,6 +126,12 @@ def test_cycles_of_an_integrable_map_are_longer_than_the_bound_of_hasse_and_weil
     assert cycle_census(map_of(*EXCHANGES_LEVELS), 1, 47).longest == 114 > 47 + 1 + math.isqrt(4 * 47)
 
 
+def test_a_map_without_eps_needs_none():
+    assert cycle_census(load("mcmillan"), prime=31) == cycle_census(load("mcmillan"), 1, 31)
+    with pytest.raises(InputError, match="found None, expected an exact number"):
+        cycle_census(load("weierstrass"), prime=31)
+
+
 def test_a_map_that_degenerates_modulo_the_prime_is_a_constant():
     """For x' = x^2 + x - 1 that is where 5 eps^2 = 1, as 2/11 modulo 101."""
     census = cycle_census(load("riccati").system, "2/11", 101)

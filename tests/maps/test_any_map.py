@@ -233,3 +233,13 @@ def test_a_check_tries_its_claims_along_such_an_orbit():
     assert (held.verdict, refuted.verdict) == (Certainty.PROVED, Certainty.REFUTED)
     assert "held exactly at 4 points of an orbit" in held.also[-1].summary
     assert "fails at step 0 of an exact orbit" in refuted.also[-1].summary
+
+
+@pytest.mark.parametrize(
+    ("name", "eps", "words"),
+    [("lyness", 1, "at the point 0,0: the map is"), ("riccati", "1/2", "for eps = 1/2: the map is")],
+)
+def test_a_singular_step_names_eps_if_there_is_one(name, eps, words):
+    map_over = km.load(name).map.at(eps)
+    with pytest.raises(SingularStep, match=words):
+        map_over.step([0, 0] if name == "lyness" else [fmpq(1, 2)])

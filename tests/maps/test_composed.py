@@ -56,7 +56,7 @@ def test_an_orbit_stays_where_a_factor_has_no_value():
     inversion = parse_system('variables = ["x", "y"]\n[map]\nimage = ["1/x", "y"]').map
     shift = parse_system('variables = ["x", "y"]\n[map]\nimage = ["x - 1", "y"]').map
     word = composed_map(shift, inversion, shift)
-    refuses(r"det M\(x\) = 0 at the point 1,2 ", word.at(1).step, [1, 2], error=SingularStep)
+    refuses(r"det M\(x\) = 0 at the point 1,2: ", word.at(1).step, [1, 2], error=SingularStep)
     walk = orbit(word, [1, 2], steps=2)
     assert ([point.text for point in walk], walk.end.status) == ([["1", "2"]], "singular")
     for kernel in ("numpy", "numba"):

@@ -1,24 +1,30 @@
 """Geometry of the level sets: j-invariants, rotation numbers and heights, each against an independent computation."""
 
 import math
+import random
 import shutil
 import subprocess
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from flint import arb, fmpq, fmpq_poly
+from flint import arb, fmpq, fmpq_poly, fmpz
 from planar_helpers import mean_turn
 
 from kahanmaps import FloatEnsemble, QuadraticSystem, geometry, load, orbit
 from kahanmaps.algebra.elliptic_curves import canonical_height as height_on
 from kahanmaps.algebra.etale import EtaleAlgebra
+from kahanmaps.algebra.fields import RR
+from kahanmaps.algebra.reduction import bad_primes_of_plane
 from kahanmaps.family.random_members import random_member_with_chi
+from kahanmaps.maps.normal_form.closure import closure, excluded_relations
 from kahanmaps.maps.normal_form.geometry import rotations_of
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.maps.normal_form.plane_heights import plane_height
+
+POINT = PlanarBlock(fmpq(1), fmpq(0), fmpq(0), fmpq(1)), (fmpq(1), fmpq(0), fmpq(1))  # disc = -27, h = 1
 
 
 def canonical_height(gamma):
@@ -71,16 +77,18 @@ def test_two_real_components_are_exchanged_and_the_second_iterate_turns():
     plane = geometry(hamiltonian_flow(*cubic), start, eps).planes[0]
     assert plane.delta > 1
     (rotation,) = plane.rotations
-    assert rotation.steps == 2
+    assert (rotation.steps, rotation.component, rotation.phase_error) == (2, "unbounded", None)
+    image = list(orbit(hamiltonian_flow(*cubic), start, eps, 1))[-1].x
+    assert geometry(hamiltonian_flow(*cubic), image, eps).planes[0].rotations[0].component == "oval"
     oval = planar_orbit(cubic, start, eps, 40_000)[1::2]  # the component that is bounded here
     measured = mean_turn(np.arctan2(*(oval - np.median(oval, axis=0)).T[::-1]), 2 * math.pi)
     assert abs(measured - float(rotation.number)) < 1e-8
 
 
 def test_on_a_level_of_period_5_the_rotation_number_is_a_multiple_of_a_fifth():
-    (rotation,) = rotations_of(fmpq(32, 27), fmpq(-27), fmpq(1), "t = 0")
+    (rotation,) = rotations_of(fmpq(32, 27), *POINT, "t = 0")
     assert (5 * rotation.number - 2).contains(0) or (5 * rotation.number - 1).contains(0)
-    (nearby,) = rotations_of(fmpq(33, 27), fmpq(-27), fmpq(1), "t = 0")
+    (nearby,) = rotations_of(fmpq(33, 27), *POINT, "t = 0")
     assert not any((5 * nearby.number - k).contains(0) for k in (1, 2))
 
 
@@ -93,7 +101,7 @@ def test_levels_that_are_almost_singular_have_the_rotation_numbers_of_the_limits
     tiny = fmpq(1, 10**digits)
 
     def rho(gamma):
-        (rotation,) = rotations_of(gamma, fmpq(-27), fmpq(1), "t = 0")
+        (rotation,) = rotations_of(gamma, *POINT, "t = 0")
         assert float(rotation.number.rad()) < 1e-15
         return float(rotation.number)
 
@@ -229,3 +237,85 @@ def test_the_curves_over_a_number_field_are_conjugate_and_tend_to_j_0():
     assert small.j.field.degree == 3
     assert all(abs(float(arb(c))) < 1e-6 for c in small.j.coefficients)
     assert not all(abs(float(arb(c))) < 1e-6 for c in large.j.coefficients)
+
+
+@pytest.mark.parametrize("eps", [fmpq(1, 1000), fmpq(1, 10**40)])
+def test_the_phase_error_is_of_order_two(eps):
+    """Per turn, that is relative to the rotation number of the flow, it is proportional to eps^2."""
+
+    def errors(eps):
+        rotations = [plane.rotations[0] for plane in geometry(load("paper_m2"), [1, 2, 3, 5], eps).planes]
+        return [float(rotation.phase_error / rotation.flow) for rotation in rotations]
+
+    for large, small in zip(errors(eps), errors(eps / 2), strict=True):
+        assert math.log2(large / small) == pytest.approx(2, abs=0.05)
+
+
+def test_the_phase_error_is_that_of_a_float_orbit_against_the_period_of_the_flow():
+    """On u^3 + v^3 = b the flow has the period B(1/3, 1/3) b^(-1/3)/3, the integral of du/(3 v^2)."""
+    cubic, start, eps = (1, 0, 0, 1), ["1/9", "1"], "1/50"
+    (rotation,) = geometry(hamiltonian_flow(*cubic), start, eps).planes[0].rotations
+    points = planar_orbit(cubic, start, eps, 40_000)
+    measured = mean_turn(np.arctan2(points[:, 1], points[:, 0]), math.pi)
+    period = math.gamma(1 / 3) ** 2 / math.gamma(2 / 3) / 3 * (1 + 1 / 9**3) ** (-1 / 3)
+    assert measured - 2 / 50 / period == pytest.approx(float(rotation.phase_error), abs=1e-10)
+    assert abs(float(rotation.phase_error)) > 1e-6
+
+
+def test_beyond_a_singular_level_there_is_no_phase_error():
+    """delta grows from 0 to infinity with eps; beyond 1 there are two components, beyond the pole no deformation."""
+    errors = [
+        geometry(hamiltonian_flow(1, 0, -1, 0), ["2", "1/10"], eps).planes[0].rotations[0].phase_error is None
+        for eps in ("1/10", "7/10", "10")
+    ]
+    assert errors == [False, True, True]
+
+
+def test_the_orbit_is_dense_or_not_or_nobody_knows():
+    circle = geometry(load("nahm_tetrahedral"), [1, 2], "1/10").closure
+    assert (circle.is_dense, circle.status) == (True, "proved")
+    torus = geometry(load("paper_m2"), [1, 2, 3, 5], "1/10").closure
+    assert (torus.is_dense, torus.status) == (None, "supported")
+    assert torus.bound > 1000
+    numbers = [arb(2).sqrt(), arb(3).sqrt()]
+    assert closure([fmpq(3), fmpq(3)], [None, None], numbers).is_dense is False
+    assert closure([fmpq(3), fmpq(32, 27)], [None, 5], numbers).is_dense is False
+    K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
+    assert closure([K.convert(3)], [None], numbers).is_dense is False
+    assert closure([K.generator], [None], numbers).is_dense is None
+    assert closure([K.generator], [None], [numbers[0], numbers[0] * 3]).status == "undecided"
+    assert geometry(load("paper_m2"), [1, 2, 3, 4], "1/10").closure is None  # a level of three lines
+
+
+@pytest.mark.parametrize(("third", "coefficient"), [(0, None), (7, 7), (5, 5)])
+def test_relations_are_excluded_only_below_the_first_one(third, coefficient):
+    """sqrt 2 and sqrt 3, and a number with the relation n x = sqrt 2 + sqrt 3."""
+    with RR(128).working():
+        numbers = [arb(2).sqrt(), arb(3).sqrt()]
+        numbers.append((numbers[0] + numbers[1]) / third if third else arb(5).sqrt())
+    bound = excluded_relations(numbers)
+    assert bound < coefficient if coefficient else bound > 300
+
+
+@pytest.mark.skipif(shutil.which("gp") is None, reason="PARI/GP (gp) is not installed")
+@pytest.mark.parametrize("modulus", [[-2, 0, 1], [-5, 0, 1], [1, -3, 0, 1], [-25, 0, 0, 1]], ids=str)
+def test_bad_primes_over_number_fields_agree_with_pari(modulus):
+    """Sixth powers in delta do not matter; ramified primes may be undecided, and 2 and 3 are."""
+    K = EtaleAlgebra(fmpq_poly(modulus))
+    rng = random.Random(5)
+    gammas, script = [], f"nf=nfinit({str(K.chi).replace('x', 't')});"
+    for _ in range(12):
+        delta = K.convert(fmpq_poly([fmpq(rng.randint(-9, 9), rng.choice((1, 2, 5))) for _ in modulus[1:]]))
+        delta *= rng.choice((1, 5**6, 7**6, 25)) * K.generator ** rng.choice((0, 3, 6))
+        if delta not in (K.zero, K.one):
+            gammas.append(1 - delta)
+            script += f"g=Mod({str(gammas[-1].polynomial).replace('x', 't')},nf.pol);"
+            script += "E=ellinit([0,9+3*g,0,48*g,64*g^2],nf);print(idealnorm(nf,ellglobalred(E)[1]));"
+    found = subprocess.run(["gp", "-q"], input=script.replace(";", ";\n"), capture_output=True, text=True, timeout=60)
+    conductors = found.stdout.split()
+    assert len(conductors) == len(gammas) > 8
+    for gamma, conductor in zip(gammas, conductors, strict=True):
+        primes = {int(p) for p, _ in fmpz(int(conductor)).factor()} if conductor != "1" else set()
+        result = bad_primes_of_plane(gamma)
+        assert set(result.bad) <= primes <= {*result.bad, *result.undecided}
+        assert all(p < 5 or K.chi.discriminant().p % p == 0 for p in result.undecided)

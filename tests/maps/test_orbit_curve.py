@@ -1,5 +1,6 @@
 """The curve of an orbit: models and heights against PARI, level curves and exact orbits, rotation against floats."""
 
+import json
 import math
 import shutil
 import subprocess
@@ -13,7 +14,9 @@ from planar_helpers import mean_turn
 import kahanmaps as km
 from kahanmaps import InputError
 from kahanmaps.algebra.elliptic_curves import EllipticCurve, canonical_height
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.parsing import parse_rational_function
+from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import UnknownCurve
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.orbits.relations.level_curve import is_conserved, level_curve
@@ -37,12 +40,14 @@ ORBITS = {
 def test_j_invariant_and_height_agree_with_pari(name):
     orbit = km.geometry(name, *ORBITS[name])
     model, point = f"[{orbit.curve.a4},{orbit.curve.a6}]", f"[{orbit.point[0]},{orbit.point[1]}]"
-    script = f"E=ellinit({model}); print(ellisoncurve(E,{point})); print(E.j); print(ellheight(E,{point})/2)"
+    script = f"E=ellinit({model}); print(ellisoncurve(E,{point})); print(E.j); print(ellheight(E,{point})/2);"
+    script += "print(ellminimalmodel(E).disc); print(#ellglobalred(E)[4]~)"
     lines = subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
     assert lines[0] == "1"
     assert fmpq(*map(int, (lines[1] + "/1").split("/")[:2])) == orbit.j
     assert abs(float(lines[2]) - float(orbit.height.mid())) < 1e-12
     assert float(orbit.height.rad()) < 1e-15
+    assert [orbit.bad_primes.minimal_discriminant, len(orbit.bad_primes.bad)] == [int(line) for line in lines[3:]]
 
 
 def j_of_quartic(a, b, c, d, e):
@@ -120,6 +125,26 @@ def test_a_rational_curve_has_a_multiplier():
     assert (parabolic.genus, parabolic.trace, parabolic.rotation) == (0, 2, None)
 
 
+@pytest.mark.parametrize(
+    ("image", "start", "trace"),
+    [
+        (["x + 1", "y + x^2"], [1, 2], 2),
+        (["2*x", "8*y"], [1, 3], fmpq(5, 2)),
+        (["(3*x - 4)/(4*x + 3)", "625*y/(4*x + 3)^4"], [1, 3], fmpq(-14, 25)),
+        (["2*x", "3*y"], [1, 3], None),
+    ],
+)
+def test_rational_curves_with_a_coordinate_as_parameter_are_found(image, start, trace):
+    """Three curves like y = x^3, y = 3 x^3 and y = 3 (1 + x^2)^2/4; y = 3 x^(log 3/log 2) is not algebraic."""
+    map_over = parse_system(f'variables = ["x", "y"]\n[map]\nimage = {json.dumps(image)}').map.at(fmpq(1), QQ)
+    if trace is None:
+        with pytest.raises(UnknownCurve, match="rational curves of degree at most 6"):
+            orbit_curve(map_over, start)
+    else:
+        orbit = orbit_curve(map_over, start)
+        assert (orbit.genus, orbit.trace, orbit.is_dense) == (0, trace, abs(trace) < 2)
+
+
 @pytest.mark.parametrize("t", [fmpq(3), fmpq(2, 5), fmpq(-7, 2)])
 def test_on_a_nodal_cubic_the_translation_is_a_multiplication(t):
     """On Y^2 = x^2 (x + 1) the point with Y = t x has kappa = (t + 1)/(t - 1)."""
@@ -195,7 +220,7 @@ def test_periodic_and_special_orbits_have_a_curve(parameters, start, order):
     """For a = 1 all orbits of Lyness' map have period 5; the sequence U of the orbit of (1, 2) has a zero."""
     system = km.load("lyness").subs(**parameters)
     orbit = km.geometry(system, start)
-    assert (orbit.genus, orbit.iterate, orbit.order) == (1, 1, order)
+    assert (orbit.genus, orbit.iterate, orbit.order, orbit.is_dense) == (1, 1, order, order is None)
     if order:
         assert (order * orbit.rotation - 1).contains(0)
         assert orbit.height_constant is None

@@ -3,6 +3,7 @@
 import pytest
 
 from kahanmaps import InputError, geometry, load
+from kahanmaps.algebra.fields import rational
 from kahanmaps.plots.rotation import plot_rotation
 
 MEMBER = load("paper_m2")
@@ -13,7 +14,7 @@ def drawn(style, axes):
 
 
 def test_the_lines_have_the_rotation_numbers_of_the_initial_points():
-    figure = plot_rotation(MEMBER.normal_form, "1/10", [1, 2, 3, 5], ["5/4", 2, 3, 5], points=5)
+    figure = plot_rotation(MEMBER, "1/10", [1, 2, 3, 5], ["5/4", 2, 3, 5], points=5)
     (axes,) = figure.axes
     rotations = [plane.rotations[0] for plane in geometry(MEMBER, ["9/8", 2, 3, 5], "1/10").planes]
     middle = [points[points[:, 0] == 0.5][0, 1] for style in ("-", "--") for points in drawn(style, axes)]
@@ -24,15 +25,15 @@ def test_the_lines_have_the_rotation_numbers_of_the_initial_points():
 
 def test_no_line_leads_across_a_singular_level():
     """At (1, 2, 3, 4) one of the two level curves consists of three lines."""
-    figure = plot_rotation(MEMBER.normal_form, "1/10", [1, 2, 3, "7/2"], [1, 2, 3, "9/2"], points=9)
+    figure = plot_rotation(MEMBER, "1/10", [1, 2, 3, "7/2"], [1, 2, 3, "9/2"], points=9)
     lines = [points for style in ("-", "--") for points in drawn(style, figure.axes[0])]
     assert any(points[0, 0] < 0.5 < points[-1, 0] and 0.5 in points[:, 0] for points in lines)
     assert not any(points[0, 0] < 0.5 < points[-1, 0] and 0.5 not in points[:, 0] for points in lines)
 
 
 def test_a_segment_of_fixed_points_has_no_rotation_number():
-    with pytest.raises(InputError, match="no initial point with a smooth level"):
-        plot_rotation(MEMBER.normal_form, "1/10", [0, 0, 0, 0], [0, 0, 0, 0], points=3)
+    with pytest.raises(InputError, match="no initial point with a rotation number"):
+        plot_rotation(MEMBER, "1/10", [0, 0, 0, 0], [0, 0, 0, 0], points=3)
 
 
 @pytest.mark.parametrize(
@@ -40,9 +41,43 @@ def test_a_segment_of_fixed_points_has_no_rotation_number():
     [
         ([2, 2, 3, 5], 1, "found 1 points, expected at least 2"),
         ([2, 2, 3, 5], "5", "found points = '5', expected an integer"),
-        ([2, 2, 3], 5, "found points with 4 and 3 coordinates"),
+        ([2, 2, 3], 5, "found a point with 3 coordinates, expected 4"),
     ],
 )
 def test_a_segment_needs_two_points_of_the_same_dimension(last, points, message):
     with pytest.raises(InputError, match=message):
-        plot_rotation(MEMBER.normal_form, "1/10", [1, 2, 3, 5], last, points=points)
+        plot_rotation(MEMBER, "1/10", [1, 2, 3, 5], last, points=points)
+
+
+@pytest.mark.parametrize(
+    ("name", "ends", "eps"),
+    [
+        ("mcmillan", [["1/3", "2/5"], ["1/2", "1/5"]], None),
+        ("euler_top", [["1/3", "2/5", "3/7"], ["1/3", 2, "3/7"]], "1/10"),
+        ("todd", [["1/3", "2/5", "3/7"], ["1/3", 2, "3/7"]], None),
+    ],
+)
+def test_orbits_on_a_curve_have_its_rotation_number(name, ends, eps):
+    """Todd's map permutes curves, so that the number is that of an iterate, with a dashed line."""
+    (axes,) = plot_rotation(load(name), eps, *ends, points=3).axes
+    middle = [(rational(a) + rational(b)) / 2 for a, b in zip(*ends, strict=True)]
+    curve = geometry(load(name), middle, eps)
+    (points,) = drawn("-" if curve.iterate * curve.steps == 1 else "--", axes)
+    assert points[1].tolist() == [0.5, float(curve.rotation.mid())]
+
+
+def test_the_horizontal_axis_may_be_an_integral():
+    """I = x^2 y^2 - x^2 - y^2 + x y."""
+    file = load("mcmillan")
+    (axes,) = plot_rotation(file, None, ["1/10", "1/5"], ["2/5", "1/5"], points=4, against="I").axes
+    (points,) = drawn("-", axes)
+    levels = [x * x / 25 - x * x + x / 5 - 1 / 25 for x in (0.1, 0.2, 0.3, 0.4)]
+    assert points[:, 0] == pytest.approx(levels)
+    assert axes.get_xlabel() == "$I$"
+    with pytest.raises(InputError, match="found no integral 'J' of mcmillan, expected one that it declares: I"):
+        plot_rotation(file, None, ["1/10", "1/5"], ["2/5", "1/5"], points=4, against="J")
+
+
+def test_without_a_known_curve_there_is_no_rotation_number():
+    with pytest.raises(InputError, match="found no initial point with a rotation number"):
+        plot_rotation(load("lorenz"), "1/10", [1, 1, 1], [2, 2, 2], points=2)

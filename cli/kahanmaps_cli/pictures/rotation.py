@@ -19,29 +19,31 @@ from kahanmaps_cli.screen.progress import SearchProgress
     click.option("--from", "first", type=PointText(), metavar="X", required=True, help="First initial point."),
     click.option("--to", "last", type=PointText(), metavar="X", required=True, help="Last initial point."),
     click.option("--points", type=Whole(2), default=200, show_default=True, metavar="N", help="Number of points."),
+    click.option(
+        "--against", metavar="NAME", help="Horizontal axis: a declared integral (default: position on the segment)."
+    ),
     opt.eps_options,
 )
 def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
-    """Plot rotation numbers along a segment of initial points, for a member of the commuting family.
+    """Plot rotation numbers along a segment of initial points.
 
     \b
       kahanmaps plot rotation nahm_tetrahedral --eps 1/10 --from 1/10,1/5 \\
           --to 2,3 -o rotation.pdf
+      kahanmaps plot rotation mcmillan --from 1/10,1/10 --to 2/5,1/2 \\
+          --against I -o mcmillan.pdf
 
-    Solid lines are the rotation numbers of the map, one for each real root of chi;
-    dashed lines are those of its second iterate, where the map exchanges two real
-    components; dotted lines are those of the flow. Horizontal lines mark some of
-    the resonances 1/n. See kahanmaps geometry --help.
+    SYSTEM is a member of the commuting family, which has a rotation number for each
+    real root of chi, or any map whose orbits lie on curves of genus 1 or 0. Solid
+    lines belong to the map; dashed lines to an iterate of it, such as the second
+    one where the map exchanges two real components; dotted lines to the flow of a
+    member. Horizontal lines mark some of the resonances 1/n. Initial points without
+    a rotation number are left out. See kahanmaps geometry --help.
 
     Exit status: 0 done, 2 usage error.
     """
     file = opt.load_system(options["system"], options)
-    normal_form = file.normal_form
-    if isinstance(normal_form, lib.NoNormalForm):
-        raise lib.InputError(f"{file.name} has no rotation numbers here: {normal_form.reason}")
-    eps = opt.requested_eps(options["eps"], options["time_step"])
-    for end in (options["first"], options["last"]):
-        file.map.at(eps, lib.QQ).point(end)
+    eps = opt.eps_of(file, options)
     progress("rotation numbers")
-    ends = options["first"], options["last"]
-    return Drawing(lib.plot_rotation(normal_form, eps, *ends, options["style"], points=options["points"]), file)
+    settings = {name: options[name] for name in ("points", "against")}
+    return Drawing(lib.plot_rotation(file, eps, options["first"], options["last"], options["style"], **settings), file)

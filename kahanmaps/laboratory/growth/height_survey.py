@@ -168,7 +168,8 @@ def height_survey(
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)
     field = "" if map_.root is None else map_.root.number_field.name
-    for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
+    given_eps = DEFAULT_EPS if eps is None else (rational(eps),)  # text that is no number is refused for every map
+    for value in given_eps if map_.has_eps else (fmpq(1),):
         map_at_eps = map_.at(value)
         rng = random.Random(f"heights {derive_seed(seed, map_.subject, value)}")
         points = (

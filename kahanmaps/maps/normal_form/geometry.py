@@ -17,24 +17,27 @@ from typing import Any
 
 from flint import acb, arb, fmpq
 
-from kahanmaps.algebra.elliptic_curves import MAX_BITS, canonical_height, complex_roots, rotation_number
+from kahanmaps.algebra.elliptic_curves import MAX_BITS, AffinePoint, canonical_height, complex_roots, rotation_number
 from kahanmaps.algebra.fields import QQ, RR, rational
 from kahanmaps.algebra.printing import format_number
+from kahanmaps.algebra.reduction import BadPrimes, bad_primes_of_plane
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
 from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
+from kahanmaps.maps.normal_form.closure import Closure, closure
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
-from kahanmaps.maps.normal_form.planar_block import Triple
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.normal_form.plane_heights import plane_height
 from kahanmaps.maps.normal_form.splitting import Plane, Splitting
 from kahanmaps.maps.orbits.relations.orbit_curve import OrbitCurve, orbit_curve
 from kahanmaps.maps.values import as_point
 
 _ACCURACY = 1e-15  # of rotation numbers
+_RELATIVE_ACCURACY = 1e-12  # of phase errors
 _HEIGHT_ACCURACY = 1e-12  # of heights that are printed without an error
 _MAX_HEIGHT_DEGREE = 4  # of fields over which heights are computed
 _LONGEST_HEIGHT = 4000  # bits of gamma for which a height is computed
@@ -45,15 +48,20 @@ class Rotation:
     """The rotation of an orbit on its level curve over one real root, or one pair of complex roots, of chi.
 
     `number` is the rotation number in (0, 1/2], up to sign: a step is a rotation of the circle by this part of a turn.
-    If the level curve has two real components, the map exchanges them (`steps` = 2), and the number is that of its
-    second iterate. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of
-    the translation in a reduced basis of the periods. `flow` is the rotation number of the time-2 eps map of the flow.
+    It is that of the iterate number `steps` of the map: 2 if the level curve has two real components, which the map
+    exchanges. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of
+    the translation in a reduced basis of the periods. `flow` is the rotation number of the time-2 eps map of the flow,
+    2 eps times its frequency. `phase_error` is `number` minus `flow`, the error of the phase in one step; None if there
+    is a singular level between the initial point and smaller eps. `component` is the component of the closed level
+    curve that contains the initial point, if there are two: "oval" or "unbounded".
     """
 
     root: str
     numbers: tuple[arb, ...]
     steps: int = 1
     flow: arb | None = None
+    phase_error: arb | None = None
+    component: str | None = None
 
     @property
     def number(self) -> arb:
@@ -65,9 +73,10 @@ class PlaneGeometry:
     """The geometry of an orbit in the planes at the roots of one irreducible factor of chi.
 
     `delta` = disc(h) level^2 and `gamma` = 1 - delta lie in the field of the root, as the j-invariant does; they are
-    None where the level is not smooth. `order` is that of the translation, None if it is infinite (proved). `height` is
-    the canonical height of the translation point (absolute, if the root is not rational), with an error of at most
-    `height_error`. `degree` is that of the field.
+    None where the level is not smooth. The Jacobian of the level curve is Y^2 = x^3 + (9 + 3 gamma) x^2 + 48 gamma x +
+    64 gamma^2, and the map is the translation by `point` on it. `order` is that of the translation, None if it is
+    infinite (proved). `height` is the canonical height of the translation point (absolute, if the root is not
+    rational), with an error of at most `height_error`. `degree` is that of the field.
     """
 
     name: str
@@ -81,15 +90,33 @@ class PlaneGeometry:
     rotations: tuple[Rotation, ...] = ()
     height_error: float = _HEIGHT_ACCURACY
     degree: int = 1
+    bad_primes: BadPrimes | None = None
+
+    @property
+    def discriminant(self) -> Any:
+        """The discriminant of the Weierstrass equation, None where the level is not smooth."""
+        return None if self.gamma is None else -110592 * self.gamma**3 * self.delta**2
+
+    @property
+    def point(self) -> AffinePoint | None:
+        """The translation point on the Weierstrass equation, None where the level is not smooth."""
+        return None if self.gamma is None else (0 * self.gamma, 8 * self.gamma)
 
     def lines(self) -> list[str]:
         """Return the lines of the text output."""
         lines = [f"plane {self.name}\t{self.kind}"]
-        if self.j is None:
+        if self.j is None or self.point is None or self.bad_primes is None:
             return lines
-        lines += [f"  k^3\t{_text(self.delta)}", f"  j-invariant\t{_text(self.j)}"]
         order = "infinite order" if self.order is None else f"order {self.order}"
-        lines.append(f"  translation\t{order} (proved: {self.reason})")
+        minimal = self.bad_primes.minimal_discriminant
+        lines += [
+            f"  k^3\t{_text(self.delta)}",
+            f"  Weierstrass model\tY^2 = x^3 + (9 + 3 g) x^2 + 48 g x + 64 g^2, g = 1 - k^3 = {_text(self.gamma)}",
+            f"  j-invariant\t{_text(self.j)}",
+            f"  discriminant\t{_text(self.discriminant)}" + ("" if minimal is None else f", minimal {minimal}"),
+            f"  bad primes\t{self.bad_primes.text}" + (" (the primes of Q below them)" if self.degree > 1 else ""),
+            f"  translation\t({', '.join(map(_text, self.point))}), {order} (proved: {self.reason})",
+        ]
         if self.height is not None:
             is_accurate = self.height_error <= _HEIGHT_ACCURACY
             error = f"{self.height:.10g}" if is_accurate else f"{self.height:.5g} +/- {self.height_error:.1g}"
@@ -98,35 +125,62 @@ class PlaneGeometry:
             of_second = ", of the second iterate: the map exchanges two real components" if rotation.steps == 2 else ""
             numbers = ", ".join(x.str(12) for x in rotation.numbers)
             lines.append(f"  rotation number\t{numbers} at t = {rotation.root}{of_second}")
+            if rotation.component is not None:
+                lines.append(f"    initial point\ton the {rotation.component} component")
             if rotation.flow is not None:
                 lines.append(f"    of the flow\t{rotation.flow.str(12)}")
+            if rotation.phase_error is not None:
+                lines.append(f"    phase error\t{rotation.phase_error.str(12)} turns per step")
         return lines
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data; exact numbers are text."""
-        exact = {name: None if (x := getattr(self, name)) is None else _text(x) for name in ("delta", "gamma", "j")}
+        names = ("delta", "gamma", "j", "discriminant")
+        exact = {name: None if (x := getattr(self, name)) is None else _text(x) for name in names}
         rotations = [
             {
                 "root": rotation.root,
                 "steps": rotation.steps,
                 "numbers": [x.str(15) for x in rotation.numbers],
                 "flow": None if rotation.flow is None else rotation.flow.str(15),
+                "phase_error": None if rotation.phase_error is None else rotation.phase_error.str(15),
+                "component": rotation.component,
             }
             for rotation in self.rotations
         ]
         plain = {"name": self.name, "kind": self.kind.name.lower(), "order": self.order, "reason": self.reason}
-        return {**plain, **exact, "height": self.height, "height_error": self.height_error, "rotations": rotations}
+        return {
+            **plain,
+            **exact,
+            "point": None if self.point is None else [_text(x) for x in self.point],
+            "bad_primes": None if self.bad_primes is None else self.bad_primes.to_json(),
+            "height": self.height,
+            "height_error": self.height_error,
+            "rotations": rotations,
+        }
 
 
 @dataclass(frozen=True)
 class LevelGeometry(PrintableResult):
     """The geometry of the level set of the integrals through a point, and of the map on it.
 
-    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all planes are smooth.
+    `height_constant` is the C of height ~ C n^2 for the n-th iterate in bits, if all planes are smooth. `closure` says
+    whether the orbit is dense in the real components that it visits; None if it is fixed or a level is singular.
     """
 
     planes: tuple[PlaneGeometry, ...]
     height_constant: float | None
+    closure: Closure | None = None
+
+    @property
+    def components(self) -> int | None:
+        """The number of real components of the level set, closed at infinity; None if a level is singular.
+
+        If there are several, the orbit visits two of them in turn, as the map exchanges components in each plane.
+        """
+        if any(plane.kind is not PeriodKind.SMOOTH for plane in self.planes):
+            return None
+        return math.prod(rotation.steps for plane in self.planes for rotation in plane.rotations)
 
     @property
     def rank(self) -> int | None:
@@ -143,8 +197,17 @@ class LevelGeometry(PrintableResult):
         lines = [line for plane in self.planes for line in plane.lines()]
         if self.rank is not None:
             lines.append(f"commuting maps\tgenerate a group of translations of rank {self.rank} (proved)")
+        if self.components is not None:
+            visits = {1: "", 2: ", the orbit visits both in turn"}
+            in_turn = visits.get(self.components, ", the orbit visits two of them in turn")
+            lines.append(f"real components\t{self.components}{in_turn}")
+        if self.closure is not None:
+            lines.append(f"orbit\t{self.closure.text}")
         if self.height_constant is not None:
-            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically")
+            reason = (
+                "" if sum(plane.degree for plane in self.planes) == 1 else ", if planes have no long common factors"
+            )
+            lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically{reason}")
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
@@ -152,6 +215,8 @@ class LevelGeometry(PrintableResult):
         return {
             "planes": [plane.to_json() for plane in self.planes],
             "rank": self.rank,
+            "components": self.components,
+            "closure": None if self.closure is None else self.closure.to_json(),
             "height_constant": self.height_constant,
         }
 
@@ -224,15 +289,20 @@ def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Seq
         j = 27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3
         middle = None if height is None else float(height.mid())
         error = _HEIGHT_ACCURACY if height is None else max(_HEIGHT_ACCURACY, float(height.rad()))
+        bad = bad_primes_of_plane(gamma)
         planes.append(
-            PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, middle, rotations, error, plane.degree)
+            PlaneGeometry(plane.name, kind, delta, gamma, j, order, reason, middle, rotations, error, plane.degree, bad)
         )
     # A plane cubic is embedded by a divisor of degree 3, and heights of the planes add up: docs/mathematics.md.
     moving = [plane for plane in planes if plane.kind is not PeriodKind.FIXED]
     constant = None
     if moving and all(plane.height is not None for plane in moving):
         constant = sum(3 * plane.degree * plane.height for plane in moving if plane.height is not None) / math.log(2)
-    return LevelGeometry(tuple(planes), constant)
+    closed = None
+    if moving and all(plane.kind is PeriodKind.SMOOTH for plane in moving):
+        numbers = [number for plane in moving for rotation in plane.rotations for number in rotation.numbers]
+        closed = closure([plane.gamma for plane in moving], [plane.order for plane in moving], numbers)
+    return LevelGeometry(tuple(planes), constant, closed)
 
 
 def rotation_numbers(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> dict[str, Rotation]:
@@ -253,7 +323,7 @@ def _levels(
         kind, gamma = classify(plane.block, triple)
         rotations: tuple[Rotation, ...] = ()
         if kind is PeriodKind.SMOOTH:
-            rotations = rotations_of(gamma, plane.block.discriminant, plane.block.h(*triple[:2]), plane.name)
+            rotations = rotations_of(gamma, plane.block, triple, plane.name)
         yield plane, triple, kind, gamma, rotations
 
 
@@ -265,32 +335,37 @@ def _text(x: Any) -> str:
 # Rotation numbers.
 
 
-def rotations_of(gamma: Any, disc: Any, h: Any, name: str) -> tuple[Rotation, ...]:
+def rotations_of(gamma: Any, block: PlanarBlock, point: Triple, name: str) -> tuple[Rotation, ...]:
     """Return the rotations at the real roots and pairs of complex roots of the field of gamma.
 
     Args:
         gamma: an element of Q or of Q[t]/g, not 0 and not 1.
-        disc, h: the discriminant of the cubic of the plane, and its value at the point in the coordinates 2 eps (u, v).
+        block: the cubic of the plane.
+        point: a point (U : V : 1) of the level, U and V the coordinates 2 eps (u, v).
         name: the name of the plane, for a plane over Q.
 
     Raises PrecisionLost if 32768 bits do not suffice.
     """
+    (U, V, _), (p, q, r) = point, block.D
+    exact = gamma, block.discriminant, block.h(U, V), p * U * U + q * U * V + r * V * V
     for bits in (128, 512, 2048, 8192, MAX_BITS):
         with RR(bits).working(), suppress(PrecisionLost):
             rotations = []
             if isinstance(gamma, fmpq):
-                rotations.append(_real_rotation(arb(gamma), arb(disc), arb(h), name.removeprefix("t = ")))
+                rotations.append(_real_rotation(*map(arb, exact), root=name.removeprefix("t = ")))
             else:
                 roots: Any = gamma.field.chi.complex_roots()
                 for root in (acb(root) for root, _ in roots if not root.imag < 0):
                     is_real, label = root.imag == 0, root.str(8, radius=False)
-                    at = [_at(x, root.real if is_real else root) for x in (gamma, disc, h)]
-                    if is_real:
-                        rotations.append(_real_rotation(at[0], at[1], at[2], label))
-                    else:
-                        rotations.append(Rotation(label, _complex_rotation(at[0])))
+                    at = [_at(x, root.real if is_real else root) for x in exact]
+                    rotations.append(
+                        _real_rotation(*at, root=label) if is_real else Rotation(label, _complex_rotation(at[0]))
+                    )
             balls = [x for rotation in rotations for x in (*rotation.numbers, rotation.flow) if x is not None]
-            if all(x.is_finite() and float(x.rad()) < _ACCURACY for x in balls):
+            errors = [rotation.phase_error for rotation in rotations if rotation.phase_error is not None]
+            if all(x.is_finite() and float(x.rad()) < _ACCURACY for x in balls) and (
+                bits == MAX_BITS or all(x.rad() < _RELATIVE_ACCURACY * abs(x) for x in errors)
+            ):
                 return tuple(rotations)
     raise PrecisionLost(
         f"the rotation numbers need more than {MAX_BITS} bits, since the level is almost singular: choose an initial "
@@ -306,12 +381,19 @@ def _at(element: Any, root: Any) -> Any:
     return total
 
 
-def _real_rotation(gamma: arb, disc: arb, h: arb, root: str) -> Rotation:
+def _real_rotation(gamma: arb, disc: arb, h: arb, D: arb, *, root: str) -> Rotation:
     """Return the rotation at a real root of chi."""
     curve = Jacobian(gamma)
     # For gamma < 0 the cubic of the Jacobian has three real roots, and T lies on the oval.
     number, steps = rotation_number(curve, curve.T, has_oval=not gamma > 0)
-    return Rotation(root, (number,), steps, _flow_rotation(disc, h))
+    flow, error, component = _flow_rotation(disc, h), None, None
+    if not (D + 1 > 0 or D + 1 < 0) or (steps == 2 and not (D + 3 > 0 or D + 3 < 0)):
+        raise PrecisionLost("the position of the point on its level cannot be decided")
+    if steps == 2:
+        component = "oval" if D + 3 > 0 else "unbounded"
+    elif D + 1 > 0:  # then gamma > 0 for all smaller eps, and 0 < number < 1/2 is a continuous function of eps
+        error = number - flow
+    return Rotation(root, (number,), steps, flow, error, component)
 
 
 def _flow_rotation(disc: arb, h: arb) -> arb:

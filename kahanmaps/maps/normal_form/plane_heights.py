@@ -20,6 +20,7 @@ from flint import acb, arb, fmpq_poly, fmpz
 from kahanmaps.algebra.elliptic_curves import MAX_BITS, EllipticCurve
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.integers import split_by_primes
+from kahanmaps.algebra.reduction import leading_coefficient
 from kahanmaps.errors import PrecisionLost
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
 
@@ -57,8 +58,8 @@ def plane_height(block: PlanarBlock, point: Triple) -> arb:
     def uncertain(Q: Any) -> fmpz:
         """The part of the norm of R at those primes at which the doubling of Q cancels factors; 1 if there are none."""
         # Numerator and denominator of x(2Q) are F(x) and 4 Y^2; norms of ideals are leading coefficients.
-        left = abs(K.norm(4 * Q[1] * Q[1])) * _leading(Q[0]) ** 4
-        cancelled = left / _leading(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
+        left = abs(K.norm(4 * Q[1] * Q[1])) * leading_coefficient(Q[0]) ** 4
+        cancelled = left / leading_coefficient(curve.add(Q, Q)[0])  # type: ignore[index]  # T has infinite order
         return split_by_primes(norm, cancelled.p)[1]
 
     multiples, Q = list[tuple[fmpz, int, Any]](), T
@@ -116,17 +117,12 @@ def _denominator(elements: Any) -> int:
     return int(common * field.chi.denom() ** (field.degree - 1))
 
 
-def _leading(element: Any) -> fmpz:
-    """Return the leading coefficient of the primitive polynomial over Z whose roots are the values of an element."""
-    return fmpq_poly(element.matrix.charpoly()).denom()
-
-
 def _archimedean(x: Any, b: Any, resultant: Any) -> arb:
     """Return the height of x plus the archimedean parts of Tate's series."""
     K = x.field
     for bits in (1 << 9, 1 << 11, 1 << 13, MAX_BITS):
         with RR(bits).working():
-            total = arb(_leading(x)).log()
+            total = arb(leading_coefficient(x)).log()
             for root, _ in K.chi.complex_roots():
                 values = [_at(element, acb(root)) for element in (x, *b, resultant)]
                 X, b2, b4, b6, b8, R = values

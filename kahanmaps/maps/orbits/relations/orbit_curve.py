@@ -6,7 +6,7 @@ curve and T: on y^2 + a1 x y + a3 y = x^3 + a2 x^2 with T = (0, 0) the division 
 
     psi_2 = a3,      psi_3 = a2 a3^2,      psi_4 = a3^4 (a1 a2 - a3)                            (ward-1948).
 
-If this cubic is singular, or the orbit lies on a rational normal curve, the map acts on a projective line. There it
+If this cubic is singular, or the orbit lies on another rational curve, the map acts on a projective line. There it
 multiplies a coordinate by the multiplier kappa, or adds a constant. Source: docs/mathematics.md, "Orbits on elliptic
 curves".
 """
@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from flint import arb, fmpq, fmpq_mat
@@ -31,6 +32,7 @@ from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.algebra.matrices import nullspace, rank
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import format_number
+from kahanmaps.algebra.reduction import BadPrimes, bad_primes
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve
 from kahanmaps.maps.implicit import Map, MapFamily
@@ -44,6 +46,7 @@ _LATER, _APART = 16, 8  # steps after which the search starts again, up to the f
 _SHORT = 2000  # ... points have at most this number of bits
 _LEVEL_POINTS = 8  # of an orbit, from which the translation of a level curve is computed
 _PERIODS = 24  # up to this period an orbit is recognized as periodic: twice the largest order of a torsion point
+_MAX_RATIONAL_DEGREE = 6  # of rational curves that are not rational normal curves
 _ACCURACY = 1e-15  # of rotation numbers
 
 
@@ -52,24 +55,75 @@ class OrbitCurve(PrintableResult):
     """The curve of an orbit, and the map on it; everything but the balls is exact and proved.
 
     The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers are about
-    this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B,
-    `height` is the canonical height of that point. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and
-    trace = 2 for a parabolic map. `rotation` is the rotation number in (0, 1/2] up to sign; None if kappa is real.
-    `steps` is 2 if that iterate exchanges two real components: then `rotation` is about its square.
-    `height_constant` is the C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits
-    (over one common denominator the integers may be longer).
+    this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B; `degree` is that of the
+    coordinates on it. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and trace = 2 for a parabolic map.
     """
 
     genus: int
     iterate: int
     curve: EllipticCurve | None = None
     point: AffinePoint | None = None
-    order: int | None = None
-    height: arb | None = None
-    rotation: arb | None = None
-    steps: int = 1
+    degree: int = 0
     trace: fmpq | None = None
-    height_constant: float | None = None
+
+    @cached_property
+    def order(self) -> int | None:
+        """The order of the translation or of kappa, None if it is infinite."""
+        return None if self.curve is None or self.point is None else self.curve.order(self.point)
+
+    @cached_property
+    def height(self) -> arb | None:
+        """The canonical height of the point."""
+        if self.curve is None or self.point is None:
+            return None
+        return canonical_height(self.curve, self.point) if self.order is None else arb(0)
+
+    @property
+    def height_constant(self) -> float | None:
+        """The C of height ~ C n^2 for the largest coordinate of the n-th iterate of the map, in bits.
+
+        Over one common denominator the integers may be longer.
+        """
+        if self.height is None or self.order is not None:
+            return None
+        return self.degree * float(self.height.mid()) / (self.iterate**2 * math.log(2))
+
+    @cached_property
+    def _rotation(self) -> tuple[arb | None, int]:
+        if self.curve is not None and self.point is not None:
+            return _rotation(self.curve, self.point)
+        if self.trace is None or abs(self.trace) >= 2:
+            return None, 1
+        with RR(128).working():  # kappa = exp(2 pi i rho)
+            return arb.atan2(arb(4 - self.trace**2).sqrt(), arb(self.trace)) / (2 * arb.pi()), 1
+
+    @property
+    def rotation(self) -> arb | None:
+        """The rotation number in (0, 1/2] up to sign; None if kappa is real."""
+        return self._rotation[0]
+
+    @property
+    def steps(self) -> int:
+        """1, or 2 if the iterate exchanges two real components; then `rotation` is about its square."""
+        return self._rotation[1]
+
+    @cached_property
+    def bad_primes(self) -> BadPrimes | None:
+        """The bad primes of the curve over Q."""
+        return None if self.curve is None else bad_primes(self.curve)
+
+    @property
+    def components(self) -> int | None:
+        """The number of real components of the curve of genus 1: 1, or 2 if the discriminant is positive."""
+        return None if self.curve is None else 2 if self.curve.discriminant > 0 else 1
+
+    @property
+    def is_dense(self) -> bool:
+        """Whether the orbit is dense in the real components of its curves that it visits (proved).
+
+        It is if its translation of a circle, or rotation, has infinite order.
+        """
+        return self.rotation is not None and self.order is None
 
     @property
     def j(self) -> fmpq | None:
@@ -80,20 +134,34 @@ class OrbitCurve(PrintableResult):
     def text(self) -> str:
         which = "" if self.iterate == 1 else f", iterate {self.iterate} of the map"
         lines = [f"curve of the orbit\tgenus {self.genus} (proved){which}"]
-        if self.curve is not None and self.point is not None and self.height is not None:
+        if (
+            self.curve is not None
+            and self.point is not None
+            and self.height is not None
+            and self.bad_primes is not None
+        ):
             order = "infinite order" if self.order is None else f"order {self.order}"
+            minimal = self.bad_primes.minimal_discriminant
             lines += [
                 f"  Weierstrass model\ty^2 = x^3 + A x + B, A = {self.curve.a4}, B = {self.curve.a6}",
                 f"  j-invariant\t{format_number(self.curve.j)}",
+                f"  discriminant\t{16 * self.curve.discriminant}" + ("" if minimal is None else f", minimal {minimal}"),
+                f"  bad primes\t{self.bad_primes.text}",
                 f"  translation\t({', '.join(map(format_number, self.point))}), {order} (proved: multiples up to 12)",
                 f"  canonical height\t{self.height.str(12)}",
             ]
+            visits = {1: "", 2: ", the orbit stays on one" if self.steps == 1 else ", the orbit visits both in turn"}
+            side = {1: "", 2: ", the translation point is on the " + ("egg", "unbounded one")[self.steps == 1]}
+            n = self.components or 1
+            lines.append(f"  real components\t{n}{visits[n]}{side[n]}")
         if self.trace is not None:
             kind = {True: "parabolic", False: "kappa + 1/kappa = " + format_number(self.trace)}[self.trace == 2]
             lines.append(f"  multiplier\t{kind}, infinite order (proved)")
         if self.rotation is not None:
             of_second = ", of the second iterate of it: two real components are exchanged" if self.steps == 2 else ""
             lines.append(f"  rotation number\t{self.rotation.str(12)}{of_second}")
+            dense = "dense in the real components that it visits (proved: infinite order)"
+            lines.append(f"  orbit\t{dense if self.is_dense else 'finite (proved)'}")
         if self.height_constant is not None:
             lines.append(f"heights\t{self.height_constant:.8g} n^2 bits, asymptotically, of the largest coordinate")
         return "\n".join(lines)
@@ -110,6 +178,10 @@ class OrbitCurve(PrintableResult):
             "A": None if self.curve is None else format_number(self.curve.a4),
             "B": None if self.curve is None else format_number(self.curve.a6),
             "j": exact(self.j),
+            "discriminant": None if self.curve is None else format_number(16 * self.curve.discriminant),
+            "bad_primes": None if self.bad_primes is None else self.bad_primes.to_json(),
+            "components": self.components,
+            "dense": self.is_dense,
             "point": None if self.point is None else [format_number(x) for x in self.point],
             "order": self.order,
             "height": None if self.height is None else self.height.str(15),
@@ -171,7 +243,8 @@ def orbit_curve(
     if result is None:
         raise UnknownCurve(
             "undecided: no curve of genus 0 or 1 was found that contains the orbit; the search covers curves of "
-            "genus 1 on which the coordinates have degree at most 8, singular plane cubics, and rational normal curves"
+            "genus 1 on which the coordinates have degree at most 8, singular plane cubics, rational normal curves, "
+            f"and rational curves of degree at most {_MAX_RATIONAL_DEGREE} on which a coordinate is a parameter"
         )
     return result
 
@@ -202,10 +275,7 @@ def _on_elliptic_curve(map_over: Map, found: EllipticSteps) -> OrbitCurve:
     if curve.discriminant == 0:
         return _on_singular_cubic(curve, point, iterate)
     curve, point = curve.short_model(point)
-    height = canonical_height(curve, point)
-    rotation, steps = _rotation(curve, point)
-    constant = found.degree * float(height.mid()) / (iterate * iterate * math.log(2))
-    return OrbitCurve(1, iterate, curve, point, curve.order(point), height, rotation, steps, height_constant=constant)
+    return OrbitCurve(1, iterate, curve, point, found.degree)
 
 
 def _rotation(curve: EllipticCurve, point: AffinePoint) -> tuple[arb, int]:
@@ -231,11 +301,11 @@ def _on_singular_cubic(curve: EllipticCurve, point: AffinePoint, iterate: int) -
     a, b, c = curve.a2, curve.a4, curve.a6
     square = a * a - 3 * b  # (r - s)^2
     if square == 0:
-        return _rational(iterate, fmpq(2))
+        return OrbitCurve(0, iterate, trace=fmpq(2))
     r = (9 * c - a * b) / (2 * square)
     x, y = point
     m_squared, w = 3 * r + a, x - r  # r - s, as 2 r + s = -a
-    return _rational(iterate, 2 * (y * y + m_squared * w * w) / (y * y - m_squared * w * w))
+    return OrbitCurve(0, iterate, trace=2 * (y * y + m_squared * w * w) / (y * y - m_squared * w * w))
 
 
 def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | None]:
@@ -243,7 +313,8 @@ def _first_points(map_over: Map, start: IntegerPoint) -> list[IntegerPoint | Non
     dim = map_over.dim
     top = max(sum(exponent) for factor in map_over.factors for exponent in factor.equation.exponents)
     points: list[IntegerPoint | None] = [start]
-    while len(points) < max(_PERIODS, top * dim + dim + 2, (dim + 1) ** 2) + dim:
+    degree = max(dim, _MAX_RATIONAL_DEGREE)
+    while len(points) < max(_PERIODS, top * degree + degree + 2, (dim + 1) * (degree + 1)) + dim:
         image = map_over.integer_step(points[-1])  # type: ignore[arg-type]
         if image is None or image.exceeding(_BITS):  # on a rational curve the length grows linearly
             return [*points, None]
@@ -269,73 +340,63 @@ def _on_level_curve(
             # The degree of the coordinates one by one, or with a common denominator, as in the search.
             is_triangular = all(factor.integer_steps.is_triangular for factor in map_over.factors)
             degree = max(map(int, F.degrees())) if is_triangular else int(F.total_degree())
-            order, (rotation, steps) = curve.order(point), _rotation(curve, point)
-            height = canonical_height(curve, point) if order is None else arb(0)
-            constant = degree * float(height.mid()) / math.log(2)
-            return OrbitCurve(
-                1, 1, curve, point, order, height, rotation, steps, height_constant=constant if order is None else None
-            )
+            return OrbitCurve(1, 1, curve, point, degree)
     return None
 
 
 def _on_rational_curve(map_over: Map, points: list[IntegerPoint | None]) -> OrbitCurve | None:
-    """Return the multiplier of an orbit on a rational normal curve: one of degree d in a space of dimension d.
+    """Return the multiplier of an orbit on a rational curve, on which the map acts as z -> (p z + q)/(r z + s).
 
-    Hyperplanes through d - 1 points of the orbit give a coordinate z of the curve, on which the map acts by a matrix.
     The coordinates are forms of degree d in (z : 1); substituted into the equation of the map they give a form of known
     degree, which vanishes if it does at more points.
     """
     if len(map_over.factors) > 1 or None in points:  # the points between the factors lie on other curves
         return None
     dim, top = map_over.dim, max(sum(exponent) for exponent in map_over.factors[0].equation.exponents)
-    rows = [[*(fmpq(x) for x in p.numerators), fmpq(p.denominator)] for p in points if p is not None]
+    rows = [[fmpq(p.denominator), *(fmpq(x) for x in p.numerators)] for p in points if p is not None]
     size = dim + 3
-    full = fmpq_mat(size, dim + 1, [x for row in rows[:size] for x in row])
-    degree = rank(QQ, full) - 1
-    if degree < 1:
-        return None
-    chosen: list[int] = []  # coordinates that are independent on the orbit
+    chosen: list[int] = []  # coordinates that are independent on the orbit, first the denominator, which is not 0
     for k in range(dim + 1):
         columns = [*chosen, k]
         if rank(QQ, fmpq_mat(size, len(columns), [row[i] for row in rows[:size] for i in columns])) == len(columns):
             chosen = columns
-    rows = [[row[k] for k in chosen] for row in rows]
-    through = fmpq_mat(degree - 1, degree + 1, [x for row in rows[: degree - 1] for x in row])
-    pencil = nullspace(QQ, through)
-    if len(pencil) != 2:
+    independent, normal = [[row[k] for k in chosen] for row in rows], len(chosen) - 1
+    if normal < 1:
         return None
-    values = [[sum(a * x for a, x in zip(form, row, strict=True)) for form in pencil] for row in rows[degree - 1 :]]
-    if any(second == 0 for _, second in values):
-        return None
-    z = [first / second for first, second in values]
-    # (p z + q)/(r z + s) maps each z to the next.
-    equations = [[z[k], fmpq(1), -z[k] * z[k + 1], -z[k + 1]] for k in range(3)]
-    kernel = nullspace(QQ, fmpq_mat(3, 4, [x for row in equations for x in row]))
-    if len(kernel) != 1:
-        return None
-    p, q, r, s = kernel[0]
-    unknowns = (degree + 1) ** 2
-    enough = max(top * degree + degree + 2, unknowns)
-    z, rows = z[:enough], rows[degree - 1 :][:enough]
-    if any(z[k + 1] * (r * z[k] + s) != p * z[k] + q for k in range(len(z) - 1)) or len(set(z)) < enough:
-        return None
-    last, forms = degree, []
+    # On a rational normal curve hyperplanes through d - 1 points of the orbit give z. Otherwise coordinates are tried.
+    parameters = [([row[k] / row[0] for row in rows], range(normal, _MAX_RATIONAL_DEGREE + 1)) for k in chosen[1:]]
+    through = fmpq_mat(normal - 1, normal + 1, [x for row in independent[: normal - 1] for x in row])
+    if len(pencil := nullspace(QQ, through)) == 2:
+        pairs = [[sum(a * x for a, x in zip(form, row, strict=True)) for form in pencil] for row in independent]
+        if all(second != 0 for _, second in pairs[normal - 1 :]):
+            parameters.insert(0, ([first / second for first, second in pairs[normal - 1 :]], range(normal, normal + 1)))
+    for z, degrees in parameters:
+        equations = [[z[k], fmpq(1), -z[k] * z[k + 1], -z[k + 1]] for k in range(3)]
+        kernel = nullspace(QQ, fmpq_mat(3, 4, [x for row in equations for x in row]))
+        p, q, r, s = kernel[0]
+        if len(kernel) != 1 or len(set(z)) < len(z):
+            continue
+        if any(z[k + 1] * (r * z[k] + s) != p * z[k] + q for k in range(len(z) - 1)):
+            continue
+        for degree in degrees:
+            enough = max(top * degree + degree + 2, len(chosen) * (degree + 1))
+            if _are_forms(z[:enough], independent[len(rows) - len(z) :][:enough], degree):
+                return OrbitCurve(0, 1, trace=(p + s) ** 2 / (p * s - q * r) - 2)
+    return None
+
+
+def _are_forms(z: Sequence[fmpq], rows: Sequence[Sequence[fmpq]], degree: int) -> bool:
+    """Return whether the rows are, up to factors, the values of forms of this degree in (z : 1), and of no others.
+
+    These have no common factor, as there would be others with another factor instead.
+    """
+    width = degree + 1
+    unknowns, equations = len(rows[0]) * width, []
     for value, row in zip(z, rows, strict=True):
-        monomials = [value**k for k in range(degree + 1)]
-        for i in range(last):
-            entry = [fmpq(0)] * unknowns
-            entry[i * (degree + 1) : (i + 1) * (degree + 1)] = [row[last] * x for x in monomials]
-            entry[last * (degree + 1) :] = [-row[i] * x for x in monomials]
-            forms.append(entry)
-    if len(nullspace(QQ, fmpq_mat(len(forms), unknowns, [x for row in forms for x in row]))) != 1:
-        return None
-    return _rational(1, (p + s) ** 2 / (p * s - q * r) - 2)
-
-
-def _rational(iterate: int, trace: fmpq) -> OrbitCurve:
-    """Return the result for a rational curve: kappa = exp(2 pi i rho) if the trace is between -2 and 2."""
-    rotation = None
-    if abs(trace) < 2:
-        with RR(128).working():
-            rotation = arb.atan2(arb(4 - trace * trace).sqrt(), arb(trace)) / (2 * arb.pi())
-    return OrbitCurve(0, iterate, trace=trace, rotation=rotation)
+        monomials = [value**k for k in range(width)]
+        for i in range(1, len(row)):
+            equation = [fmpq(0)] * unknowns
+            equation[:width] = [row[i] * x for x in monomials]
+            equation[i * width : (i + 1) * width] = [-row[0] * x for x in monomials]
+            equations.append(equation)
+    return len(nullspace(QQ, fmpq_mat(len(equations), unknowns, [x for row in equations for x in row]))) == 1

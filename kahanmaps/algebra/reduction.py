@@ -1,0 +1,176 @@
+"""Primes of bad reduction of elliptic curves over Q, and of the curves of a member's planes over number fields.
+
+Numbers are factored within a bound; what remains unfactored is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq, fmpq_poly, fmpz
+
+from kahanmaps.algebra.elliptic_curves import EllipticCurve
+from kahanmaps.algebra.integers import without
+
+_SMOOTH_BITS = 32  # prime factors up to this size are found
+_MAX_FACTORED_BITS = 140  # a cofactor up to this size is factored completely, in about a second
+
+
+@dataclass(frozen=True)
+class BadPrimes:
+    """The primes of bad reduction of an elliptic curve over Q, or the primes of Q below those of a number field.
+
+    `bad` are proved, at `undecided` the reduction is not known. `bad_cofactors` are composite numbers that were not
+    factored, of which all prime factors are bad, `undecided_cofactors` those of which some may be. At all other primes
+    the reduction is good (proved). `minimal_discriminant` is that of the curve over Q, None if it is not known.
+    """
+
+    bad: tuple[int, ...]
+    undecided: tuple[int, ...] = ()
+    bad_cofactors: tuple[int, ...] = ()
+    undecided_cofactors: tuple[int, ...] = ()
+    minimal_discriminant: int | None = None
+
+    @property
+    def text(self) -> str:
+        """The primes in one line."""
+        parts = [", ".join(map(str, self.bad)) or "none"]
+        if self.bad_cofactors:
+            parts.append(f"and all primes of {', '.join(map(str, self.bad_cofactors))} (composite, not factored)")
+        unknown = [str(p) for p in self.undecided]
+        unknown += [f"primes of {n} (composite, not factored)" for n in self.undecided_cofactors]
+        if unknown:
+            parts.append(f"undecided: {', '.join(unknown)}")
+        return "; ".join(parts)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data; integers are text, as they may be long."""
+        names = ("bad", "undecided", "bad_cofactors", "undecided_cofactors")
+        minimal = self.minimal_discriminant
+        lists = {name: [str(n) for n in getattr(self, name)] for name in names}
+        return {**lists, "minimal_discriminant": None if minimal is None else str(minimal)}
+
+
+def factor_within_bound(number: fmpz) -> tuple[set[int], set[int]]:
+    """Return the prime factors of a nonzero integer that are found, and composite cofactors.
+
+    >>> factor_within_bound(fmpz(-(2**5) * 1009))
+    ({2, 1009}, set())
+    """
+    primes, composites = set[int](), set[int]()
+    for factor, _ in abs(number).factor_smooth(_SMOOTH_BITS) if abs(number) > 1 else ():
+        if factor.is_prime():
+            primes.add(int(factor))
+        elif factor.bit_length() <= _MAX_FACTORED_BITS:
+            primes.update(int(prime) for prime, _ in factor.factor())
+        else:
+            composites.add(int(factor))
+    return primes, composites
+
+
+def bad_primes(curve: EllipticCurve, divisors: Iterable[fmpz] | None = None) -> BadPrimes:
+    """Return the primes of bad reduction of a curve over Q: those of its minimal discriminant.
+
+    Args:
+        curve: the curve.
+        divisors: nonzero integers that contain, with 2 and 3, all bad primes; None for the discriminant.
+
+    Source: laska-1982 for minimal models, with the conditions of kraus-1989 at 2 and 3.
+
+    >>> found = bad_primes(EllipticCurve(fmpq(0), fmpq(0), fmpq(16)))
+    >>> found.text, found.minimal_discriminant
+    ('3', -27)
+    """
+    scale = fmpq(curve.a2.q.lcm(curve.a4.q).lcm(curve.a6.q))
+    a2, a4, a6 = ((a * scale**k).p for a, k in ((curve.a2, 2), (curve.a4, 4), (curve.a6, 6)))
+    c4, c6 = 16 * (a2 * a2 - 3 * a4), 32 * (9 * a2 * a4 - 2 * a2**3 - 27 * a6)
+    discriminant = (c4**3 - c6 * c6) // 1728
+    primes, composites = _factors([fmpz(6), discriminant] if divisors is None else [fmpz(6), *divisors, scale.p])
+    bad, minimal = list[int](), discriminant
+    for p in sorted(primes):
+        steps = min(_valuation(c, p) // k for c, k in ((discriminant, 12), (c4, 4), (c6, 6)) if c != 0)
+        if p == 2:
+            a, b = c4 // fmpz(2) ** (4 * steps) % 16, c6 // fmpz(2) ** (6 * steps) % 32
+            steps -= not (b % 4 == 3 or (a == 0 and b in (0, 8)))
+        elif p == 3:
+            steps -= c6 != 0 and _valuation(c6, 3) == 6 * steps + 2
+        minimal //= fmpz(p) ** (12 * steps)
+        if minimal % p == 0:
+            bad.append(p)
+    certain = {n for n in composites if without(fmpz(n), curve.j.q) == 1}
+    is_known = all(c4.gcd(fmpz(n)) == 1 for n in composites)
+    minimal_discriminant = int(minimal) if is_known else None
+    return BadPrimes(tuple(bad), (), tuple(sorted(certain)), tuple(sorted(composites - certain)), minimal_discriminant)
+
+
+def bad_primes_of_plane(gamma: Any) -> BadPrimes:
+    """Return the primes of Q below those of bad reduction of the Jacobian of a level (level_curves.py).
+
+    With delta = 1 - gamma the reduction at a prime not above 2 or 3 is bad if and only if the valuation of gamma is not
+    0, or that of delta is not a multiple of 6: docs/mathematics.md, "Geometry of the level sets".
+
+    Args:
+        gamma: an element of Q, or of Q[t]/g with g integral and irreducible; not 0 and not 1.
+    """
+    delta = 1 - gamma
+    if isinstance(gamma, fmpq):
+        curve = EllipticCurve(9 + 3 * gamma, 48 * gamma, 64 * gamma * gamma)
+        return bad_primes(curve, [gamma.p, gamma.q, delta.p])
+    K, denominator = gamma.field, leading_coefficient(gamma)
+    # Primes of the denominator of j are bad; in a number field they are those of this integer.
+    poles = leading_coefficient(27 * delta * (delta + 8) ** 3 / (delta - 1) ** 3)
+    primes, composites = _factors([denominator, *((K.norm(x) * denominator).p for x in (gamma, delta))])
+    bad, undecided = list[int](), list[int]()
+    polynomial, ramified = fmpq_poly(delta.matrix.charpoly()), K.chi.discriminant().p
+    for p in sorted(primes | {2, 3}):
+        if poles % p == 0:
+            bad.append(p)
+        elif p < 5:
+            undecided.append(p)
+        else:
+            # The slopes are the valuations divided by ramification indices, which are 1 if p does not divide disc(g).
+            indices = range(1, K.degree + 1) if ramified % p == 0 else (1,)
+            slopes = [[s * e for e in indices if (s * e).q == 1] for s in newton_slopes(polynomial, p)]
+            if any(all(n.p % 6 != 0 for n in possible) for possible in slopes):
+                bad.append(p)
+            elif any(n.p % 6 != 0 for possible in slopes for n in possible):
+                undecided.append(p)
+    certain = {n for n in composites if without(fmpz(n), poles) == 1}
+    return BadPrimes(tuple(bad), tuple(undecided), tuple(sorted(certain)), tuple(sorted(composites - certain)))
+
+
+def leading_coefficient(element: Any) -> fmpz:
+    """Return the leading coefficient of the primitive polynomial over Z whose roots are the values of an element.
+
+    It is the norm of the denominator of the element.
+    """
+    return fmpq_poly(element.matrix.charpoly()).denom()
+
+
+def newton_slopes(polynomial: fmpq_poly, p: int) -> set[fmpq]:
+    """Return the p-adic valuations of the roots of a polynomial whose coefficient c_0 is not 0.
+
+    >>> newton_slopes(fmpq_poly([25, 0, 1, 0, 5]), 5) == {fmpq(1), fmpq(-1, 2)}
+    True
+    """
+    points = [(k, _valuation(c.p, p) - _valuation(fmpz(c.q), p)) for k, c in enumerate(polynomial.coeffs()) if c != 0]
+    slopes, (k, height) = set[fmpq](), points[0]
+    while k < points[-1][0]:
+        slope, neg = min((fmpq(y - height, x - k), -x) for x, y in points if x > k)
+        slopes.add(-slope)
+        k, height = -neg, height + int(slope * (-neg - k))
+    return slopes
+
+
+def _factors(numbers: Iterable[fmpz]) -> tuple[set[int], set[int]]:
+    found = [factor_within_bound(number) for number in numbers]
+    return set().union(*(primes for primes, _ in found)), set().union(*(composites for _, composites in found))
+
+
+def _valuation(number: fmpz, p: int) -> int:
+    exponent = 0
+    while number % p == 0:
+        number, exponent = number // p, exponent + 1
+    return exponent
