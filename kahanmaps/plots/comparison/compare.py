@@ -30,6 +30,7 @@ from kahanmaps.maps.convention import either, eps_suffix, resolve_eps
 from kahanmaps.maps.floats.classical import IMPLICIT, METHODS, SEPARABLE, MethodEnsemble, separated, work
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.floats.float_conversion import FloatArray, exact, to_floats
+from kahanmaps.maps.floats.starts import starts_on
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.maps.values import as_point
@@ -381,7 +382,8 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
     """Return the initial points as exact numbers."""
     if given is None:
         return (small_start(system, eps, seed),)
-    given = parse_point(given) if isinstance(given, str) else given
+    if isinstance(given, str):
+        given = starts_on(given, system.variables) if ":" in given else parse_point(given)
     if isinstance(given, Mapping):
         given = as_point(given, system.variables)
     if not hasattr(given, "__len__"):
