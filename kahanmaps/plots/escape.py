@@ -72,7 +72,10 @@ def survey_escape(
         raise InputError(f"found {counted(map_.dim, 'variable')}, expected at least 2")
     if len(set(axes)) != 2 or (at is not None and len(at) != map_.dim):
         raise InputError(f"found axes {axes} and a point {at}, expected two axes and {map_.dim} coordinates")
-    centers = [low + (np.arange(cells) + 0.5) * (high - low) / cells for low, high in window]
+    with np.errstate(over="ignore"):
+        centers = [low + (np.arange(cells) + 0.5) * (high - low) / cells for low, high in window]
+    if not np.isfinite(centers).all():
+        raise InputError(f"found the window {window}, expected a smaller one")
     starts = np.tile(np.zeros(map_.dim) if at is None else to_floats(at), (cells * cells, 1))
     starts[:, axes[0]], starts[:, axes[1]] = np.tile(centers[0], cells), np.repeat(centers[1], cells)
     ensemble = ensemble_for(map_, eps, starts, steps, radius=radius)
