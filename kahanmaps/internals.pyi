@@ -148,14 +148,15 @@ from .maps.floats.classical import METHODS as METHODS
 from .maps.floats.classical import MethodEnsemble as MethodEnsemble
 from .maps.floats.commutator import Commutator as Commutator
 from .maps.floats.commutator import commutator as commutator
-from .maps.floats.ensemble import starts_in_box as starts_in_box
 from .maps.floats.float_conversion import FloatArray as FloatArray
 from .maps.floats.float_conversion import to_float as to_float
 from .maps.floats.float_conversion import to_floats as to_floats
 from .maps.floats.float_orbit import FloatEnsemble as FloatEnsemble
-from .maps.floats.float_orbit import float_function as float_function
 from .maps.floats.lyapunov import lyapunov_exponents as lyapunov_exponents
 from .maps.floats.npy_file import NpyFile as NpyFile
+from .maps.floats.starts import MAX_NUMBERS as MAX_NUMBERS
+from .maps.floats.starts import starts_in_box as starts_in_box
+from .maps.floats.starts import starts_on as starts_on
 from .maps.kahan import KahanFamily as KahanFamily
 from .maps.normal_form.division import PeriodicLevels as PeriodicLevels
 from .maps.normal_form.division import text_in_gamma as text_in_gamma
@@ -174,6 +175,7 @@ from .paper.verify import VerifyOptions as VerifyOptions
 from .paper.verify import verify as verify
 from .plots.comparison.compare import Comparison as Comparison
 from .plots.comparison.compare import compare as compare
+from .plots.comparison.functions import known_functions as known_functions
 from .plots.comparison.functions import requested_axis as requested_axis
 from .plots.comparison.functions import requested_function as requested_function
 from .plots.comparison.plot_compare import clipped_from as clipped_from

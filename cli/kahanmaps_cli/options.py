@@ -129,13 +129,27 @@ seed_option: Callable[[F], F] = click.option(
     "--seed", type=Whole(), metavar="S", default=0, show_default=True, help="Random seed."
 )
 
-random_starts_options: Callable[[F], F] = stack(
+given_starts_options: Callable[[F], F] = stack(
+    click.option(
+        "--start", type=PointText(), multiple=True, metavar="X", help="Initial point, e.g. 1/2,-1/3. Repeatable."
+    ),
     click.option(
         "--starts",
         type=click.Path(),
         metavar="FILE",
         help="File of initial points, one per line (text, CSV) or row (.npy); - is standard input.",
     ),
+    click.option(
+        "--grid",
+        metavar="X=A:B:N,...",
+        help="Grid of initial points: N values from A to B for each variable named, or one: x=-1:1:20,y=0:1:9,z=1/2. "
+        "Others are 0.",
+    ),
+    click.option("--line", metavar="X:Y:N", help="N initial points on a line from X to Y, e.g. 0,0:1,1/2:50."),
+)
+
+starts_options: Callable[[F], F] = stack(
+    given_starts_options,
     click.option("--random", "count", type=Whole(1), metavar="N", help="Draw N random initial points instead."),
     click.option(
         "--box", type=ExactNumber(), metavar="R", help="With --random: draw coordinates from -R to R (default 1)."

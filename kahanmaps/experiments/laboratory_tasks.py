@@ -305,9 +305,9 @@ def lyapunov(
     seed: int = 0,
 ) -> Result:
     """Compute Lyapunov exponents per unit of time of float orbits from random points, by the exact tangent map."""
-    from kahanmaps.maps.floats.ensemble import starts_in_box
     from kahanmaps.maps.floats.float_conversion import to_floats
     from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
+    from kahanmaps.maps.floats.starts import starts_in_box
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     skipped = steps // 10 if transient is None else transient

@@ -172,8 +172,9 @@ def ensemble(
     seed: int = 0,
 ) -> Result:
     """Compute floating-point orbits from random initial points; count how many complete, and measure drift."""
-    from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
+    from kahanmaps.maps.floats.ensemble import FloatEnsemble
     from kahanmaps.maps.floats.float_orbit import to_floats
+    from kahanmaps.maps.floats.starts import starts_in_box
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     normal_form = float_normal_form(system, method)

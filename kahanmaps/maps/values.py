@@ -70,12 +70,22 @@ def as_points(value: Any, variables: Sequence[str]) -> list[Any]:
 def start_rows(starts: Any, variables: Sequence[str]) -> Any:
     """Return one initial point or several, each as `as_point` takes it, as the rows of an array of doubles.
 
+    Text with a colon is a grid or a line, as for `starts_on`.
+
     >>> start_rows(["1/2", 0], ["x", "y"]), start_rows([{"y": 2.5, "x": 1}], ["x", "y"])
     (array([[0.5, 0. ]]), array([[1. , 2.5]]))
+    >>> start_rows("x=0:1:2, y=3", ["x", "y"])
+    array([[0., 3.],
+           [1., 3.]])
     """
     import numpy as np
 
     from kahanmaps.maps.floats.float_conversion import to_floats
+
+    if isinstance(starts, str) and ":" in starts:
+        from kahanmaps.maps.floats.starts import starts_on
+
+        return starts_on(starts, variables)
 
     if is_float_array(starts):
         return np.array(np.atleast_2d(starts), dtype=np.float64)

@@ -72,21 +72,20 @@ def survey_escape(
         raise InputError(f"found {counted(map_.dim, 'variable')}, expected at least 2")
     if len(set(axes)) != 2 or (at is not None and len(at) != map_.dim):
         raise InputError(f"found axes {axes} and a point {at}, expected two axes and {map_.dim} coordinates")
-    centers = [low + (np.arange(cells) + 0.5) * (high - low) / cells for low, high in window]
+    with np.errstate(over="ignore"):
+        centers = [low + (np.arange(cells) + 0.5) * (high - low) / cells for low, high in window]
+    if not np.isfinite(centers).all():
+        raise InputError(f"found the window {window}, expected a smaller one")
     starts = np.tile(np.zeros(map_.dim) if at is None else to_floats(at), (cells * cells, 1))
     starts[:, axes[0]], starts[:, axes[1]] = np.tile(centers[0], cells), np.repeat(centers[1], cells)
-    ensemble = ensemble_for(map_, eps, starts, steps)
-    times, directions = np.full(len(starts), -1), np.full(len(starts), STAYS)
-    step = 0
-    for portion in ensemble.records(steps, 1, progress=progress):
-        for points in portion:
-            with np.errstate(invalid="ignore"):
-                left = np.flatnonzero((times < 0) & ~(np.abs(points).max(axis=1) <= radius))
-            seen = np.nan_to_num(points[left])
-            largest = np.abs(seen).argmax(axis=1)
-            sides = 2 * largest + (seen[np.arange(len(left)), largest] < 0)
-            times[left], directions[left] = step, np.where(np.isnan(points[left, 0]), ENDS, sides)
-            step += 1
+    ensemble = ensemble_for(map_, eps, starts, steps, radius=radius)
+    ensemble.advance(steps, progress=progress)
+    left, ended = ensemble.escaped_at >= 0, ensemble.failed_at >= 0
+    seen = np.nan_to_num(ensemble.escaped_to)
+    largest = np.abs(seen).argmax(axis=1)
+    sides = 2 * largest + (seen[np.arange(len(seen)), largest] < 0)
+    times = np.where(left, ensemble.escaped_at, ensemble.failed_at)  # both -1 for orbits that stay
+    directions = np.where(left, sides, np.where(ended, ENDS, STAYS))
     shape = cells, cells
     return Escape(map_.variables, axes, window, radius, steps, times.reshape(shape), directions.reshape(shape))
 

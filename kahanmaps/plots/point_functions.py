@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from flint import fmpq, fmpq_mpoly
@@ -35,6 +36,7 @@ class PointFunction:
     name: str
     function: RationalFunction
     eps: fmpq = ZERO
+    of_arrays: ClassVar[bool] = True  # for ensembles
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """The values at points (..., dim) as an array (...), with NaN at poles and for values that are not finite."""

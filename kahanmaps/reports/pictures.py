@@ -14,7 +14,7 @@ from kahanmaps.checks.settings import random_starts
 from kahanmaps.display import markup
 from kahanmaps.errors import InputError, KahanmapsError, counted
 from kahanmaps.maps.convention import eps_suffix
-from kahanmaps.maps.floats.ensemble import starts_in_box
+from kahanmaps.maps.floats.starts import starts_in_box
 from kahanmaps.plots.curves.invariant_curves import find_invariant_curves
 from kahanmaps.plots.curves.plot_invariant_curves import plot_invariant_curves
 from kahanmaps.plots.figures import require_matplotlib, svg_text

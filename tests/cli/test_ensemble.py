@@ -57,6 +57,56 @@ def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     assert generic["drift"] == []
 
 
+def test_grids_and_lines_are_points_in_the_order_of_numpy(kahanmaps, tmp_path):
+    path = tmp_path / "x.npy"
+
+    def drawn(command, more="-o"):
+        assert kahanmaps(command, "-q", more, path).status == 0
+        return np.load(path)[0]
+
+    grid = drawn(f"{TOP} --steps 0 --grid x3=-1:1:5,x1=0:1:3,x2=1/3")
+    first, _, third = np.meshgrid([0, 0.5, 1], [1 / 3], np.linspace(-1, 1, 5), indexing="ij")
+    assert grid.tolist() == np.stack([first.ravel(), np.full(15, 1 / 3), third.ravel()], axis=1).tolist()
+    line = drawn(f"{TOP} --steps 0 --line 0,0,1:1,-1/2,1:5")
+    assert line.tolist() == [[k / 4, -k / 8, 1] for k in range(5)]
+    assert drawn(f"{TOP} --steps 0 --start 1,2,3 --start 1/3,0,0").tolist() == [[1, 2, 3], [1 / 3, 0, 0]]
+    points = {"points": [["1", "2", "3"], ["1/3", "0", "0"]]}
+    assert kahanmaps(f"{TOP} --steps 0 --start 1,2,3 --start 1/3,0,0 --json").json["initial_points"] == points
+
+
+def test_statistics_are_those_of_the_orbits(kahanmaps, tmp_path):
+    path = tmp_path / "x.npy"
+    command = "ensemble henon_heiles --grid q1=-1:1:9,p2=0:1:5 --eps 1/20 --steps 60 --every 1 --radius 4"
+    record = kahanmaps(command, "--integral E=q1^2+p2*q2 --integral known --json -q -o", path).json
+    x = np.load(path)
+    with np.errstate(over="ignore"):
+        values = x[..., 0] ** 2 + x[..., 3] * x[..., 1]
+        drift = np.sort(np.abs(values - values[0]).max(axis=0))
+        at = (np.abs(x).max(axis=2) > 4).argmax(axis=0)
+    left = np.sort(at[(np.abs(x).max(axis=2) > 4).any(axis=0)])
+    assert 0 < len(left) < 45
+    found = record["drift"][0]["distribution"]
+    expected = {"min": drift[0], "25%": drift[11], "50%": drift[22], "95%": drift[42], "max": drift[-1]}
+    assert {key: found[key] for key in expected} == pytest.approx(expected, rel=1e-12)
+    assert found["mean"] == pytest.approx(drift.mean())
+    assert (record["escaped"]["orbits"], record["escaped"]["radius"]) == (len(left), "4")
+    assert [record["escaped"]["step"][key] for key in ("min", "max", "mean")] == [left[0], left[-1], left.mean()]
+    names = [drift["name"] for drift in record["drift"]]
+    assert names == ["E", "modified_H", "H"]
+    modified, plain = (entry["distribution"]["50%"] for entry in record["drift"][1:])
+    assert modified < 1e-12 < 1e-9 < plain  # the map conserves the one and not the other
+
+
+def test_points_are_the_same_with_and_without_a_radius(kahanmaps, tmp_path):
+    command = f"{TOP} --random 7 --steps 50 --every 7 -q -o"
+    written = []
+    for more in ("", "--radius 1/2"):
+        kahanmaps(command, tmp_path / "x.npy", more)
+        written.append(np.load(tmp_path / "x.npy").tolist())
+    assert written[0] == written[1]
+    assert len(written[0]) == 8
+
+
 def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_path):
     path = tmp_path / "x.npy"
     for more in ("", " --integral F1"):

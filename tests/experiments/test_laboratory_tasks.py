@@ -18,8 +18,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import task_kind
 from kahanmaps.laboratory.cycles import cycle_census
 from kahanmaps.laboratory.preserve import densities
-from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
+from kahanmaps.maps.floats.starts import starts_in_box
 
 TASKS = (
     "degrees", "find-integrals", "find-density", "find-poisson", "find-symmetry", "find-commuting", "analyze",

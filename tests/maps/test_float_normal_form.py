@@ -27,10 +27,10 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.random_members import random_member, random_member_with_chi, random_member_with_eigenvalues
 from kahanmaps.hard_stop import TimeLimit
-from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.float_orbit import FloatEnsemble, FloatOrbit, float_function, to_float
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.floats.planar_blocks import _sine, _Unclear, planar_blocks
+from kahanmaps.maps.floats.starts import starts_in_box
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -8,6 +8,7 @@ automatic precision every point that is shown is as accurate as asked for, or th
 """
 
 import csv
+import io
 import json
 import signal
 
@@ -36,6 +37,7 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.family.random_members import random_member_with_eigenvalues
 from kahanmaps.family.system_normal_form import NoNormalForm, system_normal_form
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import writers
 from kahanmaps.maps.orbits.iteration import Orbit, OrbitEnd
 from kahanmaps.maps.orbits.methods import choose_method
 from kahanmaps.maps.orbits.orbit import NotAccurate, bits_for, orbit
@@ -354,6 +356,29 @@ def test_where_no_precision_is_enough_that_is_said():
         return Orbit(KahanMap(riccati, "1/2", RR(bits)), ["1/4"], 9)
 
     refuses("give 15 digits", bits_for, orbit_with, 15, error=NotAccurate)
+
+
+def test_a_csv_file_has_the_characters_of_repr_with_and_without_pyarrow(monkeypatch):
+    pytest.importorskip("pyarrow")
+    rng = np.random.default_rng(1)
+    numbers = np.frombuffer(rng.bytes(8 * 20_000))
+    numbers = np.concatenate(
+        [
+            numbers[np.isfinite(numbers)],
+            np.exp(rng.uniform(-30, 40, 20_000)),
+            np.arange(-50.0, 50),
+            [-0.0, 1e-310, 1e16],
+        ]
+    )
+    x = numbers[: len(numbers) // 3 * 3].reshape(-1, 3)
+    expected = [",".join([str(7 + 5 * k), *map(repr, row)]) for k, row in enumerate(x.tolist())]
+    written = []
+    for least in (1, 10**9):
+        monkeypatch.setattr(writers, "_MIN_ARROW_ROWS", least)
+        stream = io.StringIO()
+        writers.Csv(stream, "xyz", ()).portion(7, 5, x)
+        written.append(stream.getvalue().splitlines())
+    assert written[0] == written[1] == expected
 
 
 @pytest.mark.parametrize("form", ["text", "json", "jsonl", "csv", "npz", "parquet", "npy"])

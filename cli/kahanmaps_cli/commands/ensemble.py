@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -11,12 +10,12 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import counted, quoted
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.params import Whole
-from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
+from kahanmaps_cli.params import ExactNumber, Whole
+from kahanmaps_cli.runs.ensemble_starts import requested_starts, require_one_kind_of_starts, starts_record
 from kahanmaps_cli.screen.outputs import OutputFile
 from kahanmaps_cli.screen.progress import Progress, print_stderr
 from kahanmaps_cli.screen.render import json_number, print_json, record_of, short_float
-from kahanmaps_cli.screen.terminal import print_stdout
+from kahanmaps_cli.screen.terminal import on_terminal, print_stdout, print_table
 from kahanmaps_cli.signals import interruptible
 
 MAX_STEPS = 10**13  # more would take years
@@ -28,22 +27,24 @@ _MAX_VALUES = 200_000  # of the integrals
 
 @click.command("ensemble")
 @opt.system_options
-@opt.random_starts_options
+@opt.starts_options
 @opt.eps_options
 @click.option("--steps", type=int, metavar="N", required=True, help="Number of steps.")
 @opt.backward_option
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points to FILE.npy.")
 @click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
 @opt.integral_option(
-    "Measure the drift of a function: an expression in the variables and eps, or the name of an integral of the file."
+    "Measure the drift of a function: an expression in the variables and eps, the name of an integral of the file, or "
+    "'known' for all known integrals and H."
 )
+@click.option("--radius", type=ExactNumber(), metavar="R", help="Count the orbits that leave max |x_i| <= R.")
 @click.option("--method", type=click.Choice(("generic", "normal-form")), help="By default chosen automatically.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Affects only the speed, not the numbers.")
 @click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
 @click.option("-v", "--verbose", is_flag=True, help="Print the method and its reason on standard error.")
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """Compute many float orbits of the map of SYSTEM: how many complete, and how well integrals are conserved.
+    """Compute many float orbits of the map of SYSTEM: how many complete or escape, how well integrals are conserved.
 
     \b
       kahanmaps ensemble paper_m2 --random 1000 --box 1/2 --seed 1 \\
@@ -52,6 +53,11 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
           --every 100 -o orbits.npy
       kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 \\
           --steps 1000 --integral F1
+      kahanmaps ensemble henon_heiles --grid q1=-1:1:40,q2=-1:1:40 \\
+          --eps 1/20 --steps 500 --radius 100 --integral known
+
+    The drift of an orbit is the largest |I(x_n) - I(x_0)|; the table has its distribution over the completed orbits.
+    An orbit escapes at the first step with max |x_i| > R, and may return, since Kahan maps have poles.
 
     FILE.npy is an array (records, orbits, dimension): record k holds the points after
     k*K steps, where K is the value of --every. It grows during the computation and is
@@ -62,21 +68,21 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     """
     _require_consistent(system, options)
     file = opt.load_system(system, {**options, "quiet": quiet})
-    integrals = lib.functions_along(file, options["integrals"], in_floats=True)
     eps = opt.eps_of(file, options)
     eps_value = lib.rational(1) if eps is None else eps
+    named = [pair for pair in options["integrals"] if pair != ("", "known")]
+    claims: dict[str, Any] = lib.functions_along(file, named, in_floats=True)
+    integrals: dict[str, Any] = {  # backward too: the inverse has the same integrals
+        name: lib.PointFunction(name, claimed.function, eps_value) for name, claimed in claims.items()
+    }
+    if len(named) < len(options["integrals"]):
+        integrals |= {known.name: known for known in lib.known_functions(file.real_approximation, eps_value)}
     file.map.at(eps_value)  # raises the same errors for eps as the command orbit
     starts = requested_starts(file, options)
     normal_form = lib.float_normal_form(file, options["method"])
     if isinstance(normal_form, lib.NoNormalForm) and options["method"] == "normal-form":
         raise lib.InputError(f"the method normal-form needs a normal form, and there is none: {normal_form.reason}")
     form = None if isinstance(normal_form, lib.NoNormalForm) else normal_form.form
-    value = lib.to_float(eps_value)  # backward too: the inverse has the same integrals
-
-    def of_point(claimed: Any) -> Callable[[Sequence[float]], float | None]:
-        in_floats = lib.float_function(claimed.function)
-        return lambda x: in_floats([*x, value])
-
     steps, every, output = options["steps"], options["every"], options["output"]
     is_short_run = steps * (30 * min(len(starts), 20) + len(starts)) < _MIN_COMPILED_WORK
     ensemble = lib.FloatEnsemble(
@@ -87,7 +93,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         kernel="numpy" if options["kernel"] is None and is_short_run else options["kernel"],
         backward=options["backward"],
         threads=options["threads"],
-        integrals={name: of_point(claimed) for name, claimed in integrals.items()},
+        integrals=integrals,
+        radius=None if options["radius"] is None else lib.to_float(options["radius"]),
     )
     method = "generic" if form is None else "normal-form"
     if verbose and not quiet:
@@ -113,11 +120,13 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     where = None if first is None else {"orbit": first, "step": int(near_at[first])}
     # The largest drift of each integral over the completed orbits.
     completed = (ensemble.failed_at < 0).nonzero()[0]
+    statistics = ensemble.statistics()
     drifts: list[dict[str, Any]] = [{"name": drift.name, "orbits": len(completed)} for drift in ensemble.drift]
     for record_of_drift, drift in zip(drifts, ensemble.drift if len(completed) else (), strict=False):
         worst = int(completed[drift.largest[completed].argmax()])
         record_of_drift |= {"largest": lib.json_float(drift.largest[worst]), "orbit": worst}
         record_of_drift["initial"] = json_number(drift.initial[worst])
+        record_of_drift["distribution"] = {key: lib.json_float(x) for key, x in statistics[drift.name].items()}
     results = {
         "orbits": ensemble.n,
         "steps": steps,
@@ -128,6 +137,14 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         "near_singular": {"steps": int(near.sum()), "orbits": len(near_orbits), "first": where},
         "drift": drifts,
     }
+    if options["radius"] is not None:
+        escaped = ensemble.escaped_at >= 0
+        results["escaped"] = {
+            "radius": lib.format_number(options["radius"]),
+            "orbits": int(escaped.sum()),
+            "completed": int((escaped & (ensemble.failed_at < 0)).sum()),
+            "step": statistics["escape step"],
+        }
     if as_json:
         shape = {"shape": [records, *starts.shape], "every": record_interval, "axes": ["record", "orbit", "x"]}
         direction = "backward" if options["backward"] else "forward"
@@ -157,12 +174,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
     """Raise UsageError for options that contradict each other or are out of range."""
     steps, every, output = options["steps"], options["every"], options["output"]
-    if (options["starts"] is None) == (options["count"] is None):
-        raise click.UsageError("give either --starts FILE or --random N")
-    if options["starts"] is not None and (options["box"] is not None or options["seed"] is not None):
-        raise click.UsageError("--box and --seed are for --random N")
-    if options["starts"] == "-" and system == "-":
-        raise click.UsageError("found - for both SYSTEM and --starts, but there is only one standard input")
+    if require_one_kind_of_starts({**options, "system": system}) is None:
+        raise click.UsageError("missing initial points: give --start X, --starts FILE, --grid, --line or --random N")
     if steps < 0:
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if steps > MAX_STEPS:
@@ -188,9 +201,19 @@ def _print(file: lib.SystemFile, eps: Any, backward: bool, kernel: str, results:
             start = "+-".join(map(short_float, initial)) + "i" if isinstance(initial, list) else short_float(initial)
             text = f"at most {short_float(drift['largest'])} (orbit {drift['orbit']}, from {start})"
         rows.append(("drift", f"{drift['name']}\t{text}"))
+    if "escaped" in results:
+        escaped = results["escaped"]
+        where = f"{escaped['orbits']} of {counted(results['orbits'], 'orbit')}, |x| > {escaped['radius']}"
+        rows.append(("escaped", where + (f"; {escaped['completed']} of them completed" if escaped["orbits"] else "")))
     rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in results["failures"]]
     remaining = results["orbits"] - results["counts"]["completed"] - len(results["failures"])
     if remaining:
         rows.append(("ended early", f"and {counted(remaining, 'more orbit')}"))
     for name, text in rows:
         print_stdout(f"{name}\t{text}", 15)
+    table = [(f"drift of {drift['name']}", drift.get("distribution")) for drift in results["drift"]]
+    table += [("escape step", results["escaped"]["step"])] if "escaped" in results else []
+    shown = [(name, numbers) for name, numbers in table if numbers]
+    if shown and results["orbits"] > 1:
+        cells = [[name, *map(short_float, numbers.values())] for name, numbers in shown]
+        print_table([["distribution" if on_terminal() else "# distribution", *shown[0][1]], *cells])

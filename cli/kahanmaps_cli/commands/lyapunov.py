@@ -9,7 +9,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.runs.ensemble_starts import requested_starts, starts_record
+from kahanmaps_cli.runs.ensemble_starts import requested_starts, require_one_kind_of_starts, starts_record
 from kahanmaps_cli.screen.progress import SearchProgress, print_stderr
 from kahanmaps_cli.screen.render import print_json, record_of
 from kahanmaps_cli.screen.terminal import on_terminal, print_stdout, print_table
@@ -20,7 +20,7 @@ _DEFAULT_STARTS = 16
 
 @click.command("lyapunov")
 @opt.system_options
-@opt.random_starts_options
+@opt.starts_options
 @opt.eps_options
 @click.option(
     "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps for the means."
@@ -39,8 +39,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps lyapunov henon_heiles --eps 1/10 --box 1/3 --json
 
     The exponents are given per unit of time, which is 1/(2 eps) steps, and per step: means over the orbits, their
-    spread, and the difference between the first half of the steps and all steps. Without --starts and --random there
-    are 16 random initial points.
+    spread, and the difference between the first half of the steps and all steps. By default there are 16 random
+    initial points.
 
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is compared with log |det dPhi|.
@@ -49,8 +49,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
-    if options["starts"] is not None and any(options[name] is not None for name in ("count", "box", "seed")):
-        raise click.UsageError("give either --starts FILE, or random initial points by --random, --box and --seed")
+    require_one_kind_of_starts({**options, "system": system}, random_by_default=True)
     if not 2 <= steps <= _MAX_STEPS or not 0 <= transient <= _MAX_STEPS:
         raise click.UsageError(
             f"found --steps {steps} and --transient {transient}, expected 2 to {_MAX_STEPS} and 0 to {_MAX_STEPS}"

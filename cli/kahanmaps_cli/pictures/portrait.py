@@ -12,6 +12,7 @@ from kahanmaps.errors import counted
 from kahanmaps_cli import options as opt
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import Drawing, picture, window_from, window_option
+from kahanmaps_cli.runs.ensemble_starts import requested_starts, require_one_kind_of_starts
 from kahanmaps_cli.screen.progress import Progress
 
 _MAX_STEPS = 10**9
@@ -23,10 +24,7 @@ _STEPS, _STEPS_ON_A_LINE = 1000, 100
     "portrait",
     opt.system_options,
     opt.eps_options,
-    click.option(
-        "--start", type=PointText(), multiple=True, metavar="X", help="Initial point, e.g. 1/2,-1/3. Repeatable."
-    ),
-    opt.random_starts_options,
+    opt.starts_options,
     click.option(
         "--steps", type=int, metavar="N", help="Number of steps of each orbit (default 1000; with one variable 100)."
     ),
@@ -146,7 +144,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     figure = lib.plot_portrait(shown, options["style"], lines=options["lines"], equal=options["equal"], note=note)
 
     orbit_count = counted(orbits.orbits, "orbit")
-    origin = "" if any(_is_given(options[name]) for name in _STARTS) else " from automatic initial points"
+    origin = " from automatic initial points" if require_one_kind_of_starts(options) is None else ""
     backward = ", backward" if options["backward"] else ""
     at_eps = "" if eps is None else lib.eps_suffix(eps, file.map)
     messages = [f"{file.label}: {orbit_count}{origin}, {counted(len(orbits.points) - 1, 'step')}{backward}{at_eps}"]
@@ -162,18 +160,9 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
     return Drawing(figure, file, [*messages, *notes], 3 if orbits.ended else 0)
 
 
-_STARTS = ("start", "starts", "count")
-
-
-def _is_given(value: Any) -> bool:
-    return value not in (None, ())
-
-
 def _require_consistent(options: dict[str, Any]) -> None:
     """Refuse contradicting options."""
     require_one_kind_of_starts(options)
-    if options["starts"] == "-" and options["system"] == "-":
-        raise click.UsageError("found - twice, but standard input holds one input only")
     steps = options["steps"]
     if steps is not None and not 0 <= steps <= _MAX_STEPS:
         raise click.UsageError(f"found --steps {steps}, expected 0 to {_MAX_STEPS} (--backward steps backward)")
@@ -183,33 +172,14 @@ def _require_consistent(options: dict[str, Any]) -> None:
         raise click.UsageError("--levels-at needs --levels F")
 
 
-def require_one_kind_of_starts(options: dict[str, Any]) -> None:
-    """Refuse initial points that are requested in two ways."""
-    kinds = ["random" if name == "count" else name for name in _STARTS if _is_given(options[name])]
-    if len(kinds) > 1:
-        raise click.UsageError(f"give --{kinds[0]} or --{kinds[1]}, not both")
-    if options["count"] is None and (options["box"] is not None or options["seed"] is not None):
-        raise click.UsageError("--box and --seed are for --random N")
-
-
 def initial_points(file: lib.SystemFile, field: lib.QuadraticSystem | None, eps: Any, options: dict[str, Any]) -> Any:
     """Return the requested initial points, or automatic ones around an equilibrium of the field."""
-    if options["start"]:
-        wrong = next((x for x in options["start"] if len(x) != file.dim), None)
-        if wrong is not None:
-            raise click.UsageError(
-                f"found an initial point with {counted(len(wrong), 'coordinate')}, expected {file.dim}: "
-                f"{', '.join(file.variables)}"
-            )
-        return lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)
-    if options["starts"] is not None or options["count"] is not None:
-        from kahanmaps_cli.runs.ensemble_starts import requested_starts
-
+    if require_one_kind_of_starts(options) is not None:
         return requested_starts(file, options)
     if field is None:
         raise lib.InputError(
-            f"found no initial points for {file.map.kind}, expected --start X, --starts FILE or --random N: "
-            "automatic ones need a vector field"
+            f"found no initial points for {file.map.kind}, expected --start X, --starts FILE, --grid, --line or "
+            "--random N: automatic ones need a vector field"
         )
     named = [text.strip() for text in (options["axes"] or "").split(",")]
     plane = [file.variables.index(text) for text in named if text in file.variables]

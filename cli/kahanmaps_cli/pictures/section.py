@@ -9,9 +9,10 @@ import click
 from kahanmaps import internals as lib
 from kahanmaps.errors import counted
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.params import PointText, Whole
+from kahanmaps_cli.params import Whole
 from kahanmaps_cli.pictures.output import Drawing, picture, window_from, window_option
-from kahanmaps_cli.pictures.portrait import initial_points, require_one_kind_of_starts
+from kahanmaps_cli.pictures.portrait import initial_points
+from kahanmaps_cli.runs.ensemble_starts import require_one_kind_of_starts
 from kahanmaps_cli.screen.progress import Progress
 
 
@@ -22,10 +23,7 @@ from kahanmaps_cli.screen.progress import Progress
     click.option(
         "--plane", metavar="F=C", required=True, help="Hyperplane: a linear equation, e.g. x3=1/2 or x1-x2 (= 0)."
     ),
-    click.option(
-        "--start", type=PointText(), multiple=True, metavar="X", help="Initial point, e.g. 1/2,-1/3,1. Repeatable."
-    ),
-    opt.random_starts_options,
+    opt.starts_options,
     click.option("--steps", type=Whole(), default=20_000, show_default=True, metavar="N", help="Steps of each orbit."),
     click.option(
         "--direction",

@@ -9,21 +9,12 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
-from kahanmaps_cli.params import ParameterKind, PointText
-from kahanmaps_cli.runs.ensemble_starts import read_starts
+from kahanmaps_cli.params import ParameterKind
+from kahanmaps_cli.runs.ensemble_starts import requested_starts, require_one_kind_of_starts
 
 comparison_options: Callable[[opt.F], opt.F] = opt.stack(
     opt.system_options,
-    click.option(
-        "--start",
-        type=PointText(),
-        multiple=True,
-        metavar="X",
-        help="Initial point (default: a random point near the origin). Repeatable.",
-    ),
-    click.option(
-        "--starts", type=click.Path(), metavar="FILE", help="File of initial points, as for kahanmaps ensemble."
-    ),
+    opt.given_starts_options,
     opt.eps_options,
     click.option(
         "--steps", type=int, metavar="N", default=10_000, show_default=True, help="Number of steps of each orbit."
@@ -45,14 +36,13 @@ comparison_options: Callable[[opt.F], opt.F] = opt.stack(
 
 def requested_comparison(options: dict[str, Any], progress: Callable[[str], None], **more: Any) -> lib.Comparison:
     """Run the comparison that the options of `comparison_options` ask for."""
-    if options["start"] and options["starts"] is not None:
-        raise click.UsageError("give either --start X or --starts FILE")
+    kind = require_one_kind_of_starts(options)
     file = opt.load_system(options["system"], options)
     _ = file.real_approximation.system  # a map of another kind is refused first
-    of_file = None if options["starts"] is None else read_starts(options["starts"], file.variables)
+    starts = None if kind is None else options["start"] or requested_starts(file, options)
     return lib.compare(
         file,
-        options["start"] or of_file,
+        starts,
         opt.requested_eps(options["eps"], options["time_step"]),
         options["steps"],
         progress=progress,

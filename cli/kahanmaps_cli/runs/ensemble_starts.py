@@ -1,7 +1,7 @@
-"""Initial points of many orbits: from a .npy file, from text with a point per line, or random.
+"""Initial points of many orbits: given, from a .npy file, from text with a point per line, on a grid, or random.
 
-Text has integers, fractions p/q and decimals, separated by commas or blanks; # starts a comment. A first line with the
-names of the variables assigns the columns.
+Text files have integers, fractions p/q and decimals, separated by commas or blanks; # starts a comment. A first line
+with the names of the variables assigns the columns.
 """
 
 from __future__ import annotations
@@ -13,23 +13,51 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import click
+
 from kahanmaps import internals as lib
-from kahanmaps.errors import ExpressionError, InputError
+from kahanmaps.errors import ExpressionError, InputError, counted, quoted
 
 MAX_TEXT_BYTES = 100_000_000
 MAX_NPY_BYTES = 2_000_000_000
-MAX_NUMBERS = 50_000_000  # coordinates of all initial points
 _MAGIC = b"\x93NUMPY"
 
 
+def require_one_kind_of_starts(options: Mapping[str, Any], *, random_by_default: bool = False) -> str | None:
+    """Return the option that gives the initial points, None without one. Raises UsageError for several."""
+    kinds = [name for name in ("start", "starts", "grid", "line", "count") if options.get(name) not in (None, ())]
+    flags = ["--random" if name == "count" else f"--{name}" for name in kinds]
+    if len(kinds) > 1:
+        raise click.UsageError(f"give {flags[0]} or {flags[1]}, not both")
+    of_random = "count" in options and (options["box"] is not None or options["seed"] is not None)
+    if of_random and options["count"] is None and (kinds or not random_by_default):
+        raise click.UsageError("--box and --seed are for --random N")
+    if options.get("starts") == "-" and options.get("system") == "-":
+        raise click.UsageError("found - for both SYSTEM and --starts, but there is only one standard input")
+    return kinds[0] if kinds else None
+
+
 def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: int | None = None) -> lib.FloatArray:
-    """Return the initial points of a file, or random ones: `count` of them unless the options give a number."""
+    """Return the requested initial points, otherwise `count` random ones."""
+    dim = file.dim
+    if options["start"]:
+        for x in options["start"]:
+            if len(x) != dim:
+                found = counted(len(x), "coordinate")
+                raise InputError(f"found an initial point with {found}, expected {dim}: {', '.join(file.variables)}")
+        return lib.to_floats([entry for x in options["start"] for entry in x]).reshape(-1, dim)
     if options["starts"] is not None:
         return read_starts(options["starts"], file.variables)
-    dim, count = file.dim, options["count"] or count or 1
-    if count * dim > MAX_NUMBERS:
+    for name, separator in (("grid", "="), ("line", ":")):
+        if options[name] is not None:
+            if separator not in options[name] or (name == "line" and "=" in options[name]):
+                shape = "x=-1:1:20,y=1/2" if name == "grid" else "0,0:1,1/2:50"
+                raise InputError(f"found --{name} {quoted(options[name])}, expected a {name} such as {shape}")
+            return lib.starts_on(options[name], file.variables)
+    count = options["count"] or count or 1
+    if count * dim > lib.MAX_NUMBERS:
         raise InputError(
-            f"found --random {count}, expected at most {MAX_NUMBERS // dim} initial points in dimension {dim}"
+            f"found --random {count}, expected at most {lib.MAX_NUMBERS // dim} initial points in dimension {dim}"
         )
     box = lib.rational(1) if options["box"] is None else options["box"]
     if box <= 0:
@@ -42,8 +70,12 @@ def requested_starts(file: lib.SystemFile, options: Mapping[str, Any], count: in
 
 def starts_record(options: Mapping[str, Any], orbits: int) -> dict[str, Any]:
     """Return the part of a record from which the initial points can be reproduced."""
-    if options["starts"] is not None:
-        return {"initial_points": {"file": options["starts"]}, "seed": None}
+    if options["start"]:
+        points = [list(map(lib.format_number, x)) for x in options["start"]]
+        return {"initial_points": {"points": points}, "seed": None}
+    for name, key in (("starts", "file"), ("grid", "grid"), ("line", "line")):
+        if options[name] is not None:
+            return {"initial_points": {key: options[name]}, "seed": None}
     box = "1" if options["box"] is None else lib.format_number(options["box"])
     return {"initial_points": {"random": orbits, "box": box}, "seed": options["seed"] or 0}
 
@@ -98,8 +130,8 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str]) -> lib.FloatArr
             f"{where}: found an array of shape {shape}, expected (n, {dim}): one row for each initial "
             f"point, with columns {', '.join(variables)}"
         )
-    if rows.size > MAX_NUMBERS:
-        raise InputError(f"{where}: found an array of shape {shape}, expected at most {MAX_NUMBERS} numbers")
+    if rows.size > lib.MAX_NUMBERS:
+        raise InputError(f"{where}: found an array of shape {shape}, expected at most {lib.MAX_NUMBERS} numbers")
     with np.errstate(over="ignore"):
         starts: lib.FloatArray = np.ascontiguousarray(rows, dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
@@ -137,8 +169,8 @@ def _from_text(text: str, where: str, variables: Sequence[str]) -> lib.FloatArra
                 message = error.message if isinstance(error, ExpressionError) else error
                 raise InputError(f"{where}:{number}: entry {k + 1}: {message}") from error
         rows.append(row)
-        if len(rows) * len(variables) > MAX_NUMBERS:
-            raise InputError(f"{where}:{number}: found more than {MAX_NUMBERS} numbers, expected fewer")
+        if len(rows) * len(variables) > lib.MAX_NUMBERS:
+            raise InputError(f"{where}:{number}: found more than {lib.MAX_NUMBERS} numbers, expected fewer")
     if not rows:
         raise InputError(f"{where}: found no point, expected one per line: {', '.join(variables)}, e.g. 1/2,-1/3,...")
     return np.array(rows, dtype=np.float64)

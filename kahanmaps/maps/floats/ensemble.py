@@ -8,7 +8,7 @@ the size of the portions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.hints import AttributeHints
 from kahanmaps.maps.convention import either, resolve_eps
-from kahanmaps.maps.floats.float_conversion import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.float_conversion import FloatArray, float_function, to_float, to_floats
 from kahanmaps.maps.floats.planar_blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.floats.steps import (
     RUNNING,
@@ -47,7 +48,9 @@ _MAX_SCALAR_ORBITS = 4  # up to this number machine code takes orbits one by one
 _CHUNKS_PER_THREAD = 8  # more than one, since other programs may occupy a core
 _RECORDED_NUMBERS = 1_000_000  # in a portion
 
-Function = Callable[[Sequence[float]], float | None]
+# A function of a point; with an attribute `of_arrays` that is true, of many points (n, dim).
+Function = Callable[[Any], Any]
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,14 +72,19 @@ class Drift:
         return Drift(self.name, self.initial[orbit], self.largest[orbit], self.last[orbit])
 
 
-def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
-    """Return random initial points (count, dim), uniform between -size and size, determined by the seed.
+def distribution(values: NDArray[Any]) -> dict[str, float]:
+    """Return minimum, quantiles, maximum and mean of numbers; each quantile is one of them. Empty for no numbers.
 
-    >>> starts_in_box(2, 1, 1.0, seed=0).tolist()
-    [[0.2739233746429086], [-0.4604265724722594]]
+    >>> distribution(np.array([4.0, 1.0, 2.0, np.inf]))
+    {'min': 1.0, '5%': 1.0, '25%': 1.0, '50%': 2.0, '75%': 4.0, '95%': inf, 'max': inf, 'mean': inf}
     """
-    starts: FloatArray = (2 * np.random.default_rng(seed).random((count, dim)) - 1) * size
-    return starts
+    if not len(values):
+        return {}
+    quantiles = np.quantile(values, _QUANTILES, method="inverted_cdf").tolist()
+    with np.errstate(over="ignore"):
+        mean = float(values.mean())
+    middle = {f"{100 * share:g}%": float(value) for share, value in zip(_QUANTILES, quantiles, strict=True)}
+    return {"min": float(values.min()), **middle, "max": float(values.max()), "mean": mean}
 
 
 class FloatEnsemble(AttributeHints):
@@ -91,8 +99,11 @@ class FloatEnsemble(AttributeHints):
             an elimination, and loses fewer digits.
         kernel: "numpy" or "numba" (default: numba if installed).
         threads: the number of cores that numba may use (default: all).
-        integrals: functions of a point, whose drift is measured at recorded points.
-        sampled: the number of steps between samples of the block integrals of the normal form.
+        integrals: functions of a point, or rational functions of the variables and eps, such as those of
+            `load(name).integrals`, by name; their drift is measured at recorded points.
+        sampled: the number of steps between samples of the block integrals of the normal form, and of `integrals` where
+            no points are recorded.
+        radius: if given, every step is examined, and the first point with max |x_i| > radius of each orbit is kept.
 
     >>> import numpy as np
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
@@ -114,6 +125,7 @@ class FloatEnsemble(AttributeHints):
         threads: int | None = None,
         integrals: Mapping[str, Function] | None = None,
         sampled: int = SAMPLED,
+        radius: float | None = None,
     ) -> None:
         epsilon = rational(eps)
         if sampled < 1:
@@ -134,6 +146,8 @@ class FloatEnsemble(AttributeHints):
         if to_float(epsilon) == 0.0:
             raise InputError("eps rounds to 0 as a floating-point number: choose a larger eps")
         compiled = choose_kernel(kernel, is_long=True) == "numba" and has_llvm()
+        if radius is not None and not radius > 0:
+            raise InputError(f"found the radius {radius:g}, expected a number above 0")
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = self.system.real_approximation
@@ -156,11 +170,20 @@ class FloatEnsemble(AttributeHints):
         #: Kernel, method and threads, for example "numba normal form, 2 threads".
         self.kernel = f"numba {method}, {counted(self._threads, 'thread')}" if compiled else f"numpy {method}"
         self._compiled = compiled
-        self._watched = [WatchedFunction(name, function, self._starts) for name, function in (integrals or {}).items()]
+        self._watched = []
+        for name, given in (integrals or {}).items():
+            function: Function = given
+            if isinstance(given, RationalFunction):
+                function = _of_point(given, to_float(epsilon))
+            self._watched.append(WatchedFunction(name, function, self._starts))
         self._sampled = sampled
         self._interrupted = False
+        self._radius = radius
+        self._escaped_at = np.full(self.n, -1)
+        self._escaped_to = np.full(shape, np.nan)
         self.backward = backward
         self.step = 0
+        self._note_escapes(0, self._starts[None])
 
     def _build_step(self) -> None:
         self._step = map_step(self._factors) if self._blocks is None else planar_step(self._blocks)
@@ -214,6 +237,28 @@ class FloatEnsemble(AttributeHints):
         return self._batch.near_at.copy()
 
     @property
+    def escaped_at(self) -> NDArray[np.int64]:
+        """The first step at which max |x_i| > radius, for each orbit; -1 for orbits that were not seen outside."""
+        return self._escaped_at.copy()
+
+    @property
+    def escaped_to(self) -> FloatArray:
+        """The points (n, dim) at the steps `escaped_at`; NaN for orbits that were not seen outside."""
+        return self._escaped_to.copy()
+
+    def statistics(self) -> dict[str, dict[str, float]]:
+        """Return distributions over the orbits: of the largest drift of each integral, and of the escape steps.
+
+        The drift is that of the orbits that completed their steps, by the name of the integral. With a radius, "escape
+        step" is the distribution of `escaped_at` over the orbits that left. See `distribution`.
+        """
+        completed = self._batch.status == RUNNING
+        results = {drift.name: distribution(drift.largest[completed]) for drift in self.drift}
+        if self._radius is not None:
+            results["escape step"] = distribution(self._escaped_at[self._escaped_at >= 0])
+        return results
+
+    @property
     def drift(self) -> tuple[Drift, ...]:
         """The drift of the block integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
         drifts = []
@@ -242,6 +287,12 @@ class FloatEnsemble(AttributeHints):
     def advance(self, steps: int, *, progress: Callable[[int], None] | None = None) -> None:
         """Take `steps` steps; `progress` is called with the current step about ten times a second."""
         require_steps(steps)
+        if self._watched or self._radius is not None:
+            for _ in self.records(steps, self._sampled, progress=progress):
+                pass
+            for watched in self._watched:
+                watched.observe(self.x[None])
+            return
         for _ in self._recorded(steps, 0, progress):
             pass
 
@@ -258,12 +309,28 @@ class FloatEnsemble(AttributeHints):
             yield self._starts[None].copy()
         else:
             yield np.empty((0, self.n, self.system.dim))
-        for record in self._recorded(steps, every, progress):
+        for record in self._recorded(steps, every if self._radius is None else 1, progress):
             if len(record):
                 x = self._points_of(record)
+                if self._radius is not None:
+                    first = self.step - len(x) + 1
+                    self._note_escapes(first, x)
+                    x = x[-first % every :: every]
                 for watched in self._watched:
                     watched.observe(x)
-                yield x
+                if len(x):
+                    yield x
+
+    def _note_escapes(self, first: int, x: FloatArray) -> None:
+        """Keep the first points outside of the radius among those at the steps first, first + 1, ..."""
+        if self._radius is None:
+            return
+        inside = np.flatnonzero(self._escaped_at < 0)
+        with np.errstate(invalid="ignore"):
+            is_outside = np.abs(x[:, inside]).max(axis=2) > self._radius
+        left = np.flatnonzero(is_outside.any(axis=0))
+        at = is_outside[:, left].argmax(axis=0)
+        self._escaped_at[inside[left]], self._escaped_to[inside[left]] = first + at, x[at, inside[left]]
 
     def _recorded(self, steps: int, every: int, progress: Callable[[int], None] | None) -> Iterator[FloatArray]:
         """Take steps in portions of about 0.1 s, and yield the states at multiples of `every` (0: none)."""
@@ -356,8 +423,15 @@ class WatchedFunction:
         return Drift(self.name, self._initial.copy(), self._largest.copy(), self._last.copy())
 
     def _values(self, points: FloatArray) -> FloatArray:
+        if getattr(self._function, "of_arrays", False):
+            return np.asarray(self._function(points), dtype=np.float64)
         values = (self._function(point) for point in points.tolist())
         return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def _of_point(function: RationalFunction, eps: float) -> Function:
+    in_floats, has_eps = float_function(function), function.names[-1:] == ("eps",)
+    return lambda x: in_floats([*x, eps] if has_eps else x)
 
 
 def ensemble(
@@ -376,15 +450,20 @@ def ensemble(
     threads: int | None = None,
     integrals: Mapping[str, Function] | None = None,
     sampled: int = SAMPLED,
+    radius: float | None = None,
 ) -> FloatEnsemble:
     """Return the float orbits of many initial points after `steps` steps.
 
     The arguments are those of `FloatEnsemble`; `x0` stands for `starts`, `n` for `steps`, and `time_step` or `h` for
-    2 eps. Raises InputError for a negative number of steps and for invalid arguments.
+    2 eps. `starts` may also be a grid or a line, as text: "x=-1:1:20, y=1/2" or "0,0:1,2:50". Raises InputError for a
+    negative number of steps and for invalid arguments.
 
     >>> top = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
     >>> ensemble(top, [[1, 0, 0], [0, "1/2", 0]], "1/10", 100, kernel="numpy").x.tolist()
     [[1.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
+    >>> spin = ensemble(top, "x=1/4:1:4, y=1/2, z=1/3", "1/10", 100, integrals={"x": lambda x: x[0]}, kernel="numpy")
+    >>> {name: round(value, 3) for name, value in spin.statistics()["x"].items() if name in ("min", "50%", "max")}
+    {'min': 0.018, '50%': 0.06, 'max': 0.566}
     """
     starts, steps = either(starts=starts, x0=x0), either(steps=steps, n=n)
     if starts is None:
@@ -394,7 +473,13 @@ def ensemble(
     epsilon = resolve_eps(eps, time_step, h, floats=True)
     map_ = as_map(system)
     result = FloatEnsemble(
-        map_, epsilon, start_rows(starts, map_.variables), **options, integrals=integrals, sampled=sampled
+        map_,
+        epsilon,
+        start_rows(starts, map_.variables),
+        **options,
+        integrals=integrals,
+        sampled=sampled,
+        radius=radius,
     )
     if steps:
         result.advance(steps)

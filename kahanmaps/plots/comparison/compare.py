@@ -26,10 +26,11 @@ from kahanmaps.documents.files import SystemFile, float_normal_form
 from kahanmaps.documents.inline import as_file
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.system_normal_form import NoNormalForm
-from kahanmaps.maps.convention import either, eps_suffix, resolve_eps
+from kahanmaps.maps.convention import either, eps_record_suffix, resolve_eps
 from kahanmaps.maps.floats.classical import IMPLICIT, METHODS, SEPARABLE, MethodEnsemble, separated, work
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
-from kahanmaps.maps.floats.float_conversion import FloatArray, exact, to_floats
+from kahanmaps.maps.floats.float_conversion import FloatArray, exact, to_float, to_floats
+from kahanmaps.maps.floats.starts import starts_on
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.orbits.iteration import OrbitEnd
 from kahanmaps.maps.values import as_point
@@ -51,6 +52,7 @@ _MIN_SIZES = 5  # step sizes, before an order is regarded as settled
 _SETTLED = 0.004  # change of the slope from one step size to the next
 _ROUNDING = 1000 * 2.0**-53  # errors below this times the root of the number of steps say nothing about the order
 _MIN_COMPILED_STEPS = 20_000
+_LONG = 60  # characters of a number; the record has all of them
 _COLUMNS = ("kind", "method", "function", "eps", "step", "value", "evaluations")
 
 
@@ -219,7 +221,8 @@ class Comparison(ResultPart):
     @property
     def text(self) -> str:
         """The tables and notes, as `print` shows them."""
-        lines = [f"# {self.file.name}{eps_suffix(self.eps)}, {counted(self.steps, 'step')}, measured in floating point"]
+        eps = eps_record_suffix({"eps": _shown(self.eps), "time_step": _shown(2 * self.eps)})
+        lines = [f"# {self.file.name}{eps}, {counted(self.steps, 'step')}, measured in floating point"]
         for rows in self.tables():
             lines += ["\t".join(cells) for cells in rows]
         return "\n".join([*lines, *self.remarks()])
@@ -231,7 +234,7 @@ class Comparison(ResultPart):
         """Return sentences on what the numbers mean and on what is missing."""
         sentences = []
         if self.time is not None:
-            sentences.append(f"error: at time {format_number(self.time)}, against Taylor solutions in balls")
+            sentences.append(f"error: at time {_shown(self.time)}, against Taylor solutions in balls")
         if absolute := [name for name in self.labels if not self.relative[name]]:
             sentences.append(f"absolute drift: {', '.join(absolute)}, for it is 0 at an initial point")
         for run in (run for run in self.runs if run.failures):
@@ -375,11 +378,17 @@ def small_start(system: QuadraticSystem, eps: Any, seed: int = 0) -> tuple[fmpq,
     return starts[complete[0] if len(complete) else 0]
 
 
+def _shown(number: fmpq) -> str:
+    text = format_number(number)
+    return text if len(text) <= _LONG else f"about {to_float(number):.6g}"
+
+
 def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[tuple[fmpq, ...], ...]:
     """Return the initial points as exact numbers."""
     if given is None:
         return (small_start(system, eps, seed),)
-    given = parse_point(given) if isinstance(given, str) else given
+    if isinstance(given, str):
+        given = starts_on(given, system.variables) if ":" in given else parse_point(given)
     if isinstance(given, Mapping):
         given = as_point(given, system.variables)
     if not hasattr(given, "__len__"):

@@ -32,6 +32,8 @@ _EFFORT = -2  # of the search for integrals: it takes at most a few seconds
 class OfTheImage:
     """An integral that depends on x and its image x~ under the Kahan map: the modified H, or x^T M x~/eps."""
 
+    of_arrays = True  # for ensembles
+
     def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
         self.name, self.label = function.name, label
         self._function, self._eps = function, eps

@@ -53,11 +53,12 @@ def ensemble_for(
     *,
     backward: bool = False,
     form: NormalForm | None = None,
+    radius: float | None = None,
 ) -> FloatEnsemble:
     """Return the ensemble of these initial points (n, dim) with the faster kernel; eps is half the time step."""
     work = len(starts) * steps * (1 + given.dim**3 // 8)
     kernel = "numpy" if work < _LITTLE_WORK and steps < _FEW_STEPS else None
-    return FloatEnsemble(given, eps, starts, backward=backward, form=form, kernel=kernel)
+    return FloatEnsemble(given, eps, starts, backward=backward, form=form, kernel=kernel, radius=radius)
 
 
 def field_of(file: SystemFile) -> QuadraticSystem | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +83,9 @@ def require_window(numbers: Sequence[float], axes: int) -> Window:
         raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
     window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
     for low, high in window:
-        if not (low < high and isfinite(high - low)):
-            raise InputError(f"found the window {low:g} to {high:g}, expected low < high")
+        if not -_LARGEST <= low < high <= _LARGEST:
+            limits = f", and numbers between -{_LARGEST:g} and {_LARGEST:g}" if low < high else ""
+            raise InputError(f"found the window {low:g} to {high:g}, expected low < high{limits}")
     return window
 
 
