@@ -450,7 +450,7 @@ class ExperimentReader:
 
     @property
     def has_parameters(self) -> bool:
-        """Whether the system is a file, or may be one where its value is wrong."""
+        """Whether the system is a file or, if its value is wrong, might be one."""
         return self.kind is not None and self.kind.needs is not None and not self.is_family
 
     def _read_systems(self) -> list[dict[str, Any]]:

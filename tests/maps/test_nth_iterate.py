@@ -152,7 +152,9 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
         "a double root": "on a singular level",
         "a triple root": "on a singular level",
     }
-    expected = next((f"the initial point is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
+    expected = next(
+        (f"the initial point is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), ""
+    )
     assert special_start(normal_form, fmpq(1, 2), start) == expected
 
 

@@ -298,7 +298,7 @@ def compare(
     value, count = rational(value), either(steps=steps, n=n)
     count = 10_000 if count is None else count
     if value == 0:
-        raise InputError("found eps = 0, expected another number: nothing moves")
+        raise InputError("found eps = 0, expected another number: at eps = 0 no method moves a point")
     if not isinstance(count, int) or not 1 <= count <= MAX_STEPS:
         raise InputError(f"found {count} steps, expected 1 to {MAX_STEPS}")
     starts = _starts(field, either(start=start, x0=x0), value, seed)
