@@ -201,7 +201,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> str:
         The text of the script, exact, as that of `certificate`. Symbols of the search stay symbols.
 
     Raises:
-        InputError: if nothing is proved, for results at one eps or about the flow, and for too long identities.
+        InputError: if nothing is proved, for results at one eps or of the flow, and if identities are too long.
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(certificate_of(find_poisson(load("lotka_volterra")), "gp").splitlines()[-1])

@@ -226,7 +226,7 @@ class Verifier:
         return findings
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
-        """Return the number-th random point over GF(p), with the roots of chi if needed; None if there are none."""
+        """Return the random point of this number over GF(p), with the roots of chi if needed; None without roots."""
         # In general, and where chi splits over Q, one pool of points serves all claims.
         needs_split = roots and self.member is not None and self.roots is None
         key = (needs_split, number)

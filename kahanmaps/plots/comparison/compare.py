@@ -397,7 +397,7 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
 def _methods(
     file: SystemFile, eps: fmpq, starts: Sequence[Any], requested: Sequence[str] | None, kernel: str | None
 ) -> tuple[list[str], dict[str, str], Callable[[str, fmpq, int, int], FloatEnsemble]]:
-    """Return the methods, the reasons for those left out, and how to start the first orbits at an eps by a method."""
+    """Return the methods, the reasons for omitted ones, and a function that starts the first orbits by a method."""
     if isinstance(requested, str) or not hasattr(requested or (), "__iter__"):
         raise InputError(f"found methods = {requested!r}, expected a list such as ['kahan', 'rk4']")
     names = list(dict.fromkeys(DEFAULT_METHODS if requested is None else requested))
