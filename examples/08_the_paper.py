@@ -1,8 +1,7 @@
 """The paper of Petrera and Suris, statement by statement, for a member whose eigenvalues are not rational.
 
-chi = t^3 - 2 is irreducible with two complex roots, so f_0 is the only rational associated system. The claims of the
-paper are proved nevertheless; those about arbitrary quadratic systems are supported. Then each hypothesis of Theorem 9
-is violated in turn, and the theorem fails.
+chi = t^3 - 2 is irreducible with two complex roots, so f_0 is the only rational associated system. All claims of the
+paper are proved nevertheless. Then each hypothesis of Theorem 9 is violated in turn, and the theorem fails.
 """
 
 from collections import Counter

@@ -1,10 +1,10 @@
 """Degrees over finite fields: exponential growth over Q may be quadratic or bounded modulo a prime.
 
 Three lines with the exponents (6, 3, 2) have the degrees 2^n over Q. Modulo p every fraction is an integer, so that
-singularities are confined there which over Q never are. Over GF(5) and GF(11) the degrees are periodic, over GF(7) they
-grow quadratically, as those of an integrable map, and over GF(17) no degree drops.
+singularities may be confined that are not confined over Q. Over GF(5) and GF(11) the degrees are periodic, over GF(7)
+they grow quadratically, like those of an integrable map, and over GF(17) no degree drops.
 
-A line over GF(p^k), with p^k about 2^60, is mapped as polynomials, and common factors are divided out. This is the
+A line over GF(p^k), with p^k about 2^60, is mapped as polynomials, and common factors are divided out. This follows the
 definition of the degrees, and shares no code with `kahanmaps degrees`. Other systems (files, names of the catalogue,
 equations) and primes are arguments; `--terms` is the number of degrees:
 
@@ -20,7 +20,7 @@ from flint import fq_default_ctx, fq_default_poly_ctx
 import kahanmaps as km
 
 SIX_THREE_TWO = "x' = 3*x^2 + 10*x*y; y' = -8*x*y - 12*y^2"
-MERSENNE = 2**61 - 1  # instead of Q: no fraction that occurs is an integer of moderate size here
+MERSENNE = 2**61 - 1  # in place of Q: no fraction that occurs is an integer of moderate size modulo this prime
 
 
 def solve(matrix, right):

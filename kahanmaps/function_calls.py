@@ -64,7 +64,7 @@ class CallError(InputError, TypeError):
 
 
 def public_function(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """Return a function as it is called by users, under its public name."""
+    """Return the public version of a function, under its public name, with checks of its arguments."""
     signature = inspect.signature(function)
     kinds = {parameter.name: str(parameter.annotation) for parameter in signature.parameters.values()}
     takes_options = inspect.Parameter.VAR_KEYWORD in (parameter.kind for parameter in signature.parameters.values())

@@ -1,4 +1,4 @@
-"""Interrupts: the first Ctrl-C or SIGTERM ends long work where its output is valid, the next ones end it at once."""
+"""Interrupts: the first Ctrl-C or SIGTERM ends long work with valid output, the next one ends it at once."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def handle(number: int, handler: Callable[[int, Any], None]) -> Any:
 def raise_interrupt(signum: int, frame: Any) -> None:
     """Raise KeyboardInterrupt, and again after each second of CPU time until `end_interrupts` is called.
 
-    Libraries lose exceptions: Python turns one raised while a class is being created into RuntimeError, which an
-    `except Exception` around an import (matplotlib's of its three-dimensional axes) takes for a missing library.
+    An exception may be lost: Python turns one that is raised while a class is created into a RuntimeError, which an
+    `except Exception` around an import (in matplotlib, of three-dimensional axes) takes for a missing library.
     """
     signal.signal(signal.SIGVTALRM, signal.default_int_handler)
     signal.setitimer(signal.ITIMER_VIRTUAL, _REPEAT_SECONDS, _REPEAT_SECONDS)

@@ -45,7 +45,7 @@ class Monomial:
         return Monomial(self.constant**exponent, tuple(exponent * power for power in self.powers))
 
     def without(self, common: Sequence[int]) -> Monomial:
-        """The quotient by these powers."""
+        """The quotient by the monomial with the powers `common`."""
         return Monomial(self.constant, tuple(a - b for a, b in zip(self.powers, common, strict=True)))
 
     def at(self, values: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
@@ -92,7 +92,7 @@ class DarbouxProduct:
 
     @property
     def is_single(self) -> bool:
-        """Whether it is written as one polynomial."""
+        """Whether the product is written as one polynomial."""
         return self.content.is_one() and [factor.exponent for factor in self.factors] == [1]
 
     @property

@@ -76,7 +76,7 @@ class _Script:
         return [f"Variables {' '.join(letters)} : R."] if letters else []
 
     def functions(self, arguments: str, /, **polynomials: fmpq_mpoly) -> list[str]:
-        """Return definitions of functions of these arguments."""
+        """Return definitions of functions of the same arguments."""
         return [f"Definition {name} ({arguments} : R) : R := {self.text(P)}." for name, P in polynomials.items()]
 
     def predicate(self, letter: str = "e", relation: str = "maps", data: MapData | None = None) -> list[str]:
@@ -346,7 +346,7 @@ class _Script:
         ]
 
     def products(self, fraction: DarbouxProducts, *named: tuple[str, str]) -> list[str]:
-        """The functions with these names, and the lemmas that the map multiplies them by their cofactors.
+        """Definitions of the products, and the lemmas that the map multiplies these by their cofactors.
 
         `named` are the names of each product and of its cofactor.
         """

@@ -52,7 +52,7 @@ class Check:
 
     @property
     def command(self) -> str:
-        """The name of its command and of its task."""
+        """The name of the command and of the task of this check."""
         return f"check-{self.name}"
 
     def __call__(self, *arguments: Any, **options: Any) -> Report:

@@ -204,9 +204,9 @@ def _brackets(tensor: Any) -> HtmlCell:
 
 @lines_of.register
 def _darboux(search: DarbouxSearch) -> Iterator[Line]:
-    """Yield the equation of a Darboux polynomial, then the polynomials for each cofactor, or that none were found."""
+    """Yield the equation of a Darboux polynomial and the polynomials for each cofactor, or a note on absence."""
     meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(search.cofactors) else ""
-    equation = f"P(x~) = C P(x){meaning}; without the spaces that products of others span"
+    equation = f"P(x~) = C P(x){meaning}; spaces spanned by products of others are omitted"
     yield ("P' = K P, irreducible; integrals left out" if search.flow else equation,)
     for space in search.spaces:
         yield (f"{'K' if search.flow else 'C'} = {space.cofactor}",)
@@ -233,7 +233,7 @@ def _structures(structures: ConstantStructures) -> Iterator[Line]:
 
 @lines_of.register
 def _growth(growth: DegreeGrowth | Scan) -> Iterator[Line]:
-    """The lines of its `text`."""
+    """Yield the lines of `DegreeGrowth.text`."""
     return (line.split("\t") for line in growth.text.split("\n"))
 
 

@@ -273,7 +273,7 @@ def period_html(period: OrbitPeriod) -> str:
 
 @text_form.register
 def period_text(period: OrbitPeriod) -> str:
-    """Return the period, those in the planes, and whether the orbit meets a pole."""
+    """Return the period, the periods in the planes, and whether the orbit meets a pole."""
     lines = [f"period\t{_period_word(period)}"]
     for plane in period.planes:
         cells = ["plane", plane.name, f"period {_period_word(plane)}", str(plane.kind), plane.reason]

@@ -30,7 +30,7 @@ def iterates_in(*texts: str) -> int:
 
 
 def with_iterates(variables: Sequence[str], count: int, others: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the variables, those with ~, ~~, ... up to `count`, then the others.
+    """Return the variables, then the variables with ~, ~~, ... up to `count`, then the others.
 
     >>> with_iterates(["x", "y"], 1, ["eps"])
     ('x', 'y', 'x~', 'y~', 'eps')

@@ -176,12 +176,12 @@ class Experiment:
 
     @property
     def size(self) -> int:
-        """The number of its tasks."""
+        """The number of tasks of the experiment."""
         return self.grid.size
 
     @property
     def product(self) -> str:
-        """The number of its tasks as a product: 4 m x 10,000 seed x 3 eps."""
+        """The number of tasks of the experiment as a product: 4 m x 10,000 seed x 3 eps."""
         return " x ".join(f"{len(self.grid.axes[group[0]]):,} {'+'.join(group)}" for group in self.grid.groups)
 
     @cached_property
@@ -216,7 +216,7 @@ class Experiment:
         return Task(self.kind.name, system_spec, options)
 
     def tasks(self) -> Iterator[Task]:
-        """Yield its tasks in order."""
+        """Yield the tasks of the experiment in order."""
         return (self[index] for index in range(self.size))
 
 
@@ -450,7 +450,7 @@ class ExperimentReader:
 
     @property
     def has_parameters(self) -> bool:
-        """Whether the system is a file, or may be one where its value is wrong."""
+        """Whether the system is a file or, if its value is wrong, might be one."""
         return self.kind is not None and self.kind.needs is not None and not self.is_family
 
     def _read_systems(self) -> list[dict[str, Any]]:

@@ -76,7 +76,7 @@ class TaskKind:
 
 
 def fields(result: Any, *names: str) -> Result:
-    """Return attributes of a result by their names."""
+    """Return the attributes of a result with these names, as a dict."""
     return {name: getattr(result, name) for name in names}
 
 

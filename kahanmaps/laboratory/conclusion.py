@@ -27,9 +27,9 @@ _CURVES = {None: "curves", 0: "rational curves", 1: "elliptic curves, of genus 1
 
 @dataclass(frozen=True)
 class Conclusion(ResultPart):
-    """The verdict on a map; `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere
-    defined) or "undecided".
+    """The verdict on a map.
 
+    `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere defined) or "undecided".
     `sense` is the precise sense of the verdict: "superintegrable" (one integral less than the dimension, proved),
     "Liouville integrable" (proved), "integrable in the sense of zero algebraic entropy", "not integrable", "confining
     and not integrable", else the kind. `ground` is the kind of evidence: "proved", "derived" (from the measured

@@ -1,6 +1,6 @@
-"""Negative controls: input that breaks exactly one hypothesis. On it the claims that need the hypothesis must fail.
+"""Negative controls: input that violates exactly one hypothesis, for which the claims that need it must fail.
 
-A control takes the paper's objects and returns broken ones; the change is random. A claim names the controls that
+A control takes the paper's objects and returns changed ones; the change is random. A claim names the controls that
 refute it. A claim that no control can refute would not be a check.
 """
 
@@ -24,7 +24,7 @@ class Control:
 
 
 def broken_H(o: PaperObjects) -> PaperObjects:
-    """H plus the cube of a random linear form; for m = 1, where every cubic belongs, f is doubled but not H."""
+    """H plus the cube of a random linear form; for m = 1, where every cubic is allowed, f is doubled but not H."""
     if o.m == 1:
         return o.changed(base=o.f.transformed(o.I * o.number(2)))
     u = o.vector("break 1")
@@ -32,13 +32,13 @@ def broken_H(o: PaperObjects) -> PaperObjects:
 
 
 def broken_J(o: PaperObjects) -> PaperObjects:
-    """J plus a random skew matrix of rank 2, throughout; for m = 1, where A^T J = J A for every skew J, twice J."""
+    """J plus a random skew matrix of rank 2; for m = 1, where A^T J = J A holds for every skew J, 2 J."""
     u, v = o.vector("break 1"), o.vector("break 2")
     return o.changed(J=o.J + u * v.transpose() - v * u.transpose(), base=None)
 
 
 def broken_f(o: PaperObjects) -> PaperObjects:
-    """f plus a random vector times the square of a random linear form; H stays."""
+    """f plus a random vector times the square of a random linear form; H is unchanged."""
     p, u = o.vector("break 1"), o.vector("break 2")
     return o.changed(base=SystemOver(o.K, o.f.tensor + o.tensor(p, u, u), o.f.B, o.f.c))
 
@@ -55,7 +55,7 @@ def repeated_root(o: PaperObjects) -> PaperObjects:
 
 
 def linear_f(o: PaperObjects) -> PaperObjects:
-    """H with its quadratic part only: linear maps that are functions of one matrix commute with any steps."""
+    """The quadratic part of H alone: then f is linear, and maps with all time steps commute."""
     zero = o.zeros(o.n * o.n, o.n)
     return o.inhomogeneous().changed(third=zero, gradient_of_linear_part=o.zeros(o.n, 1), base=None, draw=o.vector)
 
@@ -98,7 +98,7 @@ CONTROLS: dict[str, Control] = {
 
 
 def broken(name: str, objects: PaperObjects) -> PaperObjects:
-    """The objects broken by a control; vectors that were drawn stay the same."""
+    """The objects changed by a control; the vectors drawn so far stay the same."""
     changed = CONTROLS[name].function(objects)
     changed.draw = objects.vector
     return changed

@@ -1,6 +1,6 @@
 """Formal proofs of the facts (5)-(12), which hold for every quadratic f and every cubic H in every dimension.
 
-Coordinates would be too many in dimension 6. None are needed: the facts follow from a few identities between
+In dimension 6 there would be too many coordinates. None are needed: the facts follow from a few identities between
 multilinear expressions, in which Q is any symmetric bilinear map, B any linear map, T any symmetric trilinear form and
 J any skew matrix. Each function yields the pairs of expressions that have to be equal; docs/mathematics.md, "Formal
 proofs", says how the claims follow from them.
@@ -66,7 +66,7 @@ def letter(name: str) -> Expression:
 
 @dataclass(frozen=True)
 class Multilinear:
-    """A multilinear map of which nothing else is known than its symmetry: 1 symmetric, -1 skew, 0 none."""
+    """A multilinear map of which only the symmetry is known: 1 symmetric, -1 skew, 0 none."""
 
     name: str
     symmetry: int = 0
@@ -122,28 +122,28 @@ class KahanEquation:
 
 
 def map_of_any_quadratic_system(Q: Multilinear = Q) -> Pairs:
-    """Yield the identities behind (5)-(7): the explicit form, and reversibility."""
+    """Yield the identities that imply (5)-(7): the explicit form, and reversibility."""
     kahan = KahanEquation(Q)
     yield kahan.M(X, Y - X) - 2 * EPS * kahan.f(X), kahan.E(X, Y)
     yield kahan.E(Y, X, -EPS), kahan.E(X, Y) * -1
 
 
 def map_of_any_homogeneous_system(Q: Multilinear = Q) -> Pairs:
-    """Yield the identities behind (8) and (9)."""
+    """Yield the identities that imply (8) and (9)."""
     kahan = KahanEquation(Q, homogeneous=True)
     yield kahan.M(X, Y) - X, kahan.E(X, Y)
     yield Y - kahan.P(Y, X), kahan.E(X, Y)
 
 
 def jacobian_of_any_map(Q: Multilinear = Q) -> Pairs:
-    """Yield the identity behind (10): E changes by M(x) w - P(y) v to first order if x and y change by v and w."""
+    """Yield the identity that implies (10): to first order E changes by M(x) w - P(y) v if x, y change by v, w."""
     kahan, v, w = KahanEquation(Q), letter("v"), letter("w")
     first_order = kahan.M(X, w) - kahan.P(Y, v)
     yield kahan.E(X + v, Y + w) - kahan.E(X, Y), first_order - Q(v, w) * (2 * EPS)
 
 
 def integral_of_any_cubic(T: Multilinear = T, skew: Multilinear | None = None) -> Pairs:
-    """Yield the identities behind (11), for three successive points x, y, z of an orbit.
+    """Yield the identities that imply (11), for three successive points x, y, z of an orbit.
 
     H(x) = T(x, x, x) with a last coordinate 1 of x. G_uv is the covector with G_uv . w = 3 T(u, v, w) for all w with
     last coordinate 0. Kahan's equation reads y - x = 2 eps J G_xy, hence T(u, v, y - x) = (2 eps/3) G_uv . J G_xy.
@@ -160,10 +160,10 @@ def integral_of_any_cubic(T: Multilinear = T, skew: Multilinear | None = None) -
 
 
 def measure_of_any_hamiltonian_map(sign_of_transpose: int = -1) -> Pairs:
-    """Yield the identities behind (12): det(I + eps J S) = det(I - eps J S) for a skew J and a symmetric S.
+    """Yield the identities that imply (12): det(I + eps J S) = det(I - eps J S) for a skew J and a symmetric S.
 
-    Transposition gives det(I + eps J S) = det(I - eps S J); that this is det(I - eps J S) is read off two products of
-    block matrices, of which the factors on one side have determinant 1.
+    Transposition gives det(I + eps J S) = det(I - eps S J). Two products of block matrices, with factors of determinant
+    1 on one side, show that this is det(I - eps J S).
     """
     one, zero = Expression({(): fmpq_poly([1])}), Expression({})
     J, S = letter("J"), letter("S")

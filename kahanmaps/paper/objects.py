@@ -1,9 +1,9 @@
 """The objects that the paper denotes by letters, at a point over a field; claims are functions of these objects.
 
-Letters are the paper's: A, J, H (with its chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated g, K;
-x and eps; x~ is the image of x under the map of f. Numbers are elements of `K`, which may be the rationals, GF(p),
-rational functions, an algebra Q[t]/chi, complex balls, dual numbers, or mere bounds for sizes. Vectors are columns.
-Nothing here checks anything: broken input is evaluated like any other, which is what the controls are for.
+Letters are the paper's: A, J, H (with its chain H_0, H_1, ...), f_i, the roots of chi, B_i and the associated g, K; x
+and eps; x~ is the image of x under the map of f. Numbers are elements of `K`, which may be the rationals, GF(p),
+rational functions, an algebra Q[t]/chi, complex balls, dual numbers, or mere bounds for sizes. Vectors are columns. No
+hypothesis is checked here: the controls evaluate input that violates one.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _IN_K = (
 
 
 def remembered(method: Method) -> Method:
-    """Remember the values of a method by the identity of its arguments, which are kept, so that it stays theirs.
+    """Cache the values of a method by the identity of its arguments, to which references are kept.
 
-    The claims need the same values again and again.
+    The claims need the same values many times.
     """
     name = method.__name__
 
@@ -52,11 +52,10 @@ def remembered(method: Method) -> Method:
 class PaperObjects:
     """The paper's objects over the field `K`.
 
-    `third` holds the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H.
-    `draw` gives further vectors by name (random ones at a point, indeterminates in a proof). `step_eps` is the eps
-    that the maps are computed with and `minus` the value of B_i at its own root: other values are for controls, and so
-    are `method`, the explicit Euler method instead of Kahan's, and `error_of_second`, a tensor f'' that is not the
-    derivative of f'.
+    `third` holds the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H. `draw`
+    gives further vectors by name (random ones at a point, indeterminates in a proof). `step_eps` is the eps of the maps
+    and `minus` the value of B_i at its own root; other values are for controls. So are `method`, which may be the
+    explicit Euler method, and `error_of_second`, an error of the tensor f''.
     """
 
     K: Field
@@ -136,7 +135,7 @@ class PaperObjects:
         self._memory.update(drawn)
 
     def scalar(self, name: str) -> Any:
-        """Return an independent number."""
+        """Return an independent number with this name."""
         return self.vector(name)[0, 0]
 
     @remembered
@@ -574,7 +573,7 @@ class PaperObjects:
         return PaperObjects(**{**kept, "_memory": {}, **changes})
 
     def inhomogeneous(self) -> PaperObjects:
-        """The same with quadratic and linear terms in H, such that A nabla^2 H = nabla^2 H A^T still holds.
+        """Return the objects with quadratic and linear terms in H, such that A nabla^2 H = nabla^2 H A^T still holds.
 
         The quadratic part has the Hesse matrix X = sum over three vectors u of sum_i A^i u u^T C_i(A)^T with Horner's
         polynomials C_i of chi: A X - X A^T = sum (chi(A) u u^T - u u^T chi(A)^T) = 0. The linear part is arbitrary.
@@ -616,7 +615,7 @@ class PaperObjects:
         return SystemOver(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
 
     def arbitrary_system_over_the_algebra(self) -> SystemOver:
-        """A planar quadratic system over Q[A^T]: f = sum of M_a(x) M_b(x) e, M_c(x) e' and a constant, vectors drawn.
+        """A planar quadratic system over Q[A^T]: f = sum of M_a(x) M_b(x) e, M_c(x) e' and a constant, random vectors.
 
         M_a(x) = sum_k (a^T (A^T)^k x) C_k(A)^T with Horner's polynomials C_k of chi; since chi(A) = 0 it is linear over
         Q[A^T], as every linear form with values there.
@@ -639,7 +638,7 @@ class PaperObjects:
         return SystemOver(K, K.matrix(n * n, n, [entry for row in rows for entry in row]), linear, self.vector("f(0)"))
 
     def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
-        """A cubic H with terms of all degrees and (unless it is to be standard) a skew J, without any structure."""
+        """A cubic H with terms of all degrees and a skew J (`standard` or not), both without further structure."""
         n, K = self.n, self.K
         tensor: dict[tuple[int, ...], Any] = {}
         for i, j in itertools.combinations_with_replacement(range(n), 2):

@@ -1,13 +1,13 @@
 """The registry of the paper's claims: one short function each, with its place in the paper; and their evaluation.
 
 A claim is a function that takes the paper's objects (`PaperObjects`: A, J, H, f, B_i, x, eps, ...) and yields pairs
-(left, right) which the paper says are equal. It knows nothing of the numbers it runs on: the same function is
-evaluated at random points over GF(p), at exact points over Q, over rational functions (a proof), over an algebra
-Q[t]/chi, over complex balls, and over bounds for degrees and coefficients. To add a claim, write one such function in
-the file of its section, with a title and a formula as its docstring.
+(left, right) which the paper says are equal. It does not depend on the kind of numbers: the same function is evaluated
+at random points over GF(p), at exact points over Q, over rational functions (a proof), over an algebra Q[t]/chi, over
+complex balls, and over bounds for degrees and coefficients. To add a claim, write one such function in the file of its
+section, with a title and a formula as its docstring.
 
-Formulas are printed for every m where the statement makes sense; where the paper's own form is for m = 3 and reads
-differently for other m, the general form reduces to it.
+Formulas are printed for every m for which the statement makes sense. If the paper states a formula for m = 3 only, the
+general formula reduces to it.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Claim:
     """One statement or display of the paper.
 
     `place` names it in the paper ("Lemma 3", "(28)"), `label` is its label in the LaTeX source. `breaks` lists the
-    controls: inputs that break one hypothesis, on which the same function has to come out refuted.
+    controls: inputs that violate one hypothesis, for which the same function must be refuted.
     """
 
     key: str
@@ -114,8 +114,8 @@ _claims: dict[str, Claim] = {}
 def claim(place: str, label: str, breaks: str = "", **more: Any) -> Callable[[ClaimFunction], ClaimFunction]:
     """Register a function as a claim; the section is that of its file.
 
-    The first line of its docstring is the title, the second one the formula. `breaks` are names of controls, blanks
-    between them; a claim with a reason `at_most` is about a rank that is attained. Other keywords: fields of `Claim`.
+    The first line of its docstring is the title, the second one the formula. `breaks` are names of controls, separated
+    by blanks; a claim with a reason `at_most` says that a rank is attained. Other keywords are fields of `Claim`.
     """
 
     def register(function: ClaimFunction) -> ClaimFunction:
@@ -147,7 +147,7 @@ UNDEFINED = (SingularStep, SingularMatrix, ZeroDivisionError)
 
 
 def entries(value: Any) -> list[Any]:
-    """The entries of a matrix; a number alone."""
+    """The entries of a matrix, or the number itself."""
     return list(value.entries()) if hasattr(value, "entries") else [value]
 
 
@@ -196,7 +196,7 @@ def outcomes(
 
 
 def witness_of(outcome: ClaimOutcome) -> Witness | None:
-    """The point at which a claim failed, with both sides; of matrices the first entry that differs."""
+    """The point at which a claim failed, with both sides; for matrices, the first entry in which they differ."""
     if outcome.failure is None:
         return None
     o = outcome.objects

@@ -4,7 +4,7 @@
   the associated systems, the integrals, Pi), the claims test that code.
 * `normal_form_objects`: the normal form with indeterminate roots, coefficients, x and eps. Over the splitting field of
   chi every member with distinct roots is symplectically similar to a specialization of it (docs/mathematics.md).
-* `random_objects`: everything at random over GF(p), hidden by a random symplectic matrix.
+* `random_objects`: all data at random over GF(p), transformed by a random symplectic matrix.
 * `etale_objects`: a member's own normal form, one planar system over Q[t]/chi.
 * `bound_objects`, `universal_bound_objects`: bounds for degrees and coefficients instead of numbers.
 """
@@ -43,7 +43,7 @@ MAX_SIGN_VECTORS = 32
 class MemberObjects(PaperObjects):
     """A given member at a point: values for which the library has its own code are computed by that code.
 
-    Inside derivatives (dual numbers) and in variations they are computed as everywhere else.
+    Within derivatives (dual numbers) and in variations they are computed as for other objects.
     """
 
     member: FamilyMember
@@ -130,10 +130,9 @@ def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
 
 
 def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[PrimeField, tuple[Any, ...]] | None:
-    """A random prime field of 63 bits in which chi has m distinct roots, and the roots; None if no prime tried has this
-    property.
+    """Return a random prime field of 63 bits in which chi has m distinct roots, with the roots, or None.
 
-    Drawn from all primes of that size until one fits, so it is uniform among those that fit.
+    Random primes are tried until chi has this property, so that the prime is uniform among those that have it.
     """
     m = chi.degree()
     for _ in range(tries):
@@ -162,9 +161,9 @@ def point_over(
 
 
 def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObjects:
-    """A, H, x, eps at random over GF(p): roots and planar cubics at random, hidden by a random symplectic matrix.
+    """Return random A, H, x and eps over GF(p): a random normal form, transformed by a random symplectic matrix.
 
-    The matrix is a product of five symmetric shears, upper and lower in turn.
+    The matrix is a product of five symmetric shears, alternately upper and lower.
     """
     n = 2 * m
     roots = tuple(K.random(rng) for _ in range(m))
@@ -197,11 +196,11 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
 
 
 def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int) -> PaperObjects:
-    """The normal form with indeterminate roots, planar cubics and eps; `vectors` are the further letters needed.
+    """The normal form with indeterminate roots, planar cubics and eps; `vectors` are further letters.
 
-    Each block may still be changed by a matrix of determinant 1. It is used to put the point to (u, v) = (1, 0) and the
-    coefficient of u^2 v in h to 0, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as associated: this
-    is one block of a larger system.
+    Each block may still be changed by a matrix of determinant 1. This matrix moves the point to (u, v) = (1, 0) and
+    makes the coefficient of u^2 v in h vanish, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as
+    associated, since this is one block of a larger system.
     """
     n = 2 * m
     lower = ["p", "q", "r", "s", "t"] if "linear" in vectors else []
@@ -268,7 +267,7 @@ def member_functions(
 
 
 def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
-    """A member's normal form at a random exact point: one planar system over Q[t]/chi, every root of chi at once."""
+    """A member's normal form at a random exact point: one planar system over Q[t]/chi, for all roots of chi at once."""
     form = normal_form(member)
     K = EtaleAlgebra(form.chi)
     root = K.generator
@@ -368,7 +367,7 @@ def _letters(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
 def _given(member: FamilyMember, K: Field) -> dict[str, Any]:
     """The data of a member over K: A, the third derivatives of H and, where chi has repeated roots, the B.
 
-    These have one sign for each irreducible factor of chi, to its power.
+    The B have one sign for each irreducible factor of chi, on the part that belongs to its power.
     """
     n = member.dim
     slices = [matrix.entries() for matrix in third_derivatives(member.H)]

@@ -1,7 +1,7 @@
 """Variations of the hypotheses of the paper: other H, other J, other steps, other A.
 
 A variation takes the paper's objects and returns others, like a control; but it is not known in advance whether a
-statement fails. `varied=False` of the objects leaves everything as in the paper, which is the control of what fails.
+statement fails. With `varied=False` the objects stay those of the paper, which is the control for statements that fail.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from kahanmaps.paper.objects import PaperObjects
 
 @dataclass(frozen=True)
 class Variation:
-    """A variation: its title, the least m for which it differs, and the theorem that proves claims not expanded."""
+    """A variation: its title, the least m for which it is one, and the theorem for claims that are not expanded."""
 
     title: str
     function: Callable[[PaperObjects], PaperObjects]
@@ -37,12 +37,12 @@ def any_structure(o: PaperObjects) -> PaperObjects:
 
 
 def different_steps(o: PaperObjects) -> PaperObjects:
-    """The maps of the associated g = B^T f with 2 eps: those of 2 g with eps."""
+    """The maps of the associated g = B^T f at 2 eps, which are those of 2 g at eps."""
     return o.changed(associate_matrices=tuple(B * o.number(2) for B in o.associates()), draw=o.vector)
 
 
 def jordan_block(o: PaperObjects) -> PaperObjects:
-    """A with lambda_1 twice, not diagonalisable: chi is the minimal polynomial; H random in its space."""
+    """A with a double lambda_1, not diagonalizable: chi is the minimal polynomial; H is random in its space."""
     roots = (o.lam[0], o.lam[0], *o.lam[2:])
     chi = tuple(o.changed(roots=roots).chi_of_roots)
     S, _ = o.symplectic_normal_form()
@@ -59,7 +59,7 @@ def jordan_block(o: PaperObjects) -> PaperObjects:
 
 
 def derogatory(o: PaperObjects) -> PaperObjects:
-    """A diagonalisable with lambda_1 = lambda_2, and H anything on the space of that root."""
+    """A diagonalizable with lambda_1 = lambda_2; H is any cubic on the eigenspace of this root."""
     E = o.projector(0) + o.projector(1)
     A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
     third = o.sum([o.third, *(o.tensor(w, w, w) for w in (E * o.vector(name) for name in ("d1", "d2", "d3")))])

@@ -87,7 +87,7 @@ NOTE_ON_RANDOM_MEMBERS = (
 
 @dataclass(frozen=True)
 class VerifyOptions:
-    """The options of `verify`: sections (None: all), order of the series, bits of complex balls, controls instead."""
+    """The options of `verify`: sections (None: all), order of the series, bits of complex balls, and controls."""
 
     sections: tuple[int, ...] | None = None
     order: int = 3
@@ -119,21 +119,19 @@ def verify(
     """Verify all claims of the paper, for a member of the family or for the generic member.
 
     Args:
-        system: a member of the family, with m at most 8; or
-        settings: eps (None: every eps, an indeterminate), the seed and the error bound.
-        options: which claims, and how.
-        m: half the dimension of the member in general, 1 to 8: roots, cubics, symplectic change, x and eps are all at
-            random over GF(p), and the error bound of a claim is on the probability that it is false for the generic
-            member. A claim that could also be proved in normal form is `proved`, for every member with distinct roots.
-        eps: an exact number, in the place of that of the settings; none for the member in general.
-        time_step, h: the time step 2 eps, in its place.
+        system: a member of the family, with m at most 8; None for the generic member. settings: eps (None: every eps,
+            an indeterminate), the seed and the error bound. options: the claims to be verified, and the method. m: half
+            the dimension of the generic member, 1 to 8. Its roots, cubics, coordinates, x and eps are random over
+            GF(p), and the error bound is for the probability that a claim is false for the generic member. A claim that
+            is also proved in normal form is `proved`, for every member with distinct roots. eps: half the time step, an
+            exact number that replaces the eps of the settings; not for the generic member. time_step, h: the time step
+            2 eps, instead of eps.
 
     Returns:
-        A Report with one Finding a claim, in the order of the paper. Exact but for the claims whose verdict is
-        `supported`.
+        A `Report` with one `Finding` for each claim, in the order of the paper. All but `supported` claims are exact.
 
     Raises:
-        InputError: where the system is not of kind [family], and for another m.
+        InputError: if the system is not of kind [family], and for other m.
 
     Source: petrera-suris-2016; schwartz-1980 for the bounds.
 
@@ -192,7 +190,7 @@ def verify(
 class Verifier:
     """Verifies claims: at random points over GF(p), by a proof, at exact points, and with controls.
 
-    For a given member, or (None) for the member in general, with half the dimension `m`.
+    It is for a given member or (None) for the generic member; `m` is half the dimension.
     """
 
     def __init__(
@@ -238,7 +236,7 @@ class Verifier:
         return findings
 
     def point(self, roots: bool, number: int) -> PaperObjects | None:
-        """Return the number-th random point over GF(p), with the roots of chi if needed; None if there are none."""
+        """Return the random point of this number over GF(p), with the roots of chi if needed; None without roots."""
         # In general, and where chi splits over Q, one pool of points serves all claims.
         needs_split = roots and self.member is not None and self.roots is None
         key = (needs_split, number)
@@ -282,7 +280,7 @@ class Verifier:
         return specialize.bound_objects(self.member, self.settings.eps, self.options.order)
 
     def conjugates(self, roots: bool) -> int:
-        """A bound for the degree of the field that the coefficients lie in."""
+        """A bound for the degree of the field of the coefficients."""
         if self.member is None or not roots or self.roots is not None:
             return 1
         return math.prod(math.factorial(factor.degree) for factor in self.member.factors)
@@ -509,11 +507,11 @@ class Verifier:
         return [finding for finding in controls if finding.is_as_expected] or controls
 
     def _broken(self, claim: Claim, name: str) -> ClaimOutcome | None:
-        """The claim on input broken by a control, at a point at which it fails; else the last outcome.
+        """The outcome of a claim on the input of a control, at a point at which it fails; else the last outcome.
 
-        One point refutes an equation, a rational one unless m is large; that something differs, exists or has a certain
-        rank is refuted if several consecutive points do not show it. Over Q ranks and steps of broken maps, where
-        nothing cancels, take minutes from m = 5 on.
+        One point refutes an equation (a rational point unless m is large). A claim that two objects differ, that an
+        object exists or that it has a certain rank is refuted if several consecutive points do not show it. Over Q
+        ranks and steps of the maps of controls, in which nothing cancels, take minutes from m = 5 on.
         """
         at_one = claim.kind is ClaimKind.EQUAL
         finds = (self.exact_point, self.point) if at_one and self.m < _LARGE else (self.point, self.exact_point)
@@ -615,7 +613,7 @@ class ClaimAtPoints:
 def formal_proof(claim: Claim) -> Evidence | None:
     """Prove a claim about every system by identities of multilinear expressions, which are compared here.
 
-    Raises Contradiction where the two sides of one differ.
+    Raises Contradiction if the two sides of an identity differ.
     """
     assert claim.formal is not None
     number = 0
@@ -632,7 +630,7 @@ def formal_proof(claim: Claim) -> Evidence | None:
 def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
     """Prove a claim in normal form with this number of blocks; return None if the budget is exceeded.
 
-    Raises Contradiction where the two sides are different rational functions.
+    Raises Contradiction if the two sides are different rational functions.
     """
     claim = next(claim_ for claim_ in claims() if claim_.key == key)
     bounds = specialize.universal_bound_objects(blocks, order)

@@ -67,7 +67,7 @@ def require_matplotlib() -> None:
 
 @contextmanager
 def drawing(style: Style) -> Iterator[None]:
-    """Use matplotlib's own defaults and those of the style within the context; restore the user's settings afterwards.
+    """Use the defaults of matplotlib and of the style within the context; restore the user's settings afterwards.
 
     Raises InputError where matplotlib is missing.
     """

@@ -142,7 +142,7 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
 
 
 def _dry_run(path: str, db: str, options: Mapping[str, Any]) -> None:
-    """Read the spec and print what it would run."""
+    """Read the spec and print the tasks that a run would start."""
     spec = lib.read_spec(path, max_tasks=options["max_tasks"] or lib.MAX_TASKS, skip_bad=options["skip_bad"])
     chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
     _require_experiments(options["only"], [experiment.name for experiment in spec.experiments])

@@ -74,7 +74,7 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
             messages.append(f"{which}the orbit ends before step {pole}: a pole, or closer to one than 2^-96")
     for plane in curves.planes:
         if plane.shape == "0":
-            messages.append(f"lambda = {plane.root_text}: h = 0, nothing moves in this plane")
+            messages.append(f"lambda = {plane.root_text}: h = 0, so that every point of this plane is fixed")
     outside = [
         f"{view.outside} ({'' if column == 'uv' else column + ', '}lambda = {plane.root_text})"
         for _, plane, column in lib.panels_of(curves)

@@ -43,7 +43,7 @@ def print_json(data: Mapping[str, Any]) -> None:
 def print_report(
     report: lib.Report, as_json: bool, verbose: bool = False, quiet: bool = False, measured: Any = None
 ) -> int:
-    """Print a report, and numbers measured beside it; return the exit status that the verdict stands for."""
+    """Print a report, and the numbers measured in addition; return the exit status of the verdict."""
     if as_json:
         name = click.get_current_context().info_name or ""
         beside = {} if measured is None else {"measured": measured.to_json()}
@@ -72,7 +72,7 @@ def exit_status(report: lib.Report) -> int:
 
 
 def verdict_style(finding: lib.Finding) -> str:
-    """Return the style of a verdict: red for an unexpected one, none for a control that is refuted as it should be."""
+    """Return the style of a verdict: red for an unexpected one, none for a control that is refuted as expected."""
     if not finding.is_as_expected:
         return "bold red"
     return "" if finding.control else VERDICT_COLORS[str(finding.verdict)]

@@ -38,8 +38,8 @@ def table(
 ) -> int:
     """Print a line, or with --json a record, for each combination of values; without ranges, the full result.
 
-    An error at one combination is printed on standard error, and the others continue; an error at all of them is
-    raised. --seconds limits the total time. Returns the exit status.
+    An error at one combination is printed on standard error, and the table continues; if all combinations fail, the
+    error is raised. --seconds limits the total time. Returns the exit status.
     """
     quiet, began = options["quiet"], time.monotonic()
     rows = rows_of(options["parameters"], system)

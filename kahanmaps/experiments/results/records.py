@@ -68,7 +68,7 @@ class Task:
 
     @property
     def documents(self) -> list[str]:
-        """The digests of the documents of its system and of its second system."""
+        """The digests of the documents of the task's system and of its second system."""
         specs = (self.system, self.options.get("other"))
         return [spec["document"] for spec in specs if isinstance(spec, Mapping) and "document" in spec]
 

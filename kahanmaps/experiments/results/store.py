@@ -429,7 +429,7 @@ class Store(HtmlDisplay):
         documents: Mapping[str, str],
         skipped: Iterable[tuple[str, str]] = (),
     ) -> Planned:
-        """Plan these tasks in this order; after a kill or an exception the previous plan is unchanged.
+        """Plan tasks in the given order; after a kill or an exception the previous plan is unchanged.
 
         `definition` determines the tasks: if it equals the one planned before, `tasks` is not read, and only the limits
         are updated. Otherwise this plan replaces the old one, and all results are kept. `documents` (digest to text) is

@@ -258,11 +258,11 @@ class _Worker:
 
     @property
     def is_ready(self) -> bool:
-        """Whether it has started to wait for tasks."""
+        """Whether the worker waits for tasks."""
         return not os.fstat(self._output.fileno()).st_mode & S_IWUSR
 
     def printed(self) -> str:
-        """Return the end of its output since its task began."""
+        """Return the end of the output of the process since its task began."""
         begin = max(0, os.fstat(self._output.fileno()).st_size - TAIL)
         return os.pread(self._output.fileno(), TAIL, begin).decode("utf-8", "replace").strip()
 

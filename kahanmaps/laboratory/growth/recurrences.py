@@ -166,6 +166,7 @@ class Recurrence(ResultPart):
     @cached_property
     def closed_form(self) -> str | None:
         """The polynomials in n that give a_n, one for each class of n modulo the period; None for exponential growth.
+
         They hold from n = `preperiod` on. None also if there are more than 12 classes.
         """
         if not self.is_polynomial or not self.factors:

@@ -400,7 +400,7 @@ def _fit_growth(component: Component, family: Scanned, max_degree: int = _MAX_FI
 
 
 def _continues_as(component: Component, other_growth: DegreeGrowth | None, family: Scanned) -> bool:
-    """Return whether more degrees agree with those at a member of another component with the same first degrees."""
+    """Return whether further degrees agree with those of a member on another component with the same first degrees."""
     if other_growth is None:
         return False
     growth = _fit_growth(component, family, max(_COMPARED_DEGREE, 2 * component.degrees[-1]))

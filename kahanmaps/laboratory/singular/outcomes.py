@@ -443,7 +443,7 @@ def _outcome_at(
     limits: Range,
     tracked: AlongCurves = NOTHING_TRACKED,
 ) -> Hypersurface:
-    """The outcome for the hypersurface with these tangents at a point, with its singularity pattern."""
+    """The outcome and the singularity pattern of the hypersurface with these tangents at a point."""
     full_rank = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
     curve = TestCurve(equations, point, direction, limits, tracked)

@@ -361,7 +361,7 @@ class Patterns:
 
     @property
     def word_text(self) -> str:
-        """A note on the steps in these sentences if they are steps of single maps; else empty."""
+        """A note on the steps in `sentences` if they are steps of single maps; else empty."""
         return self.word.text if self.word is not None and self.word.length > 1 and self.series else ""
 
     @property

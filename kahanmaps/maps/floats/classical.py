@@ -180,7 +180,7 @@ class FieldProgram:
                 self.terms[-1].append((to_float(coefficient), indices))
 
     def __call__(self, x: Sequence[Any], degrees: tuple[int, ...] = (0, 1, 2)) -> Any:
-        """Return f(x), or the sum of its terms of these degrees."""
+        """Return f(x), or the sum of the terms of the given degrees."""
         kept = [[(c, indices) for c, indices in row if len(indices) in degrees] for row in self.terms]
         return [_sum(c * reduce(lambda a, k: a * x[k], indices, 1.0) for c, indices in row) for row in kept]
 

@@ -217,7 +217,7 @@ class ConstantRows:
         self._free_part = _submatrix(integers, row_indices, range(len(row_indices), n))
 
     def reduce(self, matrix: fmpz_mat, rhs: fmpz_mat, scale: fmpz) -> tuple[fmpz_mat, fmpz_mat]:
-        """Return the Schur complement and its right side: a system for `scale` times the other coordinates.
+        """Return the Schur complement and its right-hand side: a system for `scale` times the other coordinates.
 
         `scale` is the factor in front of A in the matrix. The system may be empty.
         """

@@ -438,7 +438,7 @@ class Trajectory(HtmlDisplay):
         return end
 
     def _written_to(self, writer: Writer) -> Iterator[int]:
-        """Write the points, those of a float orbit in portions; yield the number of each step that was computed."""
+        """Write the points (of a float orbit in portions); yield the number of each step that was computed."""
         if self.arithmetic.kind == "float" and self._request.at is None and not self.integrals:
             count, every = 0, self._request.every
             for step, points in self.orbit.portions():

@@ -301,7 +301,7 @@ def compare(
     value, count = rational(value), either(steps=steps, n=n)
     count = 10_000 if count is None else count
     if value == 0:
-        raise InputError("found eps = 0, expected another number: nothing moves")
+        raise InputError("found eps = 0, expected another number: at eps = 0 no method moves a point")
     if not isinstance(count, int) or not 1 <= count <= MAX_STEPS:
         raise InputError(f"found {count} steps, expected 1 to {MAX_STEPS}")
     starts = _starts(field, either(start=start, x0=x0), value, seed)
@@ -406,7 +406,7 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
 def _methods(
     file: SystemFile, eps: fmpq, starts: Sequence[Any], requested: Sequence[str] | None, kernel: str | None
 ) -> tuple[list[str], dict[str, str], Callable[[str, fmpq, int, int], FloatEnsemble]]:
-    """Return the methods, the reasons for those left out, and how to start the first orbits at an eps by a method."""
+    """Return the methods, the reasons for omitted ones, and a function that starts the first orbits by a method."""
     if isinstance(requested, str) or not hasattr(requested or (), "__iter__"):
         raise InputError(f"found methods = {requested!r}, expected a list such as ['kahan', 'rk4']")
     names = list(dict.fromkeys(DEFAULT_METHODS if requested is None else requested))

@@ -96,7 +96,7 @@ class DarbouxSpace:
 
     @property
     def places(self) -> list[int]:
-        """The indices of these monomials."""
+        """The indices of the monomials that occur in the space."""
         return [k for k, entries in enumerate(zip(*self.basis, strict=True)) if any(entries)]
 
     @property

@@ -94,7 +94,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class FlowAndMap:
-    """A comparison of the flow with its map.
+    """A comparison of the integrals of a flow and of its Kahan map.
 
     The known integrals of the flow are `limits`, to which integrals of the map tend, and `other_integrals`; together
     they are independent. The map has `count` integrals; for `without_limit` of them no limit is known. `search` is the
@@ -194,7 +194,7 @@ class FlowAndMap:
 
 
 def _short(function: RationalFunction, max_terms: int) -> str:
-    """Return the formula, or its numbers of terms if it has more than `max_terms`."""
+    """Return the formula, or the numbers of its terms if there are more than `max_terms`."""
     sizes = len(function.numerator), len(function.denominator)
     return format_factored(function) if sum(sizes) <= max_terms else f"P/Q with {sizes[0]} and {sizes[1]} terms"
 

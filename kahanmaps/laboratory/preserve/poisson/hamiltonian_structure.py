@@ -281,7 +281,7 @@ class InheritedIntegrals:
         return rows
 
     def count(self, map_: ModularMap) -> int:
-        """Return the rank of their gradients at a random point, a lower bound of the number of integrals of the map."""
+        """Return the rank of the gradients of the integrals at a random point, a lower bound of their number."""
         return rank(self.gradients(map_, map_.random_point()), map_.prime)
 
     def hamiltonian(self, k: int) -> fmpq_mpoly:

@@ -203,7 +203,7 @@ def orbit_curve(
         family, integrals: the map for every eps, and its claimed integrals. In the plane their level curves are used
             for orbits that are periodic or special, after a proof that they are integrals.
 
-    Raises UnknownCurve if no curve was found, InputError if it is not, and the orbit is finite.
+    Raises UnknownCurve if no curve was found, or InputError if this is because the orbit is finite.
 
     >>> from kahanmaps.documents.inline import as_file
     >>> curve = orbit_curve(as_file("mcmillan").map.at(fmpq(1), QQ), [fmpq(1, 3), fmpq(2, 5)])
