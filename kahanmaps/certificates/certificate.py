@@ -81,9 +81,14 @@ class Certificate(str):
     seconds: float
 
     @classmethod
-    def of(cls, checker: str, claims: Sequence[Claim], header: Sequence[str], terms: int) -> Certificate:
+    def of(
+        cls, checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
+    ) -> Certificate:
         """Write the script; `terms` is the number of terms of the products that it multiplies out."""
-        text = cls(CHECKERS[checker](claims, header))
+        pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
+        about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
+        left_out = [f"Not in this certificate: {reason}" for reason in skipped]
+        text = cls(CHECKERS[checker](claims, [*header, *about, *left_out]))
         text.claims = tuple(claim.name for claim in claims)
         start, by_byte, by_term = _SECONDS[checker]
         text.seconds = start + by_byte * len(text.encode()) + by_term * terms
@@ -157,10 +162,8 @@ def certificate(
         formulas, data = _prepared(file, checker)
         planes, proved = _Planes(file, data), list[Claim]()
         if commute is not None:
-            if (
-                any(other is not None for other in (claims, integrals, density, tensor, period, equivalent))
-                or everything
-            ):
+            others = (claims, integrals, density, tensor, period, equivalent)
+            if everything or any(other is not None for other in others):
                 raise InputError("a certificate that two maps commute cannot be combined with other claims")
             proved = _commuting(file, data, commute)
         if equivalent is not None:
@@ -212,7 +215,7 @@ def certificate(
                 f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
                 f"or search with kahanmaps find-integrals {file.name} --toml"
             )
-        return _written(checker, proved, formulas.header(command), skipped, limits.terms)
+        return Certificate.of(checker, proved, formulas.header(command), skipped, limits.terms)
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
@@ -282,8 +285,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
         type(part).__name__: partial(_claims_of, part, data) for part in parts if part is not None
     }
     if isinstance(result, Analysis) and result.conclusion.kind == "not integrable" and data.dim == 2:
-        inverse = data.with_rows(formulas.map.inverse_rows)
-        finds[ENTROPY] = lambda: [positive_entropy(data, inverse, checker == "rocq")]
+        finds[ENTROPY] = dict(_known_claims(formulas, _Planes(file, data), checker))[ENTROPY]
     with limited(1) as limits:
         for name, find in finds.items():
             try:
@@ -296,17 +298,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
                 skipped.append(f"{name}: {error}")
     if not claims:
         raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
-    return _written(checker, claims, formulas.header(command), skipped, limits.terms)
-
-
-def _written(
-    checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
-) -> Certificate:
-    """The script; the comment on top also says what the claims are about, and which ones it does not have."""
-    pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
-    about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
-    left_out = [f"Not in this certificate: {text}" for text in skipped]
-    return Certificate.of(checker, claims, [*header, *about, *left_out], terms)
+    return Certificate.of(checker, claims, formulas.header(command), skipped, limits.terms)
 
 
 def _of_check(result: Report | Finding, checker: str, command: str) -> Certificate:
