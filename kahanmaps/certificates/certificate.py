@@ -81,9 +81,14 @@ class Certificate(str):
     seconds: float
 
     @classmethod
-    def of(cls, checker: str, claims: Sequence[Claim], header: Sequence[str], terms: int) -> Certificate:
+    def of(
+        cls, checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
+    ) -> Certificate:
         """Write the script; `terms` is the number of terms of the products that it multiplies out."""
-        text = cls(CHECKERS[checker](claims, header))
+        pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
+        about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
+        left_out = [f"Not in this certificate: {reason}" for reason in skipped]
+        text = cls(CHECKERS[checker](claims, [*header, *about, *left_out]))
         text.claims = tuple(claim.name for claim in claims)
         start, by_byte, by_term = _SECONDS[checker]
         text.seconds = start + by_byte * len(text.encode()) + by_term * terms
@@ -120,8 +125,8 @@ def certificate(
         claims: names of integrals of the file, "modified_hamiltonian" or "H0", "H1", ... for those that theorems give,
             "volume" for the invariant volume form, "poisson" for a Poisson tensor; "integrals", "density", "darboux"
             (Darboux polynomials up to degree 2), "symmetry" and "equivalence" (to a system of the catalogue) for what a
-            search finds and proves; "entropy" for positive entropy of a map of the plane, for gp and sympy. None for
-            all that need no search, or for the following alone if these are given.
+            search finds and proves; "entropy" for positive entropy of a map of the plane, from one theorem that is
+            assumed. None for all that need no search, or for the following alone if these are given.
         integrals: further rational functions of x and eps, as `check_integrals` takes them.
         density: phi, as `check_measure` takes it.
         tensor: a Poisson tensor, as `check_poisson` takes it.
@@ -157,10 +162,8 @@ def certificate(
         formulas, data = _prepared(file, checker)
         planes, proved = _Planes(file, data), list[Claim]()
         if commute is not None:
-            if (
-                any(other is not None for other in (claims, integrals, density, tensor, period, equivalent))
-                or everything
-            ):
+            others = (claims, integrals, density, tensor, period, equivalent)
+            if everything or any(other is not None for other in others):
                 raise InputError("a certificate that two maps commute cannot be combined with other claims")
             proved = _commuting(file, data, commute)
         if equivalent is not None:
@@ -178,14 +181,14 @@ def certificate(
             matrix = claimed_tensor(file, tensor)
             assert matrix is not None
             proved.append(invariant_tensor(data, "P", matrix.rows))
-        known = dict(_known_claims(formulas, planes))
+        known = dict(_known_claims(formulas, planes, checker))
         searches = {name: search for name, search in _SEARCHES.items() if name not in known}
         is_required = claims is not None
         if claims is None:
             claims = [] if proved and not everything else [*known, *(searches if everything else ())]
             unwanted = {UNPROVED, DETERMINANT} | (set() if file.is_quadratic else {"symmetry", "equivalence"})
             has_integral = bool(formulas.integrals) or formulas.H is not None  # hence no positive entropy
-            unwanted |= {ENTROPY} if has_integral or checker == "rocq" or not everything else set()
+            unwanted |= {ENTROPY} if has_integral or not everything else set()
             claims = [name for name in claims if name not in unwanted]
         skipped = []
         for name in claims:
@@ -212,7 +215,7 @@ def certificate(
                 f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "
                 f"or search with kahanmaps find-integrals {file.name} --toml"
             )
-        return _written(checker, proved, formulas.header(command), skipped, limits.terms)
+        return Certificate.of(checker, proved, formulas.header(command), skipped, limits.terms)
 
 
 def known_claims(file: SystemFile, check: str) -> list[str]:
@@ -282,9 +285,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
         type(part).__name__: partial(_claims_of, part, data) for part in parts if part is not None
     }
     if isinstance(result, Analysis) and result.conclusion.kind == "not integrable" and data.dim == 2:
-        inverse = data.with_rows(formulas.map.inverse_rows)
-        if checker != "rocq":
-            finds[ENTROPY] = lambda: [positive_entropy(data, inverse)]
+        finds[ENTROPY] = dict(_known_claims(formulas, _Planes(file, data), checker))[ENTROPY]
     with limited(1) as limits:
         for name, find in finds.items():
             try:
@@ -297,17 +298,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
                 skipped.append(f"{name}: {error}")
     if not claims:
         raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
-    return _written(checker, claims, formulas.header(command), skipped, limits.terms)
-
-
-def _written(
-    checker: str, claims: Sequence[Claim], header: Sequence[str], skipped: Sequence[str], terms: int
-) -> Certificate:
-    """The script; the comment on top also says what the claims are about, and which ones it does not have."""
-    pairs = [(claim.name, getattr(claim, "about", "")) for claim in claims]
-    about = [f"{name}: {text}" for name, text in dict.fromkeys(pairs) if text]
-    left_out = [f"Not in this certificate: {text}" for text in skipped]
-    return Certificate.of(checker, claims, [*header, *about, *left_out], terms)
+    return Certificate.of(checker, claims, formulas.header(command), skipped, limits.terms)
 
 
 def _of_check(result: Report | Finding, checker: str, command: str) -> Certificate:
@@ -383,7 +374,9 @@ def _equivalence(file: SystemFile, data: MapData, other: SystemFile, by: Sequenc
     return affine_symmetry(data, "equivalence", S, [P[zero] for P in T], target=target, about=about)
 
 
-def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
+def _known_claims(
+    formulas: Formulas, planes: _Planes, checker: str = ""
+) -> Iterator[tuple[str, Callable[[], list[Claim]]]]:
     """The claims of the file and those that theorems give: functions, by name, that find the identities."""
     H, file, data = formulas.H, formulas.file, planes.data
 
@@ -402,7 +395,8 @@ def _known_claims(formulas: Formulas, planes: _Planes) -> Iterator[tuple[str, Ca
         volume = VOLUME if formulas.density is None else DETERMINANT
         yield volume, lambda: [invariant_volume(data, volume, _polynomial(data.determinant))]
     if data.dim == 2:
-        yield ENTROPY, lambda: [positive_entropy(data, data.with_rows(formulas.map.inverse_rows))]
+        is_short = checker == "rocq"  # which takes a second for a hundred terms
+        yield ENTROPY, lambda: [positive_entropy(data, data.with_rows(formulas.map.inverse_rows), is_short)]
     if file.hamiltonian is not None:
         is_theorem = poisson_tensor_invariant(file.hamiltonian, file.member) is not None
         name = TENSOR if is_theorem else UNPROVED

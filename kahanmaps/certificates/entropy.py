@@ -45,10 +45,13 @@ class PositiveEntropy(Claim):
     degree: int
     line_degree: int
     lower: Fraction
+    about = 'follows from one theorem, which is assumed: docs/mathematics.md, "Positive entropy, proved in the plane"'
 
 
-def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
+def positive_entropy(data: MapData, inverse: MapData, is_short: bool = False) -> PositiveEntropy:
     """The degrees that prove that the dynamical degree is more than 1, for a map of the plane and its inverse.
+
+    Those of the best bound within the limits or, if `is_short`, of the first one above 1.
 
     Raises:
         InputError: if such degrees are not found within the limits, which proves nothing.
@@ -67,7 +70,7 @@ def positive_entropy(data: MapData, inverse: MapData) -> PositiveEntropy:
             bound = lower_bound(degrees[2 * n], _degree(iterates[n - 1]), n)
             if bound is not None and (best is None or float(bound) > best[0]):
                 best = float(bound), n, degrees[2 * n], Fraction(round_up(bound.lower(), -1))
-            if n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
+            if (is_short and best) or n >= _MAX_STEPS or max(map(len, iterates[-1])) > _MAX_TERMS:
                 break
             inner, context = iterates[-1], first[0].context()
             images = [inner[0], inner[1], *context.gens()[2:-1], inner[2]]
@@ -110,9 +113,20 @@ def _without_common_factor(forms: Sequence[fmpq_mpoly]) -> tuple[tuple[fmpq_mpol
     return tuple(form / common for form in forms), common
 
 
-def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly]) -> list[nmod_poly]:
-    """The image of a curve modulo the prime, without its common factor. Raises InputError if it is 0."""
-    powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], PRIME)} for _ in curve]
+def image_degree(forms: Sequence[fmpq_mpoly], steps: int, prime: int) -> int | None:
+    """The degree of the image of the line after some steps modulo a prime; None where it is undefined."""
+    line = [nmod_poly(list(point), prime) for point in LINE]
+    try:
+        for _ in range(steps):
+            line = _image(forms, line, prime)
+    except InputError:
+        return None
+    return max(X.degree() for X in line)
+
+
+def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int = PRIME) -> list[nmod_poly]:
+    """The image of a curve modulo the prime, without its common factor. Raises InputError where it is 0."""
+    powers: list[dict[int, nmod_poly]] = [{0: nmod_poly([1], prime)} for _ in curve]
 
     def power(k: int, exponent: int) -> nmod_poly:
         if exponent not in powers[k]:
@@ -121,12 +135,12 @@ def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly]) -> list[nmod
 
     values = []
     for form in forms:
-        total = nmod_poly([], PRIME)
+        total = nmod_poly([], prime)
         for exponents, coefficient in form.terms():
             x, y, *constants, eps, h = map(int, exponents)
             if any(constants):
                 raise InputError("expected numbers for all parameters to certify positive entropy")
-            scalar = int(coefficient.p) * pow(EPS, eps, PRIME)
+            scalar = int(coefficient.p) * pow(EPS, eps, prime)
             total += power(0, x) * power(1, y) * power(2, h) * scalar
         values.append(total)
     common = reduce(nmod_poly.gcd, values)

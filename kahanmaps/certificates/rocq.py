@@ -23,6 +23,7 @@ from kahanmaps.certificates.darboux import (
     InvariantVolume,
     Monomial,
 )
+from kahanmaps.certificates.entropy import PositiveEntropy
 from kahanmaps.certificates.identities import (
     Claim,
     EquationClaim,
@@ -31,7 +32,7 @@ from kahanmaps.certificates.identities import (
     letters_of,
     restricted,
 )
-from kahanmaps.errors import InputError
+from kahanmaps.certificates.rocq_entropy import LIBRARY, entropy_proof
 
 _LEMMA = """\
 Lemma equal_fractions : forall a b c d : R, b <> 0 -> d <> 0 -> a * d = c * b -> a / b = c / d.
@@ -585,13 +586,9 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
     safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
+    lines += [LIBRARY] if any(isinstance(claim, PositiveEntropy) for claim in claims) else []
     groups: dict[tuple[int, ...], list[Claim]] = {}  # by map: its equation and Cramer's rule are stated once
     for k, claim in enumerate(claims, 1):
-        if type(claim) not in _PROOFS:
-            raise InputError(
-                f"{claim.name} is certified for gp and sympy only, as the standard library of Coq has no degrees of "
-                "rational maps: ask for --for gp"
-            )
         own = k if isinstance(claim, Chain) else 0
         groups.setdefault((id(claim.data), isinstance(claim, EquationClaim), own), []).append(claim)
     theorems = list[str]()
@@ -624,6 +621,7 @@ _PROOFS: dict[type[Claim], tuple[Any, str]] = {
     AffineSymmetry: (_Script.symmetric, "symmetry"),
     Chain: (_Script.chain, "everywhere"),
     ChangedFunction: (_Script.changed, "coordinates"),
+    PositiveEntropy: (lambda *arguments: [*entropy_proof(*arguments)], "exponential"),
 }
 
 

@@ -45,6 +45,7 @@ from kahanmaps.certificates.darboux import (
     darboux_polynomial,
     invariant_volume,
 )
+from kahanmaps.certificates.entropy import positive_entropy
 from kahanmaps.certificates.identities import (
     FalseClaim,
     InvariantTensor,
@@ -202,12 +203,18 @@ def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(che
     assert run(checker, text, tmp_path).returncode == 0
     (claim,) = _claims_of(result, _prepared(EQUIVALENT, checker)[1])
     one = claim.image[0] ** 0
-    singular = replace(claim, image=(one * 0, one * 0), matrix=((0, 0), (0, 0)))
     shifted = replace(claim, image=(claim.image[0] + one, claim.image[1]))
-    target = claim.target.rows
-    other = replace(claim, target=replace(claim.target, rows=((*target[0][:-1], target[0][-1] + 1), target[1])))
-    for wrong in (changed(claim), singular, shifted, other):
-        assert run(checker, CHECKERS[checker]([wrong]), tmp_path).returncode != 0
+    rows = claim.target.rows
+    other = replace(claim, target=replace(claim.target, rows=((*rows[0][:-1], rows[0][-1] + 1), rows[1])))
+    wrong = [CHECKERS[checker]([false]) for false in (changed(claim), shifted, other)]
+    if checker == "rocq":
+        singular = text.replace("(4 * x_new - 8)", "(0 * x_new - 8)", 1)  # in the theorem that T is onto
+        assert singular.index("_is_onto") < singular.index("(0 * x_new - 8)") < singular.index("Proof. intros x y.")
+    else:
+        false = replace(claim, image=(one * 0, one * 0), matrix=((0, 0), (0, 0)))
+        singular = CHECKERS[checker]([false])
+    for false in (*wrong, singular):
+        assert run(checker, false, tmp_path).returncode != 0
 
 
 @pytest.mark.parametrize("checker", ["gp", "sympy"])
@@ -243,6 +250,9 @@ def test_a_period_is_accepted_and_refused_with_one_coefficient_changed(checker, 
     assert run(checker, CHECKERS[checker]([replace(chain, values=values)]), tmp_path).returncode != 0
 
 
+POSITIVE = ["lotka_volterra", "fibonacci", "zander_120", "lotka_volterra_symplectic_euler"]
+
+
 @pytest.mark.parametrize("checker", ["gp", "sympy"])
 @pytest.mark.parametrize("name", ["lotka_volterra", "fibonacci", "hietarinta_viallet"])
 def test_positive_entropy_is_accepted_and_refused_with_one_number_changed(name, checker, tmp_path):
@@ -263,10 +273,39 @@ def test_positive_entropy_is_accepted_and_refused_with_one_number_changed(name, 
     assert 1 < claim.lower < Fraction(bounds.upper)
 
 
-def test_positive_entropy_is_not_certified_for_rocq_nor_for_integrable_maps():
-    refuses("entropy is certified for gp and sympy only", certificate, load("lotka_volterra"), "rocq", ["entropy"])
+def test_positive_entropy_is_not_certified_for_integrable_maps():
     for name in ("nahm_octahedral", "mcmillan", "zander_111"):
-        refuses("which proves nothing", certificate, load(name), "gp", ["entropy"])
+        for checker in ("gp", "rocq"):
+            refuses("which proves nothing", certificate, load(name), checker, ["entropy"])
+
+
+@pytest.mark.parametrize("name", ["hietarinta_viallet", *(pytest.param(n, marks=pytest.mark.slow) for n in POSITIVE)])
+def test_coq_accepts_positive_entropy_from_one_axiom(name, tmp_path):
+    done = run("rocq", certificate(load(name), "rocq", ["entropy"]), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert re.findall(r"^\w+(?=$|\n? : )", done.stdout.replace("Axioms:", ""), flags=re.MULTILINE)[-1] == (
+        "degrees_grow_exponentially"
+    )
+
+
+@pytest.mark.slow
+def test_coq_refuses_positive_entropy_with_one_number_changed(tmp_path):
+    file = load("hietarinta_viallet")
+    data = _prepared(file, "rocq")[1]
+    claim = positive_entropy(data, data.with_rows(file.map.inverse_rows), is_short=True)
+    text, (first, *others) = CHECKERS["rocq"]([claim]), claim.forms[-1]
+    wrong = [
+        replace(claim, lower=claim.lower + Fraction(1, 100)),
+        replace(claim, forms=(*claim.forms[:-1], (first * 2, *others))),
+        replace(claim, factors=(*claim.factors[:-1], claim.factors[-1] * 2)),
+        replace(claim, inverse=(claim.inverse[0] + claim.inverse[2], *claim.inverse[1:])),
+    ]
+    texts = [CHECKERS["rocq"]([other]) for other in wrong]
+    for old, new in (("= Some 73%nat", "= Some 74%nat"), ("prime 1009", "prime 1011"), ("1009", "1011")):
+        assert old in text
+        texts.append(text.replace(old, new))
+    for other in texts:
+        assert run("rocq", other, tmp_path).returncode != 0
 
 
 def test_maps_that_do_not_commute_and_false_periods_have_no_certificate():

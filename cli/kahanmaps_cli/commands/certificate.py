@@ -29,7 +29,7 @@ _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certifica
     multiple=True,
     help="Certify this claim: an integral of the file, modified_hamiltonian, H0, H1, ..., volume, poisson (default: "
     "all of these); or all that a search proves: integrals, density, poisson, darboux, symmetry, equivalence (to a "
-    "system of the catalogue); or entropy: positive entropy of a planar map (gp and sympy).",
+    "system of the catalogue); or entropy: positive entropy of a planar map.",
 )
 @click.option("--all", "everything", is_flag=True, help="Certify all of these claims, with the searches.")
 @integral_option("Certify that this function of x and eps is an integral.", into="integrals")
