@@ -53,7 +53,7 @@ def plot_rotation(
     """
     if integer(points, "points") < 2:
         raise InputError(f"found {points} points, expected at least 2")
-    map_over, integrals = file.at(eps), file.integrals
+    map_over, integrals, normal_form = file.at(eps), file.integrals, file.normal_form
     if against is not None and against not in integrals:
         known = ", ".join(integrals) or "it declares none"
         raise InputError(f"found no integral {quoted(against)} of {file.name}, expected one that it declares: {known}")
@@ -65,8 +65,8 @@ def plot_rotation(
         at = position if against is None else integrals[against].value(QQ, (*start, map_over.eps))
         rotations: dict[str, Rotation] = {}
         try:
-            if not isinstance(file.normal_form, NoNormalForm):
-                rotations = rotation_numbers(file.normal_form, map_over.eps, start)
+            if not isinstance(normal_form, NoNormalForm):
+                rotations = rotation_numbers(normal_form, map_over.eps, start)
             elif (curve := orbit_curve(map_over, start, file.map, list(integrals.values()))).rotation is not None:
                 rotations[""] = Rotation("", (curve.rotation,), curve.iterate * curve.steps)
         except (PrecisionLost, UnknownCurve, InputError):  # an orbit that is finite, ends, or has no known curve

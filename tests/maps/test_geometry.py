@@ -18,7 +18,7 @@ from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.reduction import bad_primes_of_plane
 from kahanmaps.family.random_members import random_member_with_chi
 from kahanmaps.maps.normal_form.closure import closure, excluded_relations
-from kahanmaps.maps.normal_form.geometry import rotations_of
+from kahanmaps.maps.normal_form.geometry import geometry_of, rotations_of
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
@@ -319,3 +319,13 @@ def test_bad_primes_over_number_fields_agree_with_pari(modulus):
         result = bad_primes_of_plane(gamma)
         assert set(result.bad) <= primes <= {*result.bad, *result.undecided}
         assert all(p < 5 or K.chi.discriminant().p % p == 0 for p in result.undecided)
+
+
+def test_the_planes_are_those_of_the_declared_matrix():
+    """A recognized member may have another A, with the same planes at other roots."""
+    declared, start = load("paper_m3"), [1, 2, 3, 4, 5, 6]
+    named = {plane.name: plane.j for plane in geometry(declared, start, "1/300").planes}
+    by_command = geometry_of(declared.normal_form, "1/300", start)
+    recognized = geometry(declared.system, start, "1/300")
+    assert named == {plane.name: plane.j for plane in by_command.planes}
+    assert sorted(named.values()) == sorted(plane.j for plane in recognized.planes)
