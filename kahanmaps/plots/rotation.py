@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 _ASPECT = 0.62
 _SPACING = 0.05  # of marked resonances, relative to the height of the axes
+_LEAST, _MAX_DENOMINATOR = 3, 1000  # of them
 
 
 def plot_rotation(
@@ -47,13 +49,13 @@ def plot_rotation(
     A system with a normal form has a rotation number for each real root of chi, unless the level is singular; for other
     maps it is that of the curve of genus 1 or 0 that contains the orbit, if one is found. Solid lines belong to the
     map, dashed lines to an iterate of it, such as the second one where the map exchanges two real components, dotted
-    lines to the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal lines mark some 1/n.
+    lines to the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal lines mark resonances p/q.
 
     Raises InputError if no point has a rotation number, for fewer than two points, and for an unknown integral.
     """
     if integer(points, "points") < 2:
         raise InputError(f"found {points} points, expected at least 2")
-    map_over, integrals = file.at(eps), file.integrals
+    map_over, integrals, normal_form = file.at(eps), file.integrals, file.normal_form
     if against is not None and against not in integrals:
         known = ", ".join(integrals) or "it declares none"
         raise InputError(f"found no integral {quoted(against)} of {file.name}, expected one that it declares: {known}")
@@ -65,8 +67,8 @@ def plot_rotation(
         at = position if against is None else integrals[against].value(QQ, (*start, map_over.eps))
         rotations: dict[str, Rotation] = {}
         try:
-            if not isinstance(file.normal_form, NoNormalForm):
-                rotations = rotation_numbers(file.normal_form, map_over.eps, start)
+            if not isinstance(normal_form, NoNormalForm):
+                rotations = rotation_numbers(normal_form, map_over.eps, start)
             elif (curve := orbit_curve(map_over, start, file.map, list(integrals.values()))).rotation is not None:
                 rotations[""] = Rotation("", (curve.rotation,), curve.iterate * curve.steps)
         except (PrecisionLost, UnknownCurve, InputError):  # an orbit that is finite, ends, or has no known curve
@@ -113,15 +115,25 @@ def plot_rotation(
         axes.set_ylim(low, high)
         if against is None:
             axes.set_xlim(0, 1)
-        for n in range(2, 1000):
-            if 1 / (n - 1) - 1 / n < _SPACING * (high - low):
-                break
-            if low < 1 / n < high:
-                axes.axhline(1 / n, color="0.75", linewidth=0.4, zorder=1)
-                beside: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
-                axes.annotate(f"1/{n}", (1, 1 / n), (2, 0), **beside)
+        for value in _resonances(low, high):
+            axes.axhline(value, color="0.75", linewidth=0.4, zorder=1)
+            beside: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
+            axes.annotate(str(value), (1, value), (2, 0), **beside)
         axes.set_xlabel("position on the segment of initial points" if against is None else label_of(against))
         eps = rf", $\varepsilon = {label_number(map_over.eps)}$" if file.map.has_eps else ""
         axes.set_ylabel(rf"rotation number $\rho${eps}")
         legend_above(figure, *axes.get_legend_handles_labels(), style, max_columns=2)
     return figure
+
+
+def _resonances(low: float, high: float) -> list[Fraction]:
+    """Return fractions p/q between two numbers with the smallest q, up to twice the first or until there are three."""
+    marked: list[Fraction] = []
+    for q in range(2, _MAX_DENOMINATOR):
+        if len(marked) >= _LEAST and q > 2 * marked[0].denominator:
+            break
+        for p in range(math.ceil(low * q), math.floor(high * q) + 1):
+            value = Fraction(p, q)
+            if low < value < high and all(abs(value - other) >= _SPACING * (high - low) for other in marked):
+                marked.append(value)
+    return marked

@@ -1,5 +1,6 @@
 """Geometry of the level sets: j-invariants, rotation numbers and heights, each against an independent computation."""
 
+import itertools
 import math
 import random
 import shutil
@@ -17,8 +18,8 @@ from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.reduction import bad_primes_of_plane
 from kahanmaps.family.random_members import random_member_with_chi
-from kahanmaps.maps.normal_form.closure import closure, excluded_relations
-from kahanmaps.maps.normal_form.geometry import rotations_of
+from kahanmaps.maps.normal_form.closure import closure, excluded_relations, separating_prime
+from kahanmaps.maps.normal_form.geometry import geometry_of, rotations_of
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify
 from kahanmaps.maps.normal_form.planar_block import PlanarBlock
@@ -277,6 +278,7 @@ def test_the_orbit_is_dense_or_not_or_nobody_knows():
     torus = geometry(load("paper_m2"), [1, 2, 3, 5], "1/10").closure
     assert (torus.is_dense, torus.status) == (None, "supported")
     assert torus.bound > 1000
+    assert torus.to_json()["zariski_dense"] is True
     numbers = [arb(2).sqrt(), arb(3).sqrt()]
     assert closure([fmpq(3), fmpq(3)], [None, None], numbers).is_dense is False
     assert closure([fmpq(3), fmpq(32, 27)], [None, 5], numbers).is_dense is False
@@ -285,6 +287,22 @@ def test_the_orbit_is_dense_or_not_or_nobody_knows():
     assert closure([K.generator], [None], numbers).is_dense is None
     assert closure([K.generator], [None], [numbers[0], numbers[0] * 3]).status == "undecided"
     assert geometry(load("paper_m2"), [1, 2, 3, 4], "1/10").closure is None  # a level of three lines
+
+
+@pytest.mark.skipif(shutil.which("gp") is None, reason="PARI/GP (gp) is not installed")
+def test_a_prime_that_separates_curves_is_confirmed_by_pari():
+    gammas = [fmpq(3), fmpq(5, 2), fmpq(-4, 7)]
+    prime = separating_prime(fmpq_poly([-3, 1]) * fmpq_poly([fmpq(-5, 2), 1]) * fmpq_poly([fmpq(4, 7), 1]))
+    script = "".join(f"print(ellap(ellinit([0,9+3*({g}),0,48*({g}),64*({g})^2]),{prime}))\n" for g in gammas)
+    lines = subprocess.run(["gp", "-q"], input=script, capture_output=True, text=True, timeout=60).stdout.split()
+    discriminants = [int(line) ** 2 - 4 * prime for line in lines]
+    assert all(math.isqrt(x * y) ** 2 != x * y for x, y in itertools.combinations(discriminants, 2))
+
+
+def test_isomorphic_curves_are_not_separated():
+    """k -> (k + 2)/(k - 1) is an isomorphism of Hesse cubics: k = 2 and 4 have k^3 = 8 and 64, and the same j."""
+    assert separating_prime(fmpq_poly([7, 1]) * fmpq_poly([63, 1])) is None
+    assert separating_prime(fmpq_poly([7, 1]) * fmpq_poly([64, 1])) is not None
 
 
 @pytest.mark.parametrize(("third", "coefficient"), [(0, None), (7, 7), (5, 5)])
@@ -319,3 +337,13 @@ def test_bad_primes_over_number_fields_agree_with_pari(modulus):
         result = bad_primes_of_plane(gamma)
         assert set(result.bad) <= primes <= {*result.bad, *result.undecided}
         assert all(p < 5 or K.chi.discriminant().p % p == 0 for p in result.undecided)
+
+
+def test_the_planes_are_those_of_the_declared_matrix():
+    """A recognized member may have another A, with the same planes at other roots."""
+    declared, start = load("paper_m3"), [1, 2, 3, 4, 5, 6]
+    named = {plane.name: plane.j for plane in geometry(declared, start, "1/300").planes}
+    by_command = geometry_of(declared.normal_form, "1/300", start)
+    recognized = geometry(declared.system, start, "1/300")
+    assert named == {plane.name: plane.j for plane in by_command.planes}
+    assert sorted(named.values()) == sorted(plane.j for plane in recognized.planes)

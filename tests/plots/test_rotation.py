@@ -4,7 +4,7 @@ import pytest
 
 from kahanmaps import InputError, geometry, load
 from kahanmaps.algebra.fields import rational
-from kahanmaps.plots.rotation import plot_rotation
+from kahanmaps.plots.rotation import _resonances, plot_rotation
 
 MEMBER = load("paper_m2")
 
@@ -81,3 +81,14 @@ def test_the_horizontal_axis_may_be_an_integral():
 def test_without_a_known_curve_there_is_no_rotation_number():
     with pytest.raises(InputError, match="found no initial point with a rotation number"):
         plot_rotation(load("lorenz"), "1/10", [1, 1, 1], [2, 2, 2], points=2)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (0.1, 0.3, ["1/4", "1/5", "1/6", "1/7", "2/7", "1/8"]),
+        (0.2112, 0.2152, ["3/14", "7/33", "10/47"]),
+    ],
+)
+def test_resonances_have_the_smallest_denominators(low, high, expected):
+    assert [str(value) for value in _resonances(low, high)] == expected

@@ -37,8 +37,8 @@ def command(options: dict[str, Any], progress: SearchProgress) -> Drawing:
     real root of chi, or any map whose orbits lie on curves of genus 1 or 0. Solid
     lines belong to the map; dashed lines to an iterate of it, such as the second
     one where the map exchanges two real components; dotted lines to the flow of a
-    member. Horizontal lines mark some of the resonances 1/n. Initial points without
-    a rotation number are left out. See kahanmaps geometry --help.
+    member. Horizontal lines mark resonances p/q. Initial points without a rotation
+    number are left out. See kahanmaps geometry --help.
 
     Exit status: 0 done, 2 usage error.
     """

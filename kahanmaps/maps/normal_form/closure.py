@@ -1,24 +1,27 @@
-"""Whether an orbit is dense in the real components of the level set that it visits.
+"""Whether an orbit is dense in the real components of the level set that it visits, or Zariski dense.
 
 The orbit is dense if and only if no integers n_0 and n_i, not all n_i = 0, satisfy sum n_i rho_i = n_0 (Kronecker),
 where rho_i are the coordinates of the translation on the circles of which the components are products. On one circle it
 is enough that the translation has infinite order. For several circles no theorem is known that excludes all relations;
-balls exclude those with small coefficients. docs/mathematics.md, "Geometry of the level sets".
+balls exclude those with small coefficients. The orbit is Zariski dense if no two of the curves are isogenous, which one
+prime may prove. docs/mathematics.md, "Geometry of the level sets".
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from math import isqrt
 from typing import Any
 
-from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat
+from flint import arb, fmpq, fmpq_poly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.fields import RR
 
 _SCALE = 10**15  # the inverse of the accuracy of rotation numbers
 _SUPPORT = 10  # relations up to this size have to be excluded, or nothing is said
+_MAX_PRIME = 4000
 
 
 @dataclass(frozen=True)
@@ -26,12 +29,14 @@ class Closure:
     """Whether an orbit is dense in the components that it visits: True and False are proved, None is not decided.
 
     `bound` is the size of coefficients up to which relations of the rotation numbers are excluded (proved), if this is
-    all that is known.
+    all that is known. Modulo `prime` no two of the curves are isogenous, so that the orbit is Zariski dense (proved),
+    and the map has no further integral on the level set; None if no such prime was found or needed.
     """
 
     is_dense: bool | None
     reason: str
     bound: int | None = None
+    prime: int | None = None
 
     @property
     def status(self) -> str:
@@ -42,11 +47,19 @@ class Closure:
     def text(self) -> str:
         """A line of text."""
         verb = "not dense" if self.is_dense is False else "dense"
-        return f"{verb} in the real components that it visits ({self.status}: {self.reason})"
+        zariski = f"; Zariski dense (proved: no two curves are isogenous modulo {self.prime})" if self.prime else ""
+        return f"{verb} in the real components that it visits ({self.status}: {self.reason}){zariski}"
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return {"dense": self.is_dense, "status": self.status, "reason": self.reason, "bound": self.bound}
+        return {
+            "dense": self.is_dense,
+            "status": self.status,
+            "reason": self.reason,
+            "bound": self.bound,
+            "zariski_dense": True if self.is_dense or self.prime is not None else self.is_dense,
+            "prime": self.prime,
+        }
 
 
 def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequence[arb]) -> Closure:
@@ -61,16 +74,42 @@ def closure(gammas: Sequence[Any], orders: Sequence[int | None], numbers: Sequen
         return Closure(False, "a translation has finite order")
     values = fmpq_poly([1])
     for gamma in gammas:
-        own = fmpq_poly([-gamma, 1]) if isinstance(gamma, fmpq) else fmpq_poly(gamma.matrix.charpoly())
-        values *= own
+        values *= fmpq_poly([-gamma, 1]) if isinstance(gamma, fmpq) else fmpq_poly(gamma.matrix.charpoly())
     if values.gcd(values.derivative()).degree() > 0:
         return Closure(False, "gamma has the same value at two roots of chi, so the rotation numbers are dependent")
     if len(numbers) == 1:
         return Closure(True, "the translation of a circle has infinite order")
-    bound = excluded_relations(numbers)
+    bound, prime = excluded_relations(numbers), separating_prime(values)
     if bound < _SUPPORT:
-        return Closure(None, "the rotation numbers may be dependent")
-    return Closure(None, f"no integer relation of the rotation numbers has coefficients up to {bound}", bound)
+        return Closure(None, "the rotation numbers may be dependent", None, prime)
+    return Closure(None, f"no integer relation of the rotation numbers has coefficients up to {bound}", bound, prime)
+
+
+def separating_prime(values: fmpq_poly) -> int | None:
+    """Return a prime modulo which the curves of all roots gamma of a polynomial are good and no two are isogenous.
+
+    All roots have to lie in GF(p). The curves are not isogenous over an extension of GF(p) if the product of the
+    discriminants a^2 - 4p of their Frobenius maps is no square. None if there is no such prime below 4000.
+
+    >>> separating_prime(fmpq_poly([6, -5, 1])), separating_prime(fmpq_poly([9, -6, 1]))
+    (7, None)
+    """
+    numerator, denominator = values.numer(), values.denom()
+    for p in range(5, _MAX_PRIME):
+        if not fmpz(p).is_prime() or denominator % p == 0:
+            continue
+        roots = [-int(f[0]) for f, _ in nmod_poly(numerator, p).factor()[1] if f.degree() == 1]
+        if len(roots) < values.degree() or any(root % p in (0, 1) for root in roots):
+            continue
+        squares, discriminants = {x * x % p for x in range(1, p)}, []
+        for gamma in roots:
+            cubics = [(((x + 9 + 3 * gamma) * x + 48 * gamma) * x + 64 * gamma * gamma) % p for x in range(p)]
+            trace = sum(1 if y else 0 for y in cubics) - 2 * sum(y in squares for y in cubics)
+            discriminants.append(trace * trace - 4 * p)
+        products = (x * y for x, y in combinations(discriminants, 2))
+        if all(isqrt(product) ** 2 != product for product in products):
+            return p
+    return None
 
 
 def excluded_relations(numbers: Sequence[arb]) -> int:

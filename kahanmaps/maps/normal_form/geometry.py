@@ -24,9 +24,9 @@ from kahanmaps.algebra.reduction import BadPrimes, bad_primes_of_plane
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError, PrecisionLost
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.family.system_normal_form import SystemNormalForm, system_normal_form
+from kahanmaps.family.system_normal_form import SystemNormalForm
 from kahanmaps.maps.convention import either, resolve_eps
-from kahanmaps.maps.kahan import KahanFamily, SystemLike, as_map
+from kahanmaps.maps.kahan import SystemLike, as_map
 from kahanmaps.maps.normal_form.closure import Closure, closure
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify, torsion_order
@@ -259,12 +259,11 @@ def geometry(
     start = as_point(start, family.variables)
     if eps is not None and rational(eps) == 0:
         raise InputError("found eps = 0, expected a nonzero number: at 0 the map is the identity")
-    if isinstance(family, KahanFamily) and not family.system.symbols:
-        normal_form = system_normal_form(system)
-        if isinstance(normal_form, SystemNormalForm):
-            return geometry_of(normal_form, eps, start)
-    integrals = import_module("kahanmaps.documents.inline").as_file(system).integrals
-    return orbit_curve(family.at(fmpq(1) if eps is None else eps, QQ), start, family, list(integrals.values()))
+    file = import_module("kahanmaps.documents.inline").as_file(system)
+    normal_form = file.normal_form  # with the A of the file, if it declares one
+    if isinstance(normal_form, SystemNormalForm):
+        return geometry_of(normal_form, eps, start)
+    return orbit_curve(family.at(fmpq(1) if eps is None else eps, QQ), start, family, list(file.integrals.values()))
 
 
 def geometry_of(normal_form: SystemNormalForm | NormalForm, eps: Any, start: Sequence[Any]) -> LevelGeometry:

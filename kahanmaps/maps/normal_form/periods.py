@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from importlib import import_module
 from math import lcm
 from typing import Any
 
@@ -28,7 +29,7 @@ from kahanmaps.algebra.printing import all_fields
 from kahanmaps.display_protocols import PrintableResult
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm, system_normal_form
+from kahanmaps.family.system_normal_form import NoNormalForm, SystemNormalForm
 from kahanmaps.maps.convention import either, resolve_eps
 from kahanmaps.maps.kahan import SystemLike
 from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
@@ -333,7 +334,7 @@ def period(
 
 def normal_form_and_start(system: SystemLike, eps: Any, start: Any) -> tuple[SystemNormalForm, Any, Sequence[Any]]:
     """Return the normal form with eps and the initial point. Raises InputError if one of them is missing."""
-    normal_form = system_normal_form(system)
+    normal_form = import_module("kahanmaps.documents.inline").as_file(system).normal_form
     if isinstance(normal_form, NoNormalForm):
         raise InputError(f"found no normal form ({normal_form.reason}), expected a system that has one")
     if start is None or eps is None:
