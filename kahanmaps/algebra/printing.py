@@ -122,6 +122,7 @@ def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, 
     """Factor a function if that is shorter: return primitive polynomials with exponents, and a number; otherwise None.
 
     Numerator and denominator are each split into irreducible factors over Q, or into variables and one polynomial.
+    Factors of both are cancelled.
     """
     factors, constant, is_shorter = list[tuple[fmpq_mpoly, int]](), fmpq(1), False
     for sign, polynomial in ((1, function.numerator), (-1, function.denominator)):
@@ -135,8 +136,13 @@ def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, 
         choices = [powers, [*variables, *([(cofactor, 1)] if len(cofactor) > 1 else [])]]
         chosen = min(choices, key=lambda powers: len(format_product(powers)))
         is_shorter |= len(chosen) > 1 or any(k > 1 for _, k in chosen)
-        factors += [(g, sign * k) for g, k in chosen]
-    return (factors, constant) if is_shorter else None
+        for g, k in chosen:
+            same = next((n for n, (other, _) in enumerate(factors) if other == g), None)
+            if same is None:
+                factors.append((g, sign * k))
+            else:  # a common factor: rational functions are not reduced
+                factors[same] = g, factors[same][1] + sign * k
+    return ([(g, k) for g, k in factors if k], constant) if is_shorter else None
 
 
 def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _ONE) -> str:

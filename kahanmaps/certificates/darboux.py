@@ -245,7 +245,7 @@ def darboux_products(data: MapData, polynomials: Sequence[fmpq_mpoly], splits: b
         if factors is None:
             return None
         content, parts = factors
-        pieces.append((content, [(f, k, e, _monomial(C, data.determinant, known)) for f, k, e, C in parts]))
+        pieces.append((content, [(f, k, e, _monomial(C, data.determinant, k, known)) for f, k, e, C in parts]))
     count = len(known)
 
     def padded(constant: int, powers: Sequence[int]) -> Monomial:
@@ -292,10 +292,14 @@ def _with_cofactors(
     return content, result
 
 
-def _monomial(C: fmpq_mpoly, D: fmpq_mpoly, known: list[fmpq_mpoly]) -> tuple[int, list[int]]:
-    """C as a monomial in D and the `known` polynomials, to which new factors are added."""
+def _monomial(C: fmpq_mpoly, D: fmpq_mpoly, k: int, known: list[fmpq_mpoly]) -> tuple[int, list[int]]:
+    """C, with D^k P(N/D) = C P, as a monomial in D and the `known` polynomials, to which new factors are added."""
     power, rest = 0, C
-    if not D.is_constant() and gcd(*(int(c.p) for c in D.coeffs())) == 1:  # so that the quotients are over Z
+    if D.is_constant():  # then the powers of D in C are numbers; of 1 there are k, as in D^k
+        number, content = abs(int(D.coeffs()[0].p)), gcd(*(int(c.p) for c in C.coeffs()))
+        while content % number == 0 and power < k:
+            power, content, rest = power + 1, content // number, rest / D
+    elif gcd(*(int(c.p) for c in D.coeffs())) == 1:  # so that the quotients are over Z
         while (smaller := quotient(rest, D)) is not None:
             power, rest = power + 1, smaller
     constant, factors = rest.factor() if len(rest) <= _MAX_FACTORED_TERMS else (fmpq(1), [(rest, 1)])

@@ -483,6 +483,22 @@ def test_a_quotient_of_darboux_polynomials_with_different_cofactors_has_no_certi
     refuses("F is not conserved", certificate, load("lotka_volterra"), "gp", integrals={"F": "x/y"}, error=FalseClaim)
 
 
+@pytest.mark.parametrize("checker", CHECKERS)
+@pytest.mark.parametrize(
+    ("x_dot", "options"),
+    [
+        ("y^2", {"integrals": "y"}),
+        ("y^2/6", {"integrals": "(y^3 + y/2)/(y^2 + 1)"}),
+        ("y^2/3", {"integrals": "y^2", "density": "y^3"}),
+    ],
+)
+def test_maps_with_a_constant_determinant_have_certificates(x_dot, options, checker, tmp_path):
+    done = run(checker, certificate(System(f"x' = {x_dot}; y' = 0"), checker, **options), tmp_path)
+    assert done.returncode == 0
+    assert "false" not in done.stdout
+    refuses("not conserved", certificate, System(f"x' = {x_dot}; y' = 0"), checker, integrals="x + y", error=FalseClaim)
+
+
 def test_a_density_that_is_not_invariant_has_no_certificate():
     _, data = _prepared(load("lotka_volterra"), "gp")
     with pytest.raises(FalseClaim, match="dx/phi is not invariant"):
