@@ -19,6 +19,7 @@ from kahanmaps.algebra.fields import RR
 from kahanmaps.algebra.reduction import bad_primes_of_plane
 from kahanmaps.family.random_members import random_member_with_chi
 from kahanmaps.maps.normal_form.closure import closure, excluded_relations, separating_prime
+from kahanmaps.maps.normal_form.division import PeriodicLevels
 from kahanmaps.maps.normal_form.geometry import geometry_of, rotations_of
 from kahanmaps.maps.normal_form.level_curves import Jacobian
 from kahanmaps.maps.normal_form.periods import PeriodKind, classify
@@ -347,3 +348,25 @@ def test_the_planes_are_those_of_the_declared_matrix():
     recognized = geometry(declared.system, start, "1/300")
     assert named == {plane.name: plane.j for plane in by_command.planes}
     assert sorted(named.values()) == sorted(plane.j for plane in recognized.planes)
+
+
+@pytest.mark.parametrize(
+    ("cubic", "start", "order"),
+    [
+        ((-2, -1, -2, 0), ["-1/3", "1/3"], 5),
+        ((-2, -2, -2, 0), ["-1/3", "1/6"], 6),
+        ((-2, 0, 2, 0), ["-1/6", "0"], 12),
+    ],
+)
+def test_torsion_levels_are_those_of_the_division_polynomials(cubic, start, order):
+    """For eps = 1/2 the coordinates are (U, V); the rotation number is a multiple of 1/N, of 2/N for two components."""
+    result = geometry(hamiltonian_flow(*cubic), start, "1/2")
+    (plane,) = result.planes
+    assert (plane.order, plane.height) == (order, 0)
+    assert plane.gamma in PeriodicLevels(order).gammas
+    (rotation,) = plane.rotations
+    multiple = order * rotation.number / rotation.steps
+    assert (multiple - round(float(multiple.mid()))).contains(0)
+    assert result.closure.is_dense is False
+    shifted = geometry(hamiltonian_flow(*cubic), [start[0], "1/7"], "1/2").planes[0]
+    assert shifted.order is None
