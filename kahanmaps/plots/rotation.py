@@ -116,9 +116,9 @@ def plot_rotation(
         if against is None:
             axes.set_xlim(0, 1)
         for value in _resonances(low, high):
-            axes.axhline(value, color="0.75", linewidth=0.4, zorder=1)
+            axes.axhline(float(value), color="0.75", linewidth=0.4, zorder=1)
             beside: Any = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "va": "center"}
-            axes.annotate(str(value), (1, value), (2, 0), **beside)
+            axes.annotate(str(value), (1, float(value)), (2, 0), **beside)
         axes.set_xlabel("position on the segment of initial points" if against is None else label_of(against))
         eps = rf", $\varepsilon = {label_number(map_over.eps)}$" if file.map.has_eps else ""
         axes.set_ylabel(rf"rotation number $\rho${eps}")
