@@ -15,7 +15,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, PrecisionLost, UnknownCurve, quoted
 from kahanmaps.family.system_normal_form import NoNormalForm
 from kahanmaps.maps.normal_form.geometry import Rotation, rotation_numbers
-from kahanmaps.maps.orbits.relations.orbit_curve import orbit_curve
+from kahanmaps.maps.orbits.relations.orbit_curve import orbit_curve, require_rational
 from kahanmaps.plots.figures import drawing, label_number, label_of, legend_above, legend_height, new_figure
 from kahanmaps.plots.style import COLORS, LINES, Style
 
@@ -56,6 +56,7 @@ def plot_rotation(
     if integer(points, "points") < 2:
         raise InputError(f"found {points} points, expected at least 2")
     map_over, integrals, normal_form = file.at(eps), file.integrals, file.normal_form
+    require_rational(map_over)
     if against is not None and against not in integrals:
         known = ", ".join(integrals) or "it declares none"
         raise InputError(f"found no integral {quoted(against)} of {file.name}, expected one that it declares: {known}")

@@ -22,6 +22,9 @@ def test_components_and_density_are_proved_or_supported(kahanmaps):
     record = kahanmaps("geometry paper_m2 --start 1,2,3,5 --eps 1/10 --json").json
     assert record["components"] == 2
     assert (record["closure"]["dense"], record["closure"]["status"]) == (None, "supported")
+    text = kahanmaps("geometry paper_m3_irreducible --start 1,2,3,4,5,6 --eps 1/10").out
+    assert "0.74486177j, on a connected torus of real dimension 2\n" in text
+    assert "Zariski dense (proved: no two curves are isogenous modulo 211)" in text
 
 
 def test_a_system_that_is_not_declared_as_a_member_is_recognized(kahanmaps):

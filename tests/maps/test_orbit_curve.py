@@ -231,3 +231,10 @@ def test_periodic_and_special_orbits_have_a_curve(parameters, start, order):
 def test_a_finite_orbit_without_an_integral_determines_no_curve():
     with pytest.raises(InputError, match="the orbit has period 4"):
         km.geometry("harmonic", [1, 2], 1)
+
+
+def test_a_map_with_algebraic_parameters_is_refused():
+    system = km.load("euler_top").subs(a1="sqrt(2)")
+    for call in (km.geometry, lambda *arguments: km.plot.rotation(system, [1, 2, 3], [2, 2, 3], eps="1/10")):
+        with pytest.raises(InputError, match="expected rational parameters"):
+            call(system, [1, 2, 3], "1/10")

@@ -122,9 +122,11 @@ class PlaneGeometry:
             error = f"{self.height:.10g}" if is_accurate else f"{self.height:.5g} +/- {self.height_error:.1g}"
             lines.append(f"  canonical height\t{error}")
         for rotation in self.rotations:
-            of_second = ", of the second iterate: the map exchanges two real components" if rotation.steps == 2 else ""
+            note = ", of the second iterate: the map exchanges two real components" if rotation.steps == 2 else ""
+            if len(rotation.numbers) == 2:
+                note = ", on a connected torus of real dimension 2"
             numbers = ", ".join(x.str(12) for x in rotation.numbers)
-            lines.append(f"  rotation number\t{numbers} at t = {rotation.root}{of_second}")
+            lines.append(f"  rotation number\t{numbers} at t = {rotation.root}{note}")
             if rotation.component is not None:
                 lines.append(f"    initial point\ton the {rotation.component} component")
             if rotation.flow is not None:
@@ -196,7 +198,8 @@ class LevelGeometry(PrintableResult):
     def text(self) -> str:
         lines = [line for plane in self.planes for line in plane.lines()]
         if self.rank is not None:
-            lines.append(f"commuting maps\tgenerate a group of translations of rank {self.rank} (proved)")
+            where = "over the splitting field of chi they " if any(p.degree > 1 for p in self.planes) else ""
+            lines.append(f"commuting maps\t{where}generate a group of translations of rank {self.rank} (proved)")
         if self.components is not None:
             visits = {1: "", 2: ", the orbit visits both in turn"}
             in_turn = visits.get(self.components, ", the orbit visits two of them in turn")

@@ -203,13 +203,14 @@ def orbit_curve(
         family, integrals: the map for every eps, and its claimed integrals. In the plane their level curves are used
             for orbits that are periodic or special, after a proof that they are integrals.
 
-    Raises UnknownCurve if no curve was found, or InputError if this is because the orbit is finite.
+    Raises UnknownCurve if no curve was found, InputError if the orbit is finite or the map is not one over Q.
 
     >>> from kahanmaps.documents.inline import as_file
     >>> curve = orbit_curve(as_file("mcmillan").map.at(fmpq(1), QQ), [fmpq(1, 3), fmpq(2, 5)])
     >>> curve.genus, curve.curve.a4, curve.curve.a6, curve.rotation.str(8, radius=False)
     (1, -7323, 229622, '0.15215519')
     """
+    require_rational(map_over)
     point = IntegerPoint.from_rationals(map_over.point(start))
     # An initial point in special position leads to zeros among the first terms of the sequences.
     curve, later = None, point
@@ -247,6 +248,14 @@ def orbit_curve(
             f"and rational curves of degree at most {_MAX_RATIONAL_DEGREE} on which a coordinate is a parameter"
         )
     return result
+
+
+def require_rational(map_over: Map) -> None:
+    """Raise InputError for a map with algebraic parameters."""
+    if map_over.field is not QQ:
+        raise InputError(
+            f"found a map over {map_over.field}, expected rational parameters: curves are found over Q only"
+        )
 
 
 def _found_steps(map_over: Map, start: IntegerPoint) -> EllipticSteps | None:
