@@ -247,8 +247,7 @@ def singularities(
         if not map_at_eps.is_bilinear:
             raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
-                "such with equations that are linear in both points: of these the singularities are known by random "
-                "points"
+                "maps whose equations are linear in both points: their singularities are computed at random points"
             ) from None
         at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
         return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
