@@ -285,7 +285,7 @@ class Store(HtmlDisplay):
             raise StoreError(f"{self.name} is an SQLite database of another program, not one of results: left alone")
         if version not in FORMATS:
             raise StoreError(
-                f"{self.name} has the format {version} of kahanmaps databases, this version reads the formats "
+                f"{self.name} was written by format {version} of kahanmaps databases, this version reads formats "
                 f"{' and '.join(map(str, FORMATS))}: use the kahanmaps that wrote it, or begin another database"
             )
         return True
