@@ -1,6 +1,6 @@
-"""The floors of the house: imports point down, never up and never in circles, and loading a file loads nothing heavy.
+"""The layers of the library: imports point down, never up and never in circles, and loading a file loads nothing heavy.
 
-`violations` reads one file without running it, so an import inside a function counts for the floors too. Heavy
+`violations` reads one file without running it, so an import inside a function counts for the layers too. Heavy
 packages may be imported inside functions, where they cost only those who call them. What commands take from the library
 is listed.
 """
@@ -27,8 +27,8 @@ from kahanmaps.experiments.results.store import Store
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# From the ground up, one folder or file of kahanmaps/ a floor.
-FLOORS = [
+# The layers from the lowest on, one folder or file of kahanmaps/ each.
+LAYERS = [
     *("errors", "hints", "version", "sources", "display_protocols", "atomic_files", "processes", "hard_stop"),
     *("algebra", "function_calls", "systems", "family", "maps", "documents", "invariants"),
     *("checks", "paper", "laboratory", "experiments"),
@@ -66,7 +66,7 @@ def violations(path: str, source: str) -> list[str]:
     package = module[:-1]
     results = []
     for line, target in _imports(tree.body, package):
-        results += [f"{path}:{line}: {what}" for what in _off_floor(module, target.split("."))]
+        results += [f"{path}:{line}: {what}" for what in _off_layer(module, target.split("."))]
         if target.split(".")[0] in CLOCKS and path.startswith("kahanmaps/") and not path.startswith(WITH_A_CLOCK):
             results.append(f"{path}:{line}: reads a clock: answers would depend on the machine, count work instead")
     for line, target in _imports(tree.body, package, only_while_loading=True):
@@ -81,19 +81,19 @@ def violations(path: str, source: str) -> list[str]:
     return list(dict.fromkeys(results))
 
 
-def _off_floor(importer: list[str], target: list[str]) -> list[str]:
+def _off_layer(importer: list[str], target: list[str]) -> list[str]:
     if importer[0] == "kahanmaps" and target[0] in NEVER_IN_THE_LIBRARY:
         return [f"the library imports {target[0]}"]
     if importer[0] == "kahanmaps_cli" or target[0] != "kahanmaps" or importer == ["kahanmaps", "__init__"]:
         return []
-    if importer[1] not in FLOORS:
-        return [f"kahanmaps/{importer[1]} has no floor in FLOORS"]
+    if importer[1] not in LAYERS:
+        return [f"kahanmaps/{importer[1]} has no layer in LAYERS"]
     if target[1:] == ["__version__"]:  # set in kahanmaps/__init__.py before anything else; records carry it
         return []
-    if len(target) == 1 or target[1] not in FLOORS:
-        return [f"imports {'.'.join(target)}, which stands above all floors: import the module that defines it"]
-    if FLOORS.index(target[1]) > FLOORS.index(importer[1]):
-        return [f"{importer[1]} imports {target[1]}, a floor above"]
+    if len(target) == 1 or target[1] not in LAYERS:
+        return [f"imports {'.'.join(target)}, which stands above all layers: import the module that defines it"]
+    if LAYERS.index(target[1]) > LAYERS.index(importer[1]):
+        return [f"{importer[1]} imports {target[1]}, a layer above"]
     return []
 
 
@@ -131,7 +131,7 @@ def _is_type_checking(test: ast.expr) -> bool:
     return ast.unparse(test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
 
 
-def test_every_file_imports_its_own_floor_and_those_below():
+def test_every_file_imports_its_own_layer_and_those_below():
     results = []
     for path in python_files():
         results += violations(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
@@ -174,12 +174,12 @@ def test_a_circle_is_found_whatever_hides_it(back):
 MAPS = "kahanmaps/maps/kahan.py"
 
 WRONG = [
-    ("kahanmaps/algebra/fields.py", "from kahanmaps.maps.kahan import step", "imports maps, a floor above"),
-    ("kahanmaps/errors.py", "from .algebra import fields", "imports algebra, a floor above"),
-    (MAPS, "def f():\n    from kahanmaps.plots import draw", "imports plots, a floor above"),
-    (MAPS, "if TYPE_CHECKING:\n    from kahanmaps.checks import Claim", "imports checks, a floor above"),
-    (MAPS, "from kahanmaps import QuadraticSystem", "above all floors"),
-    ("kahanmaps/helpers.py", "from kahanmaps import errors", "has no floor"),
+    ("kahanmaps/algebra/fields.py", "from kahanmaps.maps.kahan import step", "imports maps, a layer above"),
+    ("kahanmaps/errors.py", "from .algebra import fields", "imports algebra, a layer above"),
+    (MAPS, "def f():\n    from kahanmaps.plots import draw", "imports plots, a layer above"),
+    (MAPS, "if TYPE_CHECKING:\n    from kahanmaps.checks import Claim", "imports checks, a layer above"),
+    (MAPS, "from kahanmaps import QuadraticSystem", "above all layers"),
+    ("kahanmaps/helpers.py", "from kahanmaps import errors", "has no layer"),
     (MAPS, "def f():\n    import click", "the library imports click"),
     (MAPS, "import numpy as np", "imports numpy while it is loaded"),
     (MAPS, "def f():\n    from time import monotonic", "reads a clock"),

@@ -210,7 +210,7 @@ def _orbit_integral(
     first: Sequence[fmpq_mpoly],
     second: Sequence[fmpq_mpoly],
 ) -> OrbitIntegral:
-    """The claim with integral coefficients, after its identity was verified by expansion."""
+    """The claim with integer coefficients, after its identity was verified by expansion."""
     n, names = data.dim, three_points(data)
     rows = [fmpq(1) / c for c in row_multiples(data)]
     multipliers = [[c * s for c, s in zip(side, rows, strict=True)] for side in (first, second)]

@@ -159,7 +159,7 @@ class InvariantVolume(Claim):
 
     @property
     def balance(self) -> tuple[Monomial, Monomial, Monomial]:
-        """Common, left and right with C D^(n + 1) = common left, B = common right; left = right D^n det L(x, N/D).
+        """The monomials c, l, r with C D^(n + 1) = c l and B = c r, so that l = r D^n det L(x, N/D).
 
         C and B are the cofactors of P and Q.
         """

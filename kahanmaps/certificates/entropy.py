@@ -145,5 +145,5 @@ def _image(forms: Sequence[fmpq_mpoly], curve: Sequence[nmod_poly], prime: int =
         values.append(total)
     common = reduce(nmod_poly.gcd, values)
     if not any(values):
-        raise InputError("the image of the line modulo a prime is undefined: no degrees are found")
+        raise InputError("the image of the line modulo a prime is undefined: no degrees are computed")
     return [value // common for value in values]

@@ -67,7 +67,7 @@ class _Script:
         return polynomial_text(polynomial, letters)
 
     def image_letters(self, at_n: bool) -> list[str]:
-        """The text of det x~: N, or the product itself, which Cramer's rule rewrites to N."""
+        """The text of det(M) x~: the letters of N, or the products, which Cramer's rule rewrites to N."""
         return [f"n{i + 1}" if at_n else f"(det * {name})" for i, name in enumerate(self.new)]
 
     @property
@@ -720,7 +720,7 @@ def _homogeneous_text(
 
 
 def _scaled_row(entry: fmpq_mpoly, script: _Script, dim: int, at_n: bool = False) -> str:
-    """det times an entry of L, which has degree at most 1 in x~, with det x~ (or N) in place of x~."""
+    """det times an entry of L, which has degree at most 1 in x~, with det(M) x~ (or N) in place of x~."""
     letters, image = [script.letters[name] for name in names_of(entry)], slice(dim, 2 * dim)
     letters[image] = script.image_letters(at_n)
     return _homogeneous_text(entry, letters, 1, image, "det")

@@ -127,7 +127,7 @@ def cycle_census(
     map_, prime, eps = as_map(system), integer(prime, "prime"), resolve_eps(eps, time_step, h)
     exact_eps = fmpq(1) if eps is None and not map_.has_eps else rational(eps)
     if steps < 1 or not 1 <= (DEFAULT_SAMPLES if samples is None else samples) <= MAX_SAMPLES:
-        raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES}, and at least 1")
+        raise InputError(f"found {samples} samples, {steps} steps, expected 1 to {MAX_SAMPLES} and 1 or more")
     space = _ProjectiveMap(map_, exact_eps, prime)
     census = Census(prime, exact_eps, map_.dim, sum(prime**m for m in range(map_.dim + 1)))
     if samples is None and census.points <= MAX_POINTS >> max(0, map_.dim - 6):

@@ -131,7 +131,7 @@ class Terms:
         """Return w(n), for n >= 1."""
         if n not in self._terms:
             if n < 5:
-                raise ArithmeticError("a term before the first")
+                raise ArithmeticError("found an index before the first term")
             low = 2 - n % 2
             i, j = (n + low) // 2, (n - low) // 2
             a, b = self.own_quotient(i), self._W.own_quotient(j)

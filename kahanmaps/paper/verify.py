@@ -143,7 +143,7 @@ def verify(
     """
     settings, options = Settings.of(settings, eps, time_step, h), options or VerifyOptions()
     if (system is None) == (m is None):
-        raise InputError("expected a member of the family, or m: half the dimension of the one in general")
+        raise InputError("expected a member of the family, or m, half the dimension of the generic member")
     file = None
     if system is None:
         if m is None or not 1 <= m <= MAX_M:

@@ -292,7 +292,9 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
         )
         return printable(str(record["system"])), growth
     except _UNREADABLE as error:
-        raise InputError(f"{where}: found degrees that cannot be read ({error}), expected those of degrees") from error
+        raise InputError(
+            f"{where}: found degrees that cannot be read ({error}), expected the output of 'degrees --json'"
+        ) from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,7 +363,9 @@ def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, .
                 HeightCurve(parse_number(orbit["eps"]), *numbers, kind, constant, ratio, str(orbit["status"]))
             )
     except _UNREADABLE as error:
-        raise InputError(f"{where}: found an orbit that cannot be read ({error}), expected one of heights") from error
+        raise InputError(
+            f"{where}: found an orbit that cannot be read ({error}), expected the output of 'heights --json'"
+        ) from error
     return tuple(curves)
 
 

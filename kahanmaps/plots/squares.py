@@ -178,7 +178,7 @@ def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = N
     g, note = matched(file, other)
     if eps2 is not None:
         if not other.is_quadratic or not isinstance(g, KahanFamily):
-            raise InputError(f"found eps2 with {other.map.kind}, expected a quadratic vector field, which it scales")
+            raise InputError(f"found eps2 with {other.map.kind}, expected it with a quadratic vector field")
         g = g.system
         if rational(eps2) == 0:
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")

@@ -45,10 +45,10 @@ def command(options: dict[str, Any], progress: Progress) -> Drawing:
       kahanmaps plot section henon_heiles --eps 1/50 --plane q1=0 \\
           --start 0,1/10,1/4,0 --start 0,1/5,1/5,1/10 --axes q2,p2 -o hh.png
 
-    The system has at least 3 variables. Between the points of an orbit the
-    crossing is interpolated by six of them; where the steps are too long for this,
-    it is left out and counted. Gray lines are level curves of those integrals of
-    the system that depend, on the hyperplane, on the two axes only.
+    The system has at least 3 variables. A crossing is interpolated through six points of
+    the orbit; if the steps are too long for this, the crossing is omitted and counted.
+    Gray lines are level curves of those integrals of the system whose restriction to the
+    hyperplane is a function of the two axes.
 
     By default sixteen initial points are chosen around an equilibrium.
 

@@ -1,4 +1,4 @@
-"""The reference of the library: what `kahanmaps` exports, by floors of the library and by module."""
+"""The reference of the library: what `kahanmaps` exports, by layers of the library and by module."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def module_of(value: Any) -> str:
 
 
 def api_pages_without_names(docs: Path) -> list[str]:
-    """Pages of floors that export nothing (yet)."""
+    """Pages of layers that export nothing (yet)."""
     folders = exported()
     pages = sorted((docs / "reference" / "api").glob("*.md"))
     return [f"reference/api/{page.name}" for page in pages if page.stem not in {"index", *folders}]
 
 
 def api_index() -> str:
-    """The table of contents of the floors, then a table of names for each."""
+    """The table of contents of the layers, then a table of names for each."""
     folders = exported()
     pieces = [block("\n".join([":maxdepth: 1", "", *folders]), "{toctree}")]
     for folder, modules in folders.items():
@@ -50,7 +50,7 @@ def api_index() -> str:
 
 
 def api_page(folder: str) -> str:
-    """All that a floor exports: for each module what it is about, then its names."""
+    """All that a layer exports: for each module what it is about, then its names."""
     pieces = []
     for home, names in exported()[folder].items():
         module = sys.modules[home]

@@ -28,11 +28,12 @@ def degree_series(
     """Return the generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms; exact.
 
     Args:
-        degrees: d_1; for a word of maps, applied one after the other and periodically, the degree of each map.
+        degrees: d_1; for a composition, whose maps are applied one after the other and periodically, the degree of each
+            map.
         hypersurfaces: for each exceptional hypersurface its degree and its orbit data, which must be settled; the
             columns nu are in the same order. Multiplicities that are not known must not be `needed`.
-        stages: for a word, the index (from 0) of the map that contracts each hypersurface. The series then has the
-            degrees after complete words only, and the exponent of z counts single maps.
+        stages: for a composition, the index (from 0) of the map that contracts each hypersurface. The series then has
+            the degrees of iterates of the composition only, and the exponent of z counts single maps.
 
     Source: docs/mathematics.md.
 

@@ -115,8 +115,9 @@ def lift_hypersurfaces(
 ) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
     """Lift hypersurfaces modulo primes to irreducible hypersurfaces over Q; return them with their primes.
 
-    Three kinds are tried: single hypersurfaces; products of two, which may be conjugate over a quadratic field; and
-    the product of all remaining ones, which is lifted from all primes but one and compared with it there.
+    Three kinds are tried: single hypersurfaces; products of two, which may be conjugate over a quadratic field; and the
+    product of all remaining ones, which is lifted from all primes but one and compared with the product modulo that
+    one.
 
     >>> circle = {p: [[1, 0, 0, p - 1, 0, p - 1]] for p in (31, 37, 41)}
     >>> lift_hypersurfaces(circle, ["a", "b"])

@@ -172,7 +172,7 @@ class _Curve:
 
     @cached_property
     def key(self) -> Key:
-        """The key of its hypersurface: is it contracted, which forms vanish there, and the first `rows`.
+        """The key of the hypersurface: whether it is contracted, which forms vanish on it, and the first `rows`.
 
         Raises OrbitDataUnknown where there is no first step.
         """

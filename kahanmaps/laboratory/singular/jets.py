@@ -38,24 +38,24 @@ class NotGeneric(ArithmeticError):
 
 
 class Letters(tuple[Equation, ...]):
-    """A word of maps: equations that are applied periodically, one in each step.
+    """The maps of a composition: equations that are applied periodically, one in each step.
 
-    A function belongs to one place in the word: it is evaluated after the number of steps given in `places`, and again
-    after each further complete word.
+    A function belongs to one of the maps: it is evaluated after the number of steps given in `places`, and again
+    whenever all maps have been applied once more.
     """
 
     places: tuple[int, ...] = ()
 
 
 def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
-    """Return the equations of a step, counted from 1: for a word those of one map, otherwise all."""
+    """Return the equations of a step, counted from 1: for a composition those of one map, otherwise all."""
     return (equations[(step - 1) % len(equations)],) if isinstance(equations, Letters) else equations
 
 
 def orders_of(
     equations: Sequence[Equation], functions: Sequence[Function], step: int, X: Sequence[nmod_poly], precision: int
 ) -> list[int | None]:
-    """Return the orders of functions along a curve after a step; 0 for functions of another place in a word."""
+    """Return the orders of functions along a curve after a step; 0 for functions of another map of a composition."""
     if isinstance(equations, Letters):
         is_due = [(step - place) % len(equations) == 0 for place in equations.places]
         return [function(X, precision) if due else 0 for function, due in zip(functions, is_due, strict=True)]

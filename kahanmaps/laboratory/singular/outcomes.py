@@ -253,7 +253,7 @@ class Tracking:
 
     The map contracts the critical ones. The minors are those of an equation of the map; `of_minors` are the forms in
     their common factor. If the maps of a composition are followed one by one, `stage` is the index (from 0) of the map
-    that contracts, and steps are single maps of a word of length `period`.
+    that contracts, and steps are single maps, which repeat after `period` steps.
     """
 
     critical: Sequence[HypersurfaceForm] = ()
@@ -341,7 +341,7 @@ def outcome_of(
 
 
 def outcomes_at_random(map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """Follow all hypersurfaces as `unwritten` does, without polynomials, including the poles and infinity."""
+    """Follow all hypersurfaces, the poles and infinity among them, without polynomials, by `unwritten`."""
     hypersurfaces = unwritten(map_, eps, rng, limits, poles=True) + unwritten(map_, eps, rng, limits)
     for _ in range(_TRIES):
         field = GF(random_prime(rng))

@@ -93,7 +93,7 @@ class SingularityRun(PrintableResult):
     `denominator` is det(I - eps f'(x)) as text, or "?" for a composition if it is too large. `critical_degree` is the
     degree of the Jacobian determinant of the homogeneous map; it is None if the determinant is too large to expand, and
     exceptional hypersurfaces are then represented by random points. If the determinant vanishes identically, the map is
-    not dominant: its image lies in a hypersurface, and no hypersurface is followed. `word` are the maps of a
+    not dominant: its image lies in a hypersurface, and no hypersurface is followed. `word` describes the maps of a
     composition that is followed map by map; steps of hypersurfaces are then single maps.
     """
 
@@ -247,8 +247,7 @@ def singularities(
         if not map_at_eps.is_bilinear:
             raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
-                "such with equations that are linear in both points: of these the singularities are known by random "
-                "points"
+                "maps whose equations are linear in both points: their singularities are computed at random points"
             ) from None
         at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
         return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
@@ -313,7 +312,7 @@ class Patterns:
     is empty, or the reason why the patterns are not known for all steps. `series` has the coefficients of the numerator
     and the denominator of the generating function of the degrees, and is empty where it does not follow. `exceptional`
     are the exceptional hypersurfaces `at` one of the eps that were tried. Steps are those of the map, except for the
-    hypersurfaces of a `word` of maps that is followed map by map.
+    hypersurfaces of a composition that is followed map by map (`word`).
     """
 
     lengths: tuple[int, ...]

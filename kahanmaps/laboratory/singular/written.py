@@ -1,8 +1,8 @@
 """The polynomials of the hypersurfaces that a map may contract; for a composition, those of each of its maps.
 
 The exceptional hypersurfaces of a composition are preimages of those of its maps under the maps applied before, and
-have long polynomials. Map by map the polynomials are short. Curves through the hypersurfaces are followed through the
-word of the maps, one map a step, starting with the map that contracts the hypersurface. Powers of a word repeat it.
+have long polynomials. Map by map the polynomials are short. A curve through a hypersurface is mapped by one map of the
+composition in each step, first by the map that contracts the hypersurface.
 
 For every eps the Jacobian determinant of the homogeneous map is factored over Q in the point and eps together. By
 Hilbert's irreducibility theorem its factors stay irreducible for most eps, so that those at one eps are their values.
@@ -39,7 +39,7 @@ _MAX_PRODUCTS = 300_000  # of terms, to expand the Jacobian determinant of the a
 
 @dataclass(frozen=True)
 class Word:
-    """A composition as a word of maps: the degrees of the first maps, and how often these are repeated."""
+    """The maps of a composition: the degrees of the first maps, and how often these are repeated."""
 
     degrees: tuple[int, ...]
     power: int
@@ -92,10 +92,10 @@ def followed_forms(
 def followed_map_by_map(
     map_: MapFamily, eps: fmpq, rng: random.Random, limits: Range, progress: Callable[[str], None]
 ) -> tuple[Word, list[Hypersurface]] | None:
-    """The hypersurfaces that the maps of a composition contract, at one exact eps, with the word of these maps.
+    """The hypersurfaces that the maps of a composition contract, at one exact eps, with the `Word` of these maps.
 
-    Steps and limits are those of single maps, but the first steps are those of the word. Hypersurfaces for which the
-    budget did not suffice are left out. None if the polynomials of one of the maps are too large.
+    Steps and limits are those of single maps, but the first steps are those of the composition. Hypersurfaces for which
+    the budget did not suffice are left out. None if the polynomials of one of the maps are too large.
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
@@ -136,7 +136,7 @@ def _is_short(size: int, degree: int) -> bool:
 
 
 def period_of(equations: tuple[Equation, ...]) -> int:
-    """The number of maps after which a word repeats itself, a divisor of its length."""
+    """The number of maps after which a list of maps repeats itself, a divisor of its length."""
     maps = [(equation.exponents, equation.terms) for equation in equations]
     size = len(maps)
     return next(k for k in range(1, size + 1) if size % k == 0 and maps[k:] == maps[: size - k])

@@ -71,7 +71,7 @@ class FloatStep:
 
     @cached_property
     def careful(self) -> Callable[..., tuple[Any, ...]]:
-        """The careful step on arrays."""
+        """The step on arrays with all checks."""
         function = self._in_arrays if self.careful_code is None else self.careful_code.function(np.ndarray)
         if function is None:
             raise AssertionError("a step has no careful version")
@@ -79,7 +79,7 @@ class FloatStep:
 
     @cached_property
     def careful_on_floats(self) -> Callable[..., tuple[Any, ...]]:
-        """The careful step on floats, if there is a program for it."""
+        """The step on floats with all checks, if there is a program for it."""
         return self.careful if self.careful_code is None else self.careful_code.function(float)
 
     def _code(self, careful: bool) -> StraightLineProgram | None:

@@ -174,7 +174,7 @@ class PlaneIntegers(Integers):
     def combined(
         self, scales: Sequence[fmpq], terms: Sequence[fmpz], lifts: Sequence[IntegerTriple], divisor: fmpz
     ) -> IntegerTriple:
-        """The primitive triple of the sum of scale times term times lift, which the divisor divides."""
+        """The primitive triple of a sum of products scale * term * lift; `divisor` divides the sum."""
         factors, _ = over_common_denominator(scales)
         undivided = [
             sum(((f * lift[i]) * term for f, term, lift in zip(factors, terms, lifts, strict=True)), fmpz(0))

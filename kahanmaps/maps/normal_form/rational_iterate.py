@@ -99,7 +99,7 @@ class OrbitInPlanes:
         if bits != 0:
             raise OverBudget(step, bits)
         if value is None:
-            raise ArithmeticError("an iterate at a pole that no prime shows: please report this")
+            raise ArithmeticError("an iterate is a pole over Q, but not modulo any prime: please report this")
         self._reachable = max(self._reachable, n)
         return value
 
@@ -164,7 +164,7 @@ class OrbitInPlanes:
                 poles.append(pole)
             else:
                 return min([*known_poles, *poles], default=None)
-        raise ArithmeticError("the orbit modulo many primes met a pole that it has not: please report this")
+        raise ArithmeticError("the orbit meets a pole modulo many primes, but not over Q: please report this")
 
 
 def _halved(n: int, step: int) -> int:

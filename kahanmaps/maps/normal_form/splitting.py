@@ -83,7 +83,7 @@ class Splitting:
         return self.form.dim
 
     def matrix(self, plane: int) -> list[list[Any]]:
-        """The rows of R with x = sum over the planes of R (u, v), coefficients of u and v in the field of x."""
+        """The rows of R, where x is the sum of R (u, v) over the planes; the coefficients are in the field of x."""
         return [list(row) for row in zip(*self._matrices[plane], strict=True)]
 
     def triples(self, x: Sequence[Any]) -> list[Triple]:

@@ -52,7 +52,7 @@ def plot_comparison(
         raise InputError(f"found the picture {show[:40]!r}, expected {', '.join(KINDS)}")
     runs = [run for run in result.runs if any(entry.error > 0 for entry in run.errors)]
     if result.time is None or not runs:
-        raise InputError("found no errors of the methods, for there is no reference solution or all errors are 0")
+        raise InputError("found no error above 0, expected one: there is no reference solution, or all errors are 0")
     labels = [METHODS[run.method].title for run in runs]
     with drawing(style):
         from matplotlib.lines import Line2D

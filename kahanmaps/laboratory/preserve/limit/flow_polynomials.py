@@ -176,8 +176,8 @@ class _Search:
     def run(self, primes: list[int], budget: Budget) -> str:
         """Add the polynomials to `known`; return why there may be others, or "" if there are none.
 
-        The prime that settles the search moves to the front for the next one: factors over extensions of Q without
-        residues modulo this prime then do not reappear in products.
+        The next search begins with the prime that settles this one: factors over extensions of Q that have no residues
+        modulo this prime then do not reappear in products.
         """
         reason = "lines modulo primes leave others possible"
         combined: list[tuple[list[int], int]] = []  # residues of polynomials that are not lifted yet, with moduli
