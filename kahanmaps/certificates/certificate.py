@@ -275,6 +275,8 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
             f"a {type(result).__name__} has no certificate: it proves nothing about a map, or is a part of a result; "
             "type result.certificate(checker) of the search or check, or km.certificate(system, checker)"
         )
+    if root := getattr(result, "root", ""):
+        raise InputError(f"the system has the {root} for a parameter: expected rational numbers for a certificate")
     is_of_flow, eps = getattr(result, "flow", False) is True, getattr(result, "eps", None)
     if is_of_flow or eps is not None:
         what = "the flow" if is_of_flow else f"eps = {eps}"

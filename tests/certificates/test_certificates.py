@@ -123,7 +123,8 @@ def changed(claim):
     if isinstance(claim, OrbitIntegral):
         return replace(claim, numerator=claim.numerator + claim.numerator.context().gen(0))
     if isinstance(claim, AffineSymmetry):
-        return replace(claim, image=(claim.image[0] + claim.image[0].context().gen(0), *claim.image[1:]))
+        more = 3 * claim.image[0].context().gen(0)  # T stays invertible, also where it changes the sign of x
+        return replace(claim, image=(claim.image[0] + more, *claim.image[1:]))
     if isinstance(claim, InvariantTensor):
         return replace(claim, upper={pair: P + (pair == (0, 1)) for pair, P in claim.upper.items()})
     if isinstance(claim, ChangedFunction):

@@ -112,6 +112,7 @@ def test_equivalent_systems(kahanmaps):
         ("find-integrals volterra_periodic_3 --darboux 1", 0, "D4: P is a Darboux polynomial"),
         ("find-density lotka_volterra", 0, "volume_1: dx/phi is invariant"),
         ("find-poisson lotka_volterra", 0, "P: the map is Poisson"),
+        ("find-commuting paper_m2", 0, "g1_maps_1_and_2_commute: points are images of others"),
         ("find-symmetry lotka_volterra", 0, "T1: x -> T takes the map to itself"),
     ],
 )

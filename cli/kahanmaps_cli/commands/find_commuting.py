@@ -8,6 +8,7 @@ import click
 
 from kahanmaps import internals as lib
 from kahanmaps_cli import options as opt
+from kahanmaps_cli.runs.certificates import certificate_option, write_certificate
 from kahanmaps_cli.runs.search import print_list
 from kahanmaps_cli.screen.progress import SearchProgress
 
@@ -23,6 +24,7 @@ from kahanmaps_cli.screen.progress import SearchProgress
 @opt.seed_option
 @opt.error_bits_option("A statement reported as supported is false with probability below 2^-BITS.")
 @opt.effort_options
+@certificate_option
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Find all rational g whose Kahan map commutes with that of SYSTEM, x' = f(x), at the same eps, for every eps.
@@ -56,4 +58,6 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             progress=search,
         )
     heading = f"# find-commuting: {file.name}, {commuting.kind_text}, every eps (the time step is 2 eps)"
-    return print_list("find-commuting", heading, commuting, search, settings.context([file], **search.work), as_json)
+    context = settings.context([file], **search.work)
+    status = print_list("find-commuting", heading, commuting, search, context, as_json)
+    return write_certificate({**options, "quiet": quiet}, file.name, commuting.certificate, status)
