@@ -22,7 +22,7 @@ SCRIPTS = sorted(EXAMPLES.glob("*.py"))
 
 
 # The cluster, the whole paper and planar fields have quicker tests of their own.
-LONG = {"08_the_paper", "10_cluster_batch", "13_planar_fields"}
+LONG = {"08_the_paper", "10_cluster_batch", "13_planar_fields", "14_lotka_volterra_fields", "15_certified_classes"}
 
 
 @pytest.mark.parametrize(
@@ -104,9 +104,9 @@ def test_a_dump_of_a_dataclass_is_seen():
     assert not DUMP.search("<FoundIntegral: (x + 1)/(y)> KahanMap(x, y; eps=1/10, over QQ)")
 
 
-def fields_of_the_plane():
-    """The example on planar fields as a module."""
-    spec = importlib.util.spec_from_file_location("planar_fields", EXAMPLES / "13_planar_fields.py")
+def fields_of_the_plane(name="13_planar_fields"):
+    """The example on planar fields, or another one, as a module."""
+    spec = importlib.util.spec_from_file_location(name[3:], EXAMPLES / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -171,3 +171,46 @@ def test_the_counts_of_planar_fields_on_the_page_are_those_of_the_example():
         f"| exponential | {exponential} | {15624 - sum(fields for found in kinds.values() for fields, _ in found)} |"
         in page
     )
+
+
+def test_the_class_of_a_lotka_volterra_system_is_that_of_its_permutations_and_signs():
+    module, draw = fields_of_the_plane("14_lotka_volterra_fields"), random.Random(3)
+    for _ in range(200):
+        A = [[draw.choice((-1, 0, 1)) for _ in range(3)] for _ in range(3)]
+        order, signs = draw.sample(range(3), 3), [draw.choice((-1, 1)) for _ in range(3)]
+        assert module.class_of([[A[i][j] * signs[j] for j in order] for i in order]) == module.class_of(A)
+        assert module.class_of(module.class_of(A)) == module.class_of(A)
+    chain, with_own_pair = ((0, 1, 1), (1, 0, -1), (-1, -1, 0)), ((0, 1, 0), (1, 0, 0), (1, 1, 0))
+    assert module.right_hand_sides(chain) == ["x*(y + z)", "y*(x - z)", "z*(-x - y)"]
+    assert [module.is_indecomposable(A) for A in (chain, with_own_pair)] == [True, False]
+    assert module.class_of(chain) == module.class_of(((0, 1, -1), (-1, 0, 1), (1, -1, 0)))  # LV(3, 1)
+
+
+def test_the_counts_of_lotka_volterra_systems_on_the_page_are_those_of_the_example():
+    printed = (EXAMPLES / "14_lotka_volterra_fields.out").read_text(encoding="utf-8")
+    page = (EXAMPLES.parent / "docs" / "beyond.md").read_text(encoding="utf-8")
+    page = page.partition("## Small Lotka-Volterra systems")[2]
+    rows = re.findall(r"^\| (.*) \| (\d+) \| (\d+) \|$", printed, re.MULTILINE)
+    counts = {kind: (int(inner), int(other)) for kind, inner, other in rows}
+    slow = ("bounded", "linear", "quadratic")
+    fast = [numbers for kind, numbers in counts.items() if kind not in slow]
+    table = {**{kind: counts[kind] for kind in slow}, "exponential": tuple(map(sum, zip(*fast, strict=True)))}
+    for kind, (inner, other) in table.items():
+        assert f"| {kind} | {inner} | {other} |" in page
+    assert sum(map(sum, table.values())) == 503
+    with_two = re.findall(r"^\| (?:bounded|linear|quadratic) \| .* \| 2 \| [^;|]*; [^;|]* \|$", printed, re.MULTILINE)
+    assert len(with_two) == sum(table[kind][0] for kind in slow) == 13
+    assert "fall into 503 classes" in page
+    assert f"In {sum(other for _, other in table.values())} of them" in page
+    for numbers in (f"3 ({counts['3'][0]} classes)", f"or 2 ({counts['2'][0]})"):
+        assert numbers in page
+
+
+def test_every_integral_of_the_tables_is_certified_by_sympy():
+    printed = (EXAMPLES / "15_certified_classes.out").read_text(encoding="utf-8")
+    for accepted, formulas, refuted in re.findall(r": (\d+) of (\d+) integrals .* accepted, (\d+) controls", printed):
+        assert accepted == formulas == refuted
+    rows = fields_of_the_plane("15_certified_classes").rows
+    names = ("13_planar_fields", "14_lotka_volterra_fields")
+    found = [integrals for name in names for _, integrals in rows(EXAMPLES / f"{name}.out")]
+    assert sum(map(len, found)) == sum(int(number) for number in re.findall(r"of (\d+) integrals", printed)) == 45
