@@ -30,7 +30,8 @@ rule = model.createAssignmentRule()
 rule.setVariable("y")
 assert rule.setMath(tree) == libsbml.LIBSBML_OPERATION_SUCCESS
 document.checkConsistency()
-severe = [n for n in range(document.getNumErrors()) if document.getError(n).getSeverity() >= libsbml.LIBSBML_SEV_ERROR]
+found = [document.getError(n) for n in range(document.getNumErrors())]
+severe = [error for error in found if error.getSeverity() >= libsbml.LIBSBML_SEV_ERROR]
 text = libsbml.writeSBMLToString(document)
 read = libsbml.readSBMLFromString(text)
 print("expected: one value, or an error, for", formula)

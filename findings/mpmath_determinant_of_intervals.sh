@@ -3,11 +3,11 @@
 #
 # Expected: an interval with the determinant of every matrix between the bounds, or an error when no pivot is known to
 #           differ from 0, as A**-1 and lu_solve raise it.
-# Seen:     0, an exact one: det catches the error "numerically singular" and takes it for a proof. [[1, 10], [1, 10 + e]]
-#           with e in [-1, 1] has every determinant from -1 to 1. In the same way the argument of the interval [-1, 1]
-#           is pi, and that of 0.5 is 0. For some matrices a ValueError without a text comes first (None is compared).
-# The page about `iv` calls it experimental and says that many functions do not support intervals properly yet; it does
-# not say which, and det is not among those with a warning.
+# Seen:     0, an exact one: det catches the error "numerically singular" and takes it for a proof. The matrices
+#           [[1, 10], [1, 10 + e]] with e in [-1, 1] have every determinant from -1 to 1. Beside it, the argument of
+#           the interval [-1, 1] is pi, and that of 0.5 is 0.
+# The page about `iv` calls it experimental, with many functions that do not support intervals properly yet; it does
+# not say which, and the docstring of det has no warning.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
