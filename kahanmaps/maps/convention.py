@@ -61,7 +61,7 @@ def convention(*maps: MapFamily) -> str:
     return f"eps is the paper's epsilon, the time step is {steps[0]}" if steps else NO_TIME_STEP
 
 
-def eps_share(map_: MapFamily) -> str:
+def describe_eps(map_: MapFamily) -> str:
     """Return a sentence such as "eps is half the time step" for a map; empty if it has no time step."""
     if not map_.time_steps:
         return ""

@@ -154,7 +154,7 @@ class SingularityRun(PrintableResult):
 
     @property
     def unit(self) -> str:
-        """The unit of the steps of hypersurfaces."""
+        """What `steps` of hypersurfaces counts: steps of the map, or single maps of a composition."""
         return "step" if self.word is None else "single map"
 
     @property
@@ -185,15 +185,15 @@ def singularities(
         eps: half the time step, an exact number; None: two values are tried, and their patterns must agree.
         time_step, h: the time step 2 eps, instead of eps.
         steps: the number of steps for which hypersurfaces are followed: by default 1000 in the plane, 500 in dimension
-            3, 250 in dimension 4 and 100 above, fewer if series are needed at all steps.
+            3, 250 in dimension 4 and 100 above, fewer if all of them need power series.
         seed: the random seed.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message for each hypersurface.
 
     Returns:
-        A `SingularityRun`, without eps that of the first value. Hypersurfaces are exact; their outcome is measured at
+        A `SingularityRun`; if eps is None, for the first value. Hypersurfaces are exact; their outcome is measured at
         two random points modulo two random primes, and "not confined" refers to this number of steps. A TimeLimit ends
-        the computation early; if `effort` is a Budget, it is raised.
+        the computation early; it is passed on if `effort` is a Budget.
 
     Raises:
         InputError: for dimensions above 6, a wrong number of steps, numbers too long for the budget, and different
@@ -268,28 +268,28 @@ def singularities(
             return followed_run
     tracking = Tracking(*followed_forms(map_form, forms)) if critical_degree else NONE_TRACKED
     hypersurfaces: list[Hypersurface] = []
-    is_cut = False
+    stopped = False
     for form in forms:
-        if is_cut := limits.budget.is_spent:
+        if stopped := limits.budget.is_spent:
             break
         try:
             text = name_of(form.form, map_)
             progress(f"following {text[:40]}")
             hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
-            if isinstance(effort, Budget):  # the budget of a larger computation, which is then charged, too
+            if isinstance(effort, Budget):  # of a larger computation, which ends as well
                 raise
-            is_cut = True
+            stopped = True
             break
-    if critical_degree is None and not is_cut:
+    if critical_degree is None and not stopped:
         progress("following critical points")
         too_large = "the polynomials of the exceptional hypersurfaces are too large"
         without_polynomials = (
             unwritten(map_, exact_eps, rng, limits) if map_at_eps.is_bilinear else [Hypersurface(note=too_large)]
         )
         hypersurfaces += without_polynomials
-    is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
-    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_cut)
+    stopped |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=stopped)
 
 
 def _map_by_map(
