@@ -310,7 +310,7 @@ def degree_growth(
 
     Returns:
         A `DegreeGrowth`, measured modulo random primes of 61 bits; only bounds of the dynamical degree of planar maps
-        are proved. A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised.
+        are proved. A TimeLimit ends the search with the degrees so far; it is passed on if `effort` is a Budget.
 
     Raises:
         InputError: for eps = 0, and for other values out of range.

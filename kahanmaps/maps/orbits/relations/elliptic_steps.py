@@ -52,7 +52,7 @@ class EllipticSteps:
 
     @property
     def degree(self) -> int:
-        """The largest degree of a group of coordinates on its curve."""
+        """The largest degree, on their curve, of coordinates computed together."""
         return max(group.degree for row in self._groups for group in row if isinstance(group, Coordinates))
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:
