@@ -74,7 +74,7 @@ class DynamicalDegreeBounds(ResultPart):
 
     @property
     def text(self) -> str:
-        """The interval, and the degrees that give its lower end."""
+        """The two bounds, and the degrees from which the lower one follows."""
         return (
             f"dynamical degree between {self.lower} and {self.upper}: degree of iterate {2 * self.steps} at least "
             f"{self.degree_below}, of iterate {self.steps} at most {self.degree_above}"

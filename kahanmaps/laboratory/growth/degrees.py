@@ -61,7 +61,7 @@ _ENOUGH_QUOTIENTS = 6
 _AGREEING = 12  # measured terms beyond twice the longest pattern that must agree with the derived ones
 _LARGE = 2000  # from this degree on no further measured terms need to agree
 _MATRIX_TERMS = 60  # of monomial maps
-_REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
+_REPLACEMENTS = 6  # of lines in special position, of which one in 2^40 is expected
 
 
 @dataclass(frozen=True)
@@ -338,7 +338,7 @@ def degree_growth(
     except TimeLimit as stop:
         if isinstance(effort, Budget):
             raise
-        if search.measured is not None:  # the bounds of the dynamical degree alone were cut
+        if search.measured is not None:  # only the bounds of the dynamical degree are missing
             return replace(search.measured, message=f"{search.measured.message}; {stop}")
         return search.result(Ended.STOPPED, f"{stop} at iterate {len(search.degrees)}")
 

@@ -65,7 +65,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
-MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
+MAX_DIGITS = 10_000  # of the numbers in eps and the system
 _DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # of units, by dimension
 _FEW_DIGITS = 50
 _DEFAULT_STEPS = {1: 1000, 2: 1000, 3: 500, 4: 250}  # by dimension
@@ -238,7 +238,7 @@ def singularities(
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
         except Stopped as error:
-            raise InputError(f"found a composition that is too long here: {error.message}") from error
+            raise InputError(f"found a composition whose singularities cannot be followed: {error.message}") from error
         run = SingularityRun(exact_eps, "?", line.degree)
         if not _is_dominant(map_, exact_eps):
             return replace(run, is_dominant=False)
@@ -247,7 +247,7 @@ def singularities(
         if not map_at_eps.is_bilinear:
             raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
-                "maps whose equations are linear in both points: their singularities are computed at random points"
+                "maps whose equations are linear in both points, which are treated at random points"
             ) from None
         at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
         return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
