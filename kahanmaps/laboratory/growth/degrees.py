@@ -424,7 +424,7 @@ class _Search:
                 if max_terms is not None and len(self.degrees) > max_terms:
                     raise Stopped(Ended.TERMS, f"{counted(max_terms, 'iterate')} measured, as requested")
                 if len(self.degrees) > MAX_TERMS:
-                    raise Stopped(Ended.TERMS, f"{MAX_TERMS} iterates, and no more are worked out")
+                    raise Stopped(Ended.TERMS, f"{MAX_TERMS} iterates measured, the largest number that is allowed")
                 progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
                 self._step(new_line)
                 if self.degrees[-1] == 0 and max_terms is None:

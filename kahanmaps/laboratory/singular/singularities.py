@@ -230,7 +230,7 @@ def singularities(
     map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
     try:
         if is_long(map_at_eps):
-            raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
+            raise TooLarge("forms that would take long to expand, too long for their determinant")
         map_form = homogeneous_map(map_at_eps)
         count_work(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points

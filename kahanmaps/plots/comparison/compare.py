@@ -399,7 +399,7 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
     for row in rows:
         starts.append(tuple(exact(float(x)) if isinstance(x, float) and isfinite(x) else rational(x) for x in row))
         if len(row) != system.dim:
-            raise InputError(f"found a start with {counted(len(row), 'coordinate')}, expected {system.dim}")
+            raise InputError(f"found an initial point with {counted(len(row), 'coordinate')}, expected {system.dim}")
     return tuple(starts)
 
 
