@@ -1,8 +1,8 @@
 """Float orbits: the kernels of kahanmaps against C, and against integrators of the flow, by ratios of one run.
 
 `python benchmarks/bench_float.py` prints a table; `measure()` gives its rows. The work is a family member with m = 3
-(dimension 6): one orbit to its end, one with every point delivered, and an ensemble of 100,000 starts, by the normal
-form and by generic elimination; and Euler's top in dimension 3, for which no normal form is used. `kernels.c` is
+(dimension 6): one orbit to its end, one with every point delivered, and an ensemble of 100,000 initial points, by the
+normal form and by generic elimination; and Euler's top in dimension 3, for which no normal form is used. `kernels.c` is
 compiled here with gcc -O3 -march=native, and gives the limit: the same steps without a test for what may go wrong.
 Results are compared before times are. Contestants take turns, so that a busy machine slows down all of them, and the
 best time of each counts. The integrators solve another problem, the flow: they are what one would use instead.
@@ -30,7 +30,7 @@ from kahanmaps.maps.kernels import has_numba
 EPS = fmpq(1, 10)
 LANES = 100_000
 REPEATS = 5
-ONE, MANY, GENERIC = "one orbit, m = 3", "100,000 starts, m = 3", "100,000 starts, d = 6, elimination"
+ONE, MANY, GENERIC = "one orbit, m = 3", "100,000 initial points, m = 3", "100,000 initial points, d = 6, elimination"
 TOP_ONE, TOP_MANY = "one orbit, 10,000,000 steps, Euler top", "1,000,000 starts, 100 steps, Euler top"
 EXPONENTS = "Lyapunov spectrum, 200,000 steps, Euler top"
 POINTS, GENERIC_ONE, FLOW = "one orbit, every point in x", "one orbit, d = 6, elimination", "one orbit against the flow"

@@ -140,8 +140,8 @@ from .languages.convert import convert as convert
 from .maps.algebraic import over_number_field as over_number_field
 from .maps.convention import CONVENTION as CONVENTION
 from .maps.convention import convention as convention
+from .maps.convention import describe_eps as describe_eps
 from .maps.convention import eps_record as eps_record
-from .maps.convention import eps_share as eps_share
 from .maps.convention import eps_suffix as eps_suffix
 from .maps.convention import time_step as time_step
 from .maps.floats.classical import METHODS as METHODS

@@ -44,7 +44,7 @@ class SuggestingGroup(click.Group):
 
 
 def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
-    """Return up to three known words similar to the one written, nearly as similar as the best of them."""
+    """Return up to three known words similar to `written`: the best one, and others nearly as similar."""
     from difflib import SequenceMatcher, get_close_matches
 
     close = get_close_matches(written, known, n=3, cutoff=cutoff)

@@ -1,6 +1,6 @@
 """The entry point: the lazily loaded commands, and the conversion of errors to messages and exit statuses.
 
-Exit statuses: 0 the claim holds or the work is done; 1 refuted, and nothing else; 2 usage error or bad input; 3
+Exit statuses: 0 the claim holds or the work is done; 1 refuted (it has no other meaning); 2 usage error or bad input; 3
 undecided or stopped early, or the output was lost; 70 an internal error; 130 interrupted by Ctrl-C or SIGTERM.
 """
 

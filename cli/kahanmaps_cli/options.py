@@ -142,8 +142,8 @@ given_starts_options: Callable[[F], F] = stack(
     click.option(
         "--grid",
         metavar="X=A:B:N,...",
-        help="Grid of initial points: N values from A to B for each variable named, or one: x=-1:1:20,y=0:1:9,z=1/2. "
-        "Others are 0.",
+        help="Grid of initial points: N values from A to B for a variable, or one value: x=-1:1:20,y=0:1:9,z=1/2. "
+        "Other variables are 0.",
     ),
     click.option("--line", metavar="X:Y:N", help="N initial points on a line from X to Y, e.g. 0,0:1,1/2:50."),
 )

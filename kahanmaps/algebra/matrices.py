@@ -42,7 +42,7 @@ def det(matrix: Any) -> Any:
 
 
 def rank(field: Field, matrix: Any) -> int:
-    """Return the rank. Over balls it is certain; otherwise raises `PrecisionLost`."""
+    """Return the rank. Raises `PrecisionLost` if the matrix has balls as entries and its rank is uncertain."""
     if isinstance(matrix, arb_mat | acb_mat | EntryMatrix):
         return len(_eliminate(field, matrix)[1])
     if isinstance(matrix, fmpq_mat):

@@ -283,7 +283,7 @@ class _Script:
             self.define(name, f"[{', '.join(self.letters[letter] for letter in letters)}]")
 
     def equation(self, data: MapData, letter: str = "") -> None:
-        """M, r and E = M x~ - r, with the letter behind their names."""
+        """Define M, r and E = M x~ - r, with `letter` appended to their names."""
         self.define(f"M{letter}", self.polynomials([row[:-1] for row in data.rows]))
         self.define(f"r{letter}", self.vector([row[-1] for row in data.rows]))
         self.define(f"E{letter}", self.to.residual.format(letter))

@@ -80,7 +80,7 @@ def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | No
             if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
                 integrals.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
         return integrals
-    # The modified H in both normalizations, K~_s for every rational associated system, and those of the commutant. If
+    # The modified H, its multiple H~, K~_s for every rational associated system, and those of the commutant. If
     # chi has many factors, the K~ with several minus signs are linear combinations of those listed.
     associates = theorems.listed_associates(member)
     base = associates[0]

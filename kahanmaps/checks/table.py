@@ -113,8 +113,8 @@ _CHECKS = [
         """
         Without --eps the integrals are checked for every eps.
 
-        A Hamiltonian system has a known integral, the modified Hamiltonian, in both normalizations of the paper; a
-        member of the family also has those of all rational associated systems. The section [integrals] of the file
+        A Hamiltonian system has a known integral, the modified H, and its multiple H~ = x^T J x~/eps for homogeneous H
+        and standard J; a member of the family has those of all rational associated systems. The section [integrals]
         claims further ones. By default all of them are checked, with --integral only the given ones.
         """,
         "conserved",

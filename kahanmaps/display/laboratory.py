@@ -204,7 +204,7 @@ def _brackets(tensor: Any) -> HtmlCell:
 
 @lines_of.register
 def _darboux(search: DarbouxSearch) -> Iterator[Line]:
-    """Yield the equation of a Darboux polynomial and the polynomials for each cofactor, or a note on absence."""
+    """Yield the equation of a Darboux polynomial and the polynomials for each cofactor, or say that there are none."""
     meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(search.cofactors) else ""
     equation = f"P(x~) = C P(x){meaning}; spaces spanned by products of others are omitted"
     yield ("P' = K P, irreducible; integrals left out" if search.flow else equation,)

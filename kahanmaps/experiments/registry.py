@@ -125,7 +125,7 @@ def analysis(
 ) -> Callable[[Summary], Summary]:
     """Register a function of the laboratory ("module:name", imported when it is called) as a kind of task.
 
-    Its arguments are the system file, or the attribute `of` of it, and the options, some `renamed`. Their `defaults`
+    It is called with the system file (or its attribute `of`) and the options, some of them `renamed`. The `defaults`
     are given here and not in the library, since they enter the keys of tasks.
     """
 

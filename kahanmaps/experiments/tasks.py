@@ -171,7 +171,7 @@ def ensemble(
     method: str | None = None,
     seed: int = 0,
 ) -> Result:
-    """Compute floating-point orbits from random initial points; count how many complete, and measure drift."""
+    """Compute floating-point orbits from random initial points; count the completed ones, and measure drift."""
     from kahanmaps.maps.floats.ensemble import FloatEnsemble
     from kahanmaps.maps.floats.float_orbit import to_floats
     from kahanmaps.maps.floats.starts import starts_in_box

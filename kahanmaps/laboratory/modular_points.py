@@ -261,7 +261,7 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
 
 
 def _layers_of(dim: int, degree: int, support: Sequence[int]) -> list[list[tuple[int, int]]]:
-    """Return for each degree and monomial of the support a variable, and the index of the quotient in the support."""
+    """Return, for each degree and each monomial of the support, a variable and the index of their quotient."""
     exponents, tables = exponents_up_to(dim, degree), monomial_tables(dim, degree)
     positions = {index: position for position, index in enumerate(support)}
     layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]

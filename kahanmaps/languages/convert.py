@@ -119,17 +119,17 @@ class _Writer:
         self.used = {"point", "image", "eps", "value"}  # names in lower case, since Fortran ignores case
         self.prefix = [prefix] if prefix else []
         kind = "kahan" if formulas.rhs else "map"
-        called = {f"kahan_{what}": f"{kind}_{what}" for what in ("matrix", "vector", "inverse", "jacobian")}
-        called |= {"kahan_map": "kahan_map" if formulas.rhs else "map_step"}
-        called |= {"kahan_map_formula": called["kahan_map"] + "_formula"}
-        called |= {key: key for key in ("vector_field", "modified_hamiltonian", "density")}
+        default_names = {f"kahan_{what}": f"{kind}_{what}" for what in ("matrix", "vector", "inverse", "jacobian")}
+        default_names |= {"kahan_map": "kahan_map" if formulas.rhs else "map_step"}
+        default_names |= {"kahan_map_formula": default_names["kahan_map"] + "_formula"}
+        default_names |= {key: key for key in ("vector_field", "modified_hamiltonian", "density")}
         # Maps functions to their names in the file.
-        self.names = {key: self._fresh_name(*self.prefix, name) for key, name in called.items()}
+        self.names = {key: self._fresh_name(*self.prefix, name) for key, name in default_names.items()}
         for key in (*formulas.integrals, *formulas.forms):
             self.names[f"integral {key}"] = self._fresh_name(*self.prefix, "integral", key)
-        self.words = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
-        self.words |= {key: self._fresh_name(*self.prefix, "kahan", key) for key in ("solve", "module")}
-        self.words |= {key: self._fresh_name(*self.prefix, key) for key in ("vector", "matrix")}
+        self.placeholders = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
+        self.placeholders |= {key: self._fresh_name(*self.prefix, "kahan", key) for key in ("solve", "module")}
+        self.placeholders |= {key: self._fresh_name(*self.prefix, key) for key in ("vector", "matrix")}
         # The names of variables and symbols in the file: unchanged unless they have another meaning, and all different.
         names = (*formulas.names, *formulas.new)
         free = {name for name in names if _FREE.fullmatch(name) and (self.language["underscores"] or "_" not in name)}
@@ -167,7 +167,7 @@ class _Writer:
             more = "".join(f", {value}" for value in [*[language["tenth"]] * len(self.eps), *self.symbols])
             shown = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
             lines.append(f"For example: {self._fill('usage', values=shown, more=more)}")
-        needs_solver = any(self.words["solve"] in text for text in self.written.values())
+        needs_solver = any(self.placeholders["solve"] in text for text in self.written.values())
         pieces = [
             "\n".join(map(self._comment, lines)),
             self._fill("head", functions=", ".join(self.written)),
@@ -303,7 +303,7 @@ class _Writer:
     def _listed(self, kind: str, entries: Sequence[str], between: str = ",") -> str:
         """Return entries in the brackets of a vector, a row or a matrix, on one line if they fit."""
         has_room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= _LINE
-        before, after = (Template(bracket).substitute(self.words) for bracket in self.language[kind])
+        before, after = (Template(bracket).substitute(self.placeholders) for bracket in self.language[kind])
         return before + (between + (" " if has_room else "\n        ")).join(entries) + after
 
     def _call(self, key: str, point: str, *arguments: str) -> str:
@@ -315,7 +315,7 @@ class _Writer:
         return self._fill(template, M=self._call("kahan_matrix", "point"), right=right)
 
     def _fill(self, template: str, **more: str) -> str:
-        return Template(self.language[template]).substitute(self.words | more)
+        return Template(self.language[template]).substitute(self.placeholders | more)
 
     def _comment(self, line: str) -> str:
         # A backslash at its end would continue the comment of C and Maple, the brackets are those of Mathematica.

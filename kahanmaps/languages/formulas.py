@@ -20,7 +20,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.maps.algebraic import AlgebraicMap
-from kahanmaps.maps.convention import eps_share
+from kahanmaps.maps.convention import describe_eps
 from kahanmaps.maps.implicit import MapFamily
 from kahanmaps.maps.kahan import KahanFamily
 from kahanmaps.sources import SOURCES
@@ -182,8 +182,8 @@ class Formulas:
                 f"  {name}' = {text if len(text) <= width else text[: width - 4] + ' ...'}"
                 for name, text in zip(self.variables, texts, strict=True)
             ]
-        if share := eps_share(self.map):
-            lines.append(f"{share}: the time step is {2 * self.map.time_steps} eps.")
+        if sentence := describe_eps(self.map):
+            lines.append(f"{sentence}: the time step is {2 * self.map.time_steps} eps.")
         numbers = [f"{name} = {value}" for name, value in file.parameters.items() if name not in self.symbols]
         if numbers:
             lines.append(f"Parameters: {', '.join(numbers)}")

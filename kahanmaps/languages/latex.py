@@ -11,7 +11,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.printing import integer_fraction
 from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
-from kahanmaps.maps.convention import eps_share
+from kahanmaps.maps.convention import describe_eps
 
 _LINE = 140  # characters of source on a line of a formula
 # The point and its image; x may be the name of a variable.
@@ -29,9 +29,9 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
     lines += [r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks"]
     lines += [rf"\setcounter{{MaxMatrixCols}}{{{formulas.dim}}}"] * (formulas.dim > 10)
     lines += [r"\begin{document}", ""]
-    if share := eps_share(formulas.map):
-        share = share.replace("eps", r"$\varepsilon$")
-        lines += [rf"\noindent {share}: the time step is ${2 * formulas.map.time_steps} \varepsilon$.", ""]
+    if sentence := describe_eps(formulas.map):
+        sentence = sentence.replace("eps", r"$\varepsilon$")
+        lines += [rf"\noindent {sentence}: the time step is ${2 * formulas.map.time_steps} \varepsilon$.", ""]
     for part in parts:
         title, rows = _display(part, formulas)
         # A long right-hand side is broken between its terms: it is always a sum outside braces.
@@ -123,8 +123,8 @@ def _label(name: str) -> str:
     >>> print(_label("F1"), _label("a_b"), _label("H~ é"))
     F_1 \mathrm{a\_b} \text{H\textasciitilde{} [U+00E9]}
     """
-    shown = "".join(mark if mark.isascii() else f"[U+{ord(mark):04X}]" for mark in name)
-    is_text = shown != name or any(mark in name for mark in "\\^~ ")
+    shown = "".join(c if c.isascii() else f"[U+{ord(c):04X}]" for c in name)
+    is_text = shown != name or any(c in name for c in "\\^~ ")
     return latex_name(shown).replace(r"\mathrm{", r"\text{", 1) if is_text else latex_name(shown)
 
 

@@ -61,7 +61,7 @@ def convention(*maps: MapFamily) -> str:
     return f"eps is the paper's epsilon, the time step is {steps[0]}" if steps else NO_TIME_STEP
 
 
-def eps_share(map_: MapFamily) -> str:
+def describe_eps(map_: MapFamily) -> str:
     """Return a sentence such as "eps is half the time step" for a map; empty if it has no time step."""
     if not map_.time_steps:
         return ""
@@ -93,7 +93,7 @@ def eps_record_suffix(context: Mapping[str, Any]) -> str:
 
 
 def eps_suffix(eps: fmpq | None, *maps: MapFamily) -> str:
-    """Return the text for an eps and maps.
+    """Return the text for eps and the time step of these maps, to follow a name.
 
     >>> eps_suffix(fmpq(1, 10)), eps_suffix(None)
     (', eps = 1/10 (time step 2 eps = 1/5)', ', every eps (the time step is 2 eps)')

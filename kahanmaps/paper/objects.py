@@ -80,7 +80,7 @@ class PaperObjects:
     order: int = 3  # to which order in eps^2 series are expanded
     lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient of the inhomogeneous part, where it is given
     known_chi: tuple[Any, ...] | None = None  # coefficients of chi, constant term first, where they are in K
-    varied: bool = True  # whether variations vary anything: not in their control
+    varied: bool = True  # whether variations are applied; False for their control
 
     def __post_init__(self) -> None:
         if self.step_eps is None:

@@ -86,7 +86,7 @@ class Claim:
     certified: str = ""  # the names of the claims of `certificate` that it is about, {} for 0, ..., m - 1
     statement: str = ""  # of a claim that is tested for several variations: the statement, and the variation
     variation: str = ""
-    misprint: str = ""  # not empty: this is the form printed, it fails, and here is why
+    misprint: str = ""  # if not empty: why the formula, which is as printed, is wrong
 
     def makes_sense(self, m: int) -> bool:
         """Whether the statement exists for this m."""

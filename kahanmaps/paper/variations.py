@@ -15,7 +15,7 @@ from kahanmaps.paper.objects import PaperObjects
 
 @dataclass(frozen=True)
 class Variation:
-    """A variation: its title, the least m for which it is one, and the theorem for claims that are not expanded."""
+    """A variation: its title, the least m for which it exists, and the theorem for claims that are not expanded."""
 
     title: str
     function: Callable[[PaperObjects], PaperObjects]

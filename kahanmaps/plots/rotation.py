@@ -82,7 +82,7 @@ def plot_rotation(
     if not rows:
         raise InputError(
             "found no initial point with a rotation number, expected one on a smooth level at a real root of chi, or "
-            "on a curve of genus 1 or 0; kahanmaps geometry says what a single point lies on"
+            "on a curve of genus 1 or 0; kahanmaps geometry describes the curve of a single point"
         )
     if len(rows) > len(COLORS):
         raise InputError(f"found {len(rows)} real roots of chi, expected at most {len(COLORS)} in one picture")

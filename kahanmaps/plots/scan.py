@@ -68,7 +68,7 @@ def plot_scan(
         if modulo not in known:
             tried = ", ".join(map(str, known)) or "none were tried"
             raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
-        # The special members, each with the growth of a component that it is on and has the degrees of.
+        # The special members, each with the growth of a component with its degrees that contains it.
         unassigned = {degrees: list(points) for degrees, points in known[modulo].classes.items()}
         special = []
         for kind, some in kinds.items():

@@ -76,7 +76,7 @@ class Style:
 
     @property
     def smallest(self) -> float:
-        """The size of notes and of numbers beside points: two points less, but at least the legible size 6."""
+        """The size of notes and of labels in pictures: font_size - 2, but at least 6, the smallest legible size."""
         return min(self.font_size, max(6.0, self.font_size - 2))
 
     def settings(self) -> dict[str, Any]:

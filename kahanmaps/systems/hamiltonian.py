@@ -55,7 +55,7 @@ class CubicHamiltonian(LatexDisplay):
     def __post_init__(self) -> None:
         n = len(names_of(self.H))
         if degree(self.H) > 3:
-            raise InputError(f"H has degree {degree(self.H)}, expected at most 3, or the system is not quadratic")
+            raise InputError(f"H has degree {degree(self.H)}, expected at most 3: otherwise x' = f(x) is not quadratic")
         if (self.J.nrows(), self.J.ncols()) != (n, n):
             raise InputError(f"J is {self.J.nrows()} x {self.J.ncols()}, expected {n} x {n} for {n} variables")
         for i in range(n):

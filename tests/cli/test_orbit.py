@@ -194,7 +194,7 @@ def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path):
     assert (outcome.status, outcome.out) == (0, "")
     assert np.load(tmp_path / "x.npy").tolist() == points
     assert outcome.err.startswith(
-        f"{tmp_path / 'x.npy'}: completed: 30 steps; largest observed drift of the block integrals: "
+        f"{tmp_path / 'x.npy'}: completed: 30 steps; largest observed drift of the integrals h/(1 + eps^2 D): "
     )
 
 
@@ -202,7 +202,7 @@ def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singul
     end = kahanmaps(f"{MEMBER} --steps 30 --arithmetic float --format jsonl").records[-1]
     assert list(end["drift"]) == [f"h/(1 + eps^2 D) at t = {root}" for root in (1, 2, 3)]
     assert end["near_singular"] == 0
-    assert f"drift of the block integrals: {max(end['drift'].values()):.3g}" in end["message"]
+    assert f"drift of the integrals h/(1 + eps^2 D): {max(end['drift'].values()):.3g}" in end["message"]
     end = kahanmaps(f"{TOP} --steps 5 --arithmetic float --format jsonl").records[-1]
     assert (end["near_singular"], end["message"], "drift" in end) == (0, "5 steps", False)
 

@@ -45,4 +45,4 @@ def test_a_pole_ends_the_orbit_with_a_message_and_wrong_values_are_refused():
     assert "singular" in result.message
     assert "not defined at the initial point" in commutator(square, square, "1/2", [1], 3).message
     refuses("found 0 steps", commutator, square, square, 1, [1], 0)
-    refuses("found a start with 2 coordinates, expected 1", commutator, square, square, 1, [1, 2], 3)
+    refuses("found an initial point with 2 coordinates, expected 1", commutator, square, square, 1, [1, 2], 3)

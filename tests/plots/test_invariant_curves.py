@@ -145,8 +145,8 @@ def test_one_pole_ends_the_orbit_in_all_planes_and_a_plane_at_rest_is_said_to_be
 @together(
     "starts, steps, message",
     [
-        ([], 5, "found 0 starts"),
-        ([START[4]] * 8, 5, "found 8 starts"),
+        ([], 5, "found 0 initial points"),
+        ([START[4]] * 8, 5, "found 8 initial points"),
         ([START[4]], -1, "found -1 steps"),
         ([START[4]], MAX_POINTS, "expected 0 or more steps and at most 1000000 points"),
         ([[1, 2]], 5, "found a point with 2 coordinates, expected 4"),

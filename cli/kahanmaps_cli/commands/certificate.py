@@ -31,7 +31,7 @@ _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certifica
     "all of these); or all that a search proves: integrals, density, poisson, darboux, symmetry, equivalence (to a "
     "system of the catalogue); or entropy: positive entropy of a planar map.",
 )
-@click.option("--all", "everything", is_flag=True, help="Certify all of these claims, with the searches.")
+@click.option("--all", "everything", is_flag=True, help="Certify all of these claims, also those of searches.")
 @integral_option("Certify that this function of x and eps is an integral.", into="integrals")
 @click.option(
     "--commute",
@@ -44,7 +44,7 @@ _CHECKERS = ("rocq", "gp", "sympy")  # those of kahanmaps.certificates.certifica
     metavar="OTHER",
     help="Certify that T, given by --by, takes the Kahan map of SYSTEM to that of OTHER, for the same eps.",
 )
-@click.option("--by", metavar="EXPRS", help="T: for each variable of OTHER one in those of SYSTEM: 'x + 1; 2*y'.")
+@click.option("--by", metavar="EXPRS", help="T as expressions in the variables of SYSTEM, e.g. 'x + 1; 2*y'.")
 @click.option("--period", type=Whole(1), metavar="N", help="Certify that the N-th iterate of the map is the identity.")
 @click.option(
     "--effort",

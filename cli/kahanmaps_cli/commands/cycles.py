@@ -70,8 +70,8 @@ def command(system: str | None, **options: Any) -> int:
 
         def print_text() -> None:
             map_name = "the Kahan map" if file.is_quadratic else file.map.kind
-            share = lib.eps_share(file.map)
-            print_stdout(f"# {file.name}, {map_name} on P^{file.dim} over GF(p){share and ', '}{share}")
+            about_eps = lib.describe_eps(file.map)
+            print_stdout(f"# {file.name}, {map_name} on P^{file.dim} over GF(p){about_eps and ', '}{about_eps}")
             for census in runs:
                 at_eps = f", eps = {census.eps}" if file.map.has_eps else ""
                 print_stdout(f"\n# p = {census.prime}{at_eps}")

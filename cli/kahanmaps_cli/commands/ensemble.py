@@ -44,7 +44,7 @@ _MAX_VALUES = 200_000  # of the integrals
 @click.option("-v", "--verbose", is_flag=True, help="Print the method and its reason on standard error.")
 @opt.output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """Compute many float orbits of the map of SYSTEM: how many complete or escape, how well integrals are conserved.
+    """Compute many float orbits of the map of SYSTEM: how many are completed or escape; drift of integrals.
 
     \b
       kahanmaps ensemble paper_m2 --random 1000 --box 1/2 --seed 1 \\

@@ -32,19 +32,19 @@ def command(system: str | None, as_json: bool, quiet: bool, start: Any, **option
     belong to the roots of chi, where chi(t)^2 = det(t I - A). For each irreducible factor of chi the command prints k^3
     of the Hesse cubic X^3 + Y^3 + Z^3 = 3 k X Y Z, a Weierstrass model with its j-invariant, discriminant and bad
     primes, the translation point, its order (finite or infinite, proved) and its canonical height. For each real root
-    it prints the rotation number, in (0, 1/2] and up to sign, with an error bound, that of the flow at the time step
-    2 eps, and the phase error, their difference. There is no phase error beyond a singular level, as seen from small
+    it prints the rotation numbers of the map (in (0, 1/2], up to sign, with an error bound) and of the flow at the time
+    step 2 eps, and their difference, the phase error, unless the level of the initial point is singular for a smaller
     eps. A pair of complex roots has two numbers instead: the coordinates of the translation in a reduced basis of the
     lattice of periods. The last lines say how many real components the level set has (closed at infinity), and whether
     the orbit is dense in those that it visits: proved for one circle, otherwise supported by the absence of integer
     relations of the rotation numbers up to the given size.
 
-    For any other map the command searches for a curve of genus 1 or 0 that contains the orbit, of any dimension, and
+    For any other map, in any dimension, the command searches for a curve of genus 1 or 0 that contains the orbit, and
     proves what it finds. For genus 1 it prints a Weierstrass model, the j-invariant, the bad primes, the translation,
     its canonical height and its rotation number, for genus 0 the multiplier kappa. If only an iterate maps the curve to
-    itself, the numbers are about this iterate.
+    itself, the numbers refer to this iterate.
 
-    Exit status: 0, 2 usage error, 3 if no curve was found.
+    Exit status: 0 done, 2 usage error, 3 if no curve was found.
     """
     file = load_system(system, {**options, "quiet": quiet})
     normal_form = file.normal_form

@@ -37,8 +37,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     denominator det(I - eps f'(x)). Their images are followed along power series modulo large primes. A singularity is
     confined if after some steps the image is a hypersurface again. Without --eps two values are tried and compared.
 
-    "ranks" are the dimensions of the images after 1, 2, ... steps, and "pole orders" the orders at which they lie at
-    infinity, for the first steps. Z is the hyperplane at infinity. Confined singularities are evidence for
+    "ranks" are the dimensions of the images after 1, 2, ... steps, and "pole orders" the multiplicities with which
+    they lie in the hyperplane at infinity, called Z, for the first steps. Confined singularities are evidence for
     integrability, and no proof: those of henon_heiles are confined, and its degrees grow exponentially. "not confined"
     is given with the number of steps that were tried. Where the map is not dominant, so that its image lies in a
     hypersurface, nothing is followed.
@@ -49,7 +49,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Where polynomials are too large, ? stands for all hypersurfaces with the same multiplicity and the same outcome,
     which are represented by random points.
 
-    Exit status: 0 done, 2 usage error, 3 undecided (the work limit was reached, or two points or two eps differ).
+    Exit status: 0 done, 2 usage error, 3 undecided (work limit reached, or two random points or eps disagree).
     """
     from kahanmaps.laboratory.singular.singularities import default_eps
 
@@ -75,7 +75,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             "contracted_at",
             "confined_at",
         )
-        steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
+        step_keys = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
         records = [
             {
                 **lib.attributes(run, *run_keys, singular_everywhere="is_undefined", dominant="is_dominant"),
@@ -85,7 +85,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
                 "hypersurfaces": [
                     {
                         **lib.attributes(surface, *hypersurface_keys, "followed", "settled_at", "note", "stage"),
-                        **{name: [getattr(step, of) for step in surface.steps] for name, of in steps.items()},
+                        **{name: [getattr(step, key) for step in surface.steps] for name, key in step_keys.items()},
                         "primes": [str(prime) for prime in surface.primes],
                     }
                     for surface in run.hypersurfaces
@@ -108,8 +108,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         )
     else:
         name = file.map.denominator_name
-        share = lib.eps_share(file.map)
-        print_stdout(f"# {file.name}, dimension {file.map.dim}{share and ', '}{share}")
+        about_eps = lib.describe_eps(file.map)
+        print_stdout(f"# {file.name}, dimension {file.map.dim}{about_eps and ', '}{about_eps}")
         if symbolic is not None:
             factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
             print_stdout(f"factors of {name}\t{formula(factors, 200) or 'none'}")

@@ -30,7 +30,7 @@ scan_options: Callable[[F], F] = opt.stack(
     click.option(
         "--primes",
         metavar="P,Q,...",
-        help="Compute modulo these primes, at least three (default: by the number of parameters).",
+        help="Compute modulo these primes, at least three (the default depends on the number of parameters).",
     ),
     opt.effort_options,
     click.option(

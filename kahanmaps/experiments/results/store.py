@@ -414,7 +414,7 @@ class Store(HtmlDisplay):
             if names is None or name in names:
                 with self._reading(f"the experiment {quoted(name)}"):
                     if total != (planned or 0):
-                        raise ValueError(f"{total} tasks are said to be planned, and {planned or 0} are")
+                        raise ValueError(f"the plan has {planned or 0} tasks, expected {total}")
                     limited = TaskLimits(**_table(limits))
                     chosen.append(StoredExperiment(name, definition, limited, total, index(tasks), id, offset))
                     offset += total

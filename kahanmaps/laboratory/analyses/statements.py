@@ -42,7 +42,7 @@ def of_vector_field(result: AnalysisResult) -> Iterator[Statement]:
     elif not search.found:
         yield Statement(PROVED, "f = 0 has no solution over the complex numbers: there is no fixed point")
     else:
-        # Fixed points of the flow are those of the map where det(I - eps f'(x)) is not 0.
+        # A fixed point of the flow is one of the map if det(I - eps f'(x)) is not 0 there.
         are_fixed = [points.are_fixed_by_map(result.eps) for points in search.found]
         undefined = [
             points.where for points, is_fixed in zip(search.found, are_fixed, strict=True) if is_fixed is False

@@ -74,7 +74,7 @@ class DynamicalDegreeBounds(ResultPart):
 
     @property
     def text(self) -> str:
-        """The interval, and the degrees that give its lower end."""
+        """The two bounds, and the degrees from which the lower one follows."""
         return (
             f"dynamical degree between {self.lower} and {self.upper}: degree of iterate {2 * self.steps} at least "
             f"{self.degree_below}, of iterate {self.steps} at most {self.degree_above}"
@@ -132,8 +132,8 @@ def bound_dynamical_degree(
 def is_birational(map_: Map, rng: random.Random) -> bool:
     """Return whether a map over GF(p) is birational; True is a proof.
 
-    Also returns False if the inverse is not known. For every factor, a point must solve the equation of the inverse at
-    its image, which is tested as an identity of forms, and must be the only solution, which is tested at one point.
+    Also returns False if the inverse is not known. For every factor it is tested that a point solves the equation of
+    the inverse at its image (as an identity of forms), and that it is the only solution (at one random point).
     """
     for factor in map_.factors:
         try:

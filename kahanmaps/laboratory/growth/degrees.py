@@ -61,7 +61,7 @@ _ENOUGH_QUOTIENTS = 6
 _AGREEING = 12  # measured terms beyond twice the longest pattern that must agree with the derived ones
 _LARGE = 2000  # from this degree on no further measured terms need to agree
 _MATRIX_TERMS = 60  # of monomial maps
-_REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
+_REPLACEMENTS = 6  # of lines in special position, of which one in 2^40 is expected
 
 
 @dataclass(frozen=True)
@@ -310,7 +310,7 @@ def degree_growth(
 
     Returns:
         A `DegreeGrowth`, measured modulo random primes of 61 bits; only bounds of the dynamical degree of planar maps
-        are proved. A TimeLimit ends the search with the degrees so far; if `effort` is a Budget, it is raised.
+        are proved. A TimeLimit ends the search with the degrees so far; it is passed on if `effort` is a Budget.
 
     Raises:
         InputError: for eps = 0, and for other values out of range.
@@ -338,7 +338,7 @@ def degree_growth(
     except TimeLimit as stop:
         if isinstance(effort, Budget):
             raise
-        if search.measured is not None:  # the bounds of the dynamical degree alone were cut
+        if search.measured is not None:  # only the bounds of the dynamical degree are missing
             return replace(search.measured, message=f"{search.measured.message}; {stop}")
         return search.result(Ended.STOPPED, f"{stop} at iterate {len(search.degrees)}")
 
@@ -424,7 +424,7 @@ class _Search:
                 if max_terms is not None and len(self.degrees) > max_terms:
                     raise Stopped(Ended.TERMS, f"{counted(max_terms, 'iterate')} measured, as requested")
                 if len(self.degrees) > MAX_TERMS:
-                    raise Stopped(Ended.TERMS, f"{MAX_TERMS} iterates, and no more are worked out")
+                    raise Stopped(Ended.TERMS, f"{MAX_TERMS} iterates measured, the largest number that is allowed")
                 progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
                 self._step(new_line)
                 if self.degrees[-1] == 0 and max_terms is None:

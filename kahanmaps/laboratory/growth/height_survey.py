@@ -161,9 +161,9 @@ def height_survey(
     """
     eps = resolve_eps(eps, time_step, h)
     if isinstance(starts, int) and not 1 <= starts <= _MAX_STARTS:
-        raise InputError(f"found {starts} starts, expected 1 to {_MAX_STARTS}")
+        raise InputError(f"found {starts} initial points, expected 1 to {_MAX_STARTS}")
     if hasattr(starts, "__len__") and len(starts) == 0:
-        raise InputError("found no starts, expected at least one")
+        raise InputError("found no initial points, expected at least one")
     is_stage, budget = isinstance(effort, Budget), budget_for("heights", effort)
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(system)

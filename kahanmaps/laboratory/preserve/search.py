@@ -139,16 +139,16 @@ def add_relation_spaces(
     map_: ModularMap,
     profile: Profile,
     result: SpaceSearch,
-    largest: int,
+    max_dimension: int,
     budget: Budget,
     progress: Callable[[str], None],
 ) -> str:
-    """Add spaces contained in the span of the relations of a degree until the integrals of the profile are reached.
+    """Add spaces contained in the span of the relations of a degree until they give as many integrals as orbits show.
 
-    Only degrees in which the relations of all orbits span at most `largest` dimensions are tried. Returns a sentence
-    on the degrees that were skipped because the work limit was reached; empty otherwise.
+    Only degrees in which the relations of all orbits span at most `max_dimension` dimensions are tried. Returns a
+    sentence on the degrees that were skipped because the work limit was reached; empty otherwise.
     """
-    small_nullities = takewhile(lambda size: size < largest, profile.nullities)
+    small_nullities = takewhile(lambda size: size < max_dimension, profile.nullities)
     for degree in [degree for degree, size in enumerate(small_nullities, 1) if size]:
         known_spaces = result.all_spaces
         independent_count = gradient_rank(map_, known_spaces)
@@ -158,8 +158,8 @@ def add_relation_spaces(
             continue
         if budget.is_spent:
             return f"relations of degree {degree} and more were not searched: {SPENT}"
-        progress(f"closed forms from the relations of degree {degree}")
-        spaces = darboux_spaces(map_, degree, known_spaces, largest)
+        progress(f"polynomials in the span of the relations of degree {degree}")
+        spaces = darboux_spaces(map_, degree, known_spaces, max_dimension)
         if spaces is not None:
             result.searched.append(degree)
         if spaces and gradient_rank(map_, [*known_spaces, *spaces]) > independent_count:

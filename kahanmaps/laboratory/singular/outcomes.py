@@ -456,7 +456,7 @@ def _outcome_at(
     data = NO_ORBIT_DATA
     if up is None:
         data = curve.orbit_data(limits.shown)
-        # After the steps that are shown the image may be a hypersurface again; then its orders are those of that one.
+        # After the steps that are shown the image may be a hypersurface again, whose pattern continues this one.
         longest = min(limits.series_steps, limits.reach)
         while up is None and is_complete and not data.is_settled and len(run) < longest:
             run, is_complete = curve.steps(min(2 * len(run), longest), tangents, _MAX_TANGENT_PRECISION)

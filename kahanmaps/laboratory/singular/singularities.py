@@ -65,7 +65,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
-MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
+MAX_DIGITS = 10_000  # of the numbers in eps and the system
 _DIGITS_PER_MILLION = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # of units, by dimension
 _FEW_DIGITS = 50
 _DEFAULT_STEPS = {1: 1000, 2: 1000, 3: 500, 4: 250}  # by dimension
@@ -154,7 +154,7 @@ class SingularityRun(PrintableResult):
 
     @property
     def unit(self) -> str:
-        """The unit of the steps of hypersurfaces."""
+        """What `steps` of hypersurfaces counts: steps of the map, or single maps of a composition."""
         return "step" if self.word is None else "single map"
 
     @property
@@ -185,15 +185,15 @@ def singularities(
         eps: half the time step, an exact number; None: two values are tried, and their patterns must agree.
         time_step, h: the time step 2 eps, instead of eps.
         steps: the number of steps for which hypersurfaces are followed: by default 1000 in the plane, 500 in dimension
-            3, 250 in dimension 4 and 100 above, fewer if series are needed at all steps.
+            3, 250 in dimension 4 and 100 above, fewer if all of them need power series.
         seed: the random seed.
         effort: each increase by 1 doubles the work limit.
         progress: called with a message for each hypersurface.
 
     Returns:
-        A `SingularityRun`, without eps that of the first value. Hypersurfaces are exact; their outcome is measured at
+        A `SingularityRun`; if eps is None, for the first value. Hypersurfaces are exact; their outcome is measured at
         two random points modulo two random primes, and "not confined" refers to this number of steps. A TimeLimit ends
-        the computation early; if `effort` is a Budget, it is raised.
+        the computation early; it is passed on if `effort` is a Budget.
 
     Raises:
         InputError: for dimensions above 6, a wrong number of steps, numbers too long for the budget, and different
@@ -230,7 +230,7 @@ def singularities(
     map_at_eps, rng = map_.at(exact_eps), random.Random(f"singularities {derive_seed(seed, map_.subject, exact_eps)}")
     try:
         if is_long(map_at_eps):
-            raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
+            raise TooLarge("forms that would take long to expand, too long for their determinant")
         map_form = homogeneous_map(map_at_eps)
         count_work(3 * sum(map(len, map_form.forms)))
     except TooLarge:  # a composition: follow it map by map, or distinguish hypersurfaces by random points
@@ -238,7 +238,7 @@ def singularities(
             line = Line(reduced(map_, exact_eps, rng), rng, limits.budget, _MAX_DEGREE)
             line.step(1)
         except Stopped as error:
-            raise InputError(f"found a composition that is too long here: {error.message}") from error
+            raise InputError(f"found a composition whose singularities cannot be followed: {error.message}") from error
         run = SingularityRun(exact_eps, "?", line.degree)
         if not _is_dominant(map_, exact_eps):
             return replace(run, is_dominant=False)
@@ -247,7 +247,7 @@ def singularities(
         if not map_at_eps.is_bilinear:
             raise TooLongFormula(
                 "found a composition of maps whose forms on projective space are too large, expected smaller maps, or "
-                "maps whose equations are linear in both points: their singularities are computed at random points"
+                "maps whose equations are linear in both points, which are treated at random points"
             ) from None
         at_random = tuple(outcomes_at_random(map_, exact_eps, rng, limits))
         return replace(run, hypersurfaces=at_random, stopped=limits.budget.is_spent)
@@ -268,28 +268,28 @@ def singularities(
             return followed_run
     tracking = Tracking(*followed_forms(map_form, forms)) if critical_degree else NONE_TRACKED
     hypersurfaces: list[Hypersurface] = []
-    is_cut = False
+    stopped = False
     for form in forms:
-        if is_cut := limits.budget.is_spent:
+        if stopped := limits.budget.is_spent:
             break
         try:
             text = name_of(form.form, map_)
             progress(f"following {text[:40]}")
             hypersurfaces.append(outcome_of(map_, exact_eps, form, text, rng, limits, tracking))
         except TimeLimit:
-            if isinstance(effort, Budget):  # the budget of a larger computation, which is then charged, too
+            if isinstance(effort, Budget):  # of a larger computation, which ends as well
                 raise
-            is_cut = True
+            stopped = True
             break
-    if critical_degree is None and not is_cut:
+    if critical_degree is None and not stopped:
         progress("following critical points")
         too_large = "the polynomials of the exceptional hypersurfaces are too large"
         without_polynomials = (
             unwritten(map_, exact_eps, rng, limits) if map_at_eps.is_bilinear else [Hypersurface(note=too_large)]
         )
         hypersurfaces += without_polynomials
-    is_cut |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
-    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=is_cut)
+    stopped |= limits.budget.is_spent and (critical_degree is None or any(h.settled_at is None for h in hypersurfaces))
+    return replace(run, critical_degree=critical_degree, hypersurfaces=tuple(hypersurfaces), stopped=stopped)
 
 
 def _map_by_map(

@@ -81,7 +81,7 @@ def commutator(f: MapFamily, g: MapFamily, eps: Any, start: Sequence[Any], steps
     if steps < 1:
         raise InputError(f"found {steps} steps, expected at least 1")
     if len(start) != f.dim:
-        raise InputError(f"found a start with {counted(len(start), 'coordinate')}, expected {f.dim}")
+        raise InputError(f"found an initial point with {counted(len(start), 'coordinate')}, expected {f.dim}")
     value, x = rational(eps), to_floats(start)
 
     def sizes(at: fmpq, count: int) -> tuple[list[float], str]:

@@ -43,7 +43,7 @@ from kahanmaps.maps.values import start_rows
 from kahanmaps.processes import processors
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-SAMPLED = 1000  # steps between samples of the block integrals
+SAMPLED = 1000  # steps between samples of the integrals of the planes
 _MAX_SCALAR_ORBITS = 4  # up to this number machine code takes orbits one by one
 _CHUNKS_PER_THREAD = 8  # more than one, since other programs may occupy a core
 _RECORDED_NUMBERS = 1_000_000  # in a portion
@@ -101,7 +101,7 @@ class FloatEnsemble(AttributeHints):
         threads: the number of cores that numba may use (default: all).
         integrals: functions of a point, or rational functions of the variables and eps, such as those of
             `load(name).integrals`, by name; their drift is measured at recorded points.
-        sampled: the number of steps between samples of the block integrals of the normal form, and of `integrals` where
+        sampled: the number of steps between samples of the integrals of the planes, and of `integrals` where
             no points are recorded.
         radius: if given, every step is examined, and the first point with max |x_i| > radius of each orbit is kept.
 
@@ -260,7 +260,7 @@ class FloatEnsemble(AttributeHints):
 
     @property
     def drift(self) -> tuple[Drift, ...]:
-        """The drift of the block integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
+        """The drift of the integrals h/(1 + eps^2 D), one for each root of chi, and of `integrals`."""
         drifts = []
         if self._blocks is not None:
             current = self._blocks.distances(self._batch.z, self._base)
@@ -358,21 +358,21 @@ class FloatEnsemble(AttributeHints):
             for interval in intervals:
                 length = (first + count) // interval - first // interval if interval else 0
                 tables.append(RecordTable(interval, np.empty((length, rows, self.n))))
-            filled = [table for table in tables if len(table.states)]
+            nonempty = [table for table in tables if len(table.states)]
             if self._compiled:
 
-                def advance(start: int, first: int = first, count: int = count, filled: Any = filled) -> None:
-                    self._machine_code.advance(batch, start, min(self.n, start + chunk), first, count, filled)
+                def advance(start: int, first: int = first, count: int = count, nonempty: Any = nonempty) -> None:
+                    self._machine_code.advance(batch, start, min(self.n, start + chunk), first, count, nonempty)
 
                 with ThreadPoolExecutor(self._threads) if len(chunk_starts) > 1 else nullcontext() as pool:
                     list(map(advance, chunk_starts) if pool is None else pool.map(advance, chunk_starts))
             else:
-                advance_by_numpy(self._step, batch, first, count, filled)
+                advance_by_numpy(self._step, batch, first, count, nonempty)
             self.step = first + count
             for interval, states in tables:  # states after the end of an orbit become NaN
                 if len(states) and (batch.status != RUNNING).any():
-                    at = (first // interval + 1 + np.arange(len(states))) * interval
-                    after_end = (batch.failed_at >= 0) & (at[:, None] >= batch.failed_at)
+                    recorded_steps = (first // interval + 1 + np.arange(len(states))) * interval
+                    after_end = (batch.failed_at >= 0) & (recorded_steps[:, None] >= batch.failed_at)
                     states.transpose(0, 2, 1)[after_end] = np.nan
             if self._blocks is not None and len(tables[1].states):
                 states = tables[1].states.transpose(1, 0, 2)

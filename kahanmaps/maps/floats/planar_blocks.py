@@ -105,7 +105,7 @@ class PlanarBlocks:
         return integrals
 
     def distances(self, z: FloatArray, base: NDArray[np.complex128]) -> FloatArray:
-        """Return the distances (blocks, ...) of the block integrals at the states z (rows, ...) from `base`."""
+        """Return the distances (blocks, ...) of h/(1 + eps^2 D) at the states z (rows, ...) from `base`."""
         with np.errstate(all="ignore"):
             distance: FloatArray = np.abs(self.integrals(z) - base)
         distance[np.isnan(distance)] = np.inf

@@ -51,8 +51,8 @@ class Rotation:
     It is that of the iterate number `steps` of the map: 2 if the level curve has two real components, which the map
     exchanges. At complex roots the orbit lies on a real torus of dimension 2, and `numbers` are the coordinates of
     the translation in a reduced basis of the periods. `flow` is the rotation number of the time-2 eps map of the flow,
-    2 eps times its frequency. `phase_error` is `number` minus `flow`, the error of the phase in one step; None if there
-    is a singular level between the initial point and smaller eps. `component` is the component of the closed level
+    2 eps times its frequency. `phase_error` is `number` minus `flow`, the error of the phase in one step; None if the
+    level of the initial point is singular at some smaller eps. `component` is the component of the closed level
     curve that contains the initial point, if there are two: "oval" or "unbounded".
     """
 

@@ -88,7 +88,7 @@ def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
                 j, y = index[point[0]]  # k T = +-j T
                 return abs(k - j if point[1] == y else k + j)
         upward, downward = curve.add(upward, giant_step), curve.add(downward, negative_giant_step)
-    raise AssertionError("no multiple of T in the Hasse interval is zero: it would be a mistake of ours")
+    raise AssertionError("no multiple of T in the Hasse interval is zero: please report this")
 
 
 class LevelCubic:

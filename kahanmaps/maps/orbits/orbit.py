@@ -477,7 +477,7 @@ class Trajectory(HtmlDisplay):
         if self.orbit.drift:
             float_data["drift"] = {drift.name: json_float(drift.largest) for drift in self.orbit.drift}
             largest = max(float(drift.largest) for drift in self.orbit.drift)
-            message += f"; largest observed drift of the block integrals: {largest:.3g}"
+            message += f"; largest observed drift of the integrals h/(1 + eps^2 D): {largest:.3g}"
         if self.orbit.near_singular:
             first = self.orbit.near_singular_at
             message += f"; near-singular steps: {self.orbit.near_singular}, the first from step {first}"

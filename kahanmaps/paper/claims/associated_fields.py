@@ -38,7 +38,7 @@ def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
         B = o.B_signs(signs)
         slope = o.slope(lambda o, x: o.Kf(o.B_signs(signs), x), o.x, o.J.transpose() * v)
         yield o.dot(v, o.value(o.g(B), o.x)), slope
-        # B_s = I + sum of B_i - I over the minus signs, as a polynomial in A.
+        # B_s = I + the sum of (B_i - I) over the minus signs, as a polynomial in A.
         minus = [o.lagrange(i) for i in o.each if signs[i] < 0]
         coefficients = [o.sum([c[k] for c in minus]) for k in range(o.m)]
         coefficients[0] = coefficients[0] + o.number(1 - len(minus))

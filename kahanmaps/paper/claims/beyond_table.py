@@ -1,7 +1,7 @@
 """The table of the paper's statements under varied hypotheses: proved or refuted, cell by cell.
 
-Each cell is a claim of section 10, decided like all of them for the member in general. A statement that fails is shown
-to by the smallest counterexample: all numbers 0 or 1 and eps = 1, as few ones as can be, in the order of m.
+Each cell is a claim of section 10, decided like the others for the generic member. For a statement that fails, the
+smallest counterexample is given: all numbers are 0 or 1, as few as possible are 1, and eps = 1.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def smallest_counterexample(function: ClaimFunction, variation: str) -> tuple[st
 def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) -> PaperObjects:
     """Objects in normal form with A = diag(roots, roots), H the sum of the monomials, x the sum of the unit vectors.
 
-    Where there are brackets among the ones they make up J.
+    If some of the `ones` are brackets {x_i, x_j}, these are the brackets of J.
     """
     n = 2 * m
     cubic, hessian, linear, J = ([0] * n**k for k in (3, 2, 1, 2))
@@ -121,7 +121,7 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) 
         elif kind == "J":
             J[place[0] * n + place[1]], J[place[1] * n + place[0]] = 1, -1
         else:
-            # Every derivative of a monomial of this degree, along coordinates that it has in some order, gains 1.
+            # The derivative of the monomial along its own coordinates, in each of their orders, gains 1.
             where = [i for i, e in enumerate(place) for _ in range(e)]
             entries = {3: cubic, 2: hessian, 1: linear}[len(where)]
             for order in itertools.permutations(where):

@@ -269,13 +269,13 @@ STATEMENTS: list[tuple[ClaimFunction, str, str, dict[str, Any], str]] = [
 
 
 def _cell(function: ClaimFunction, name: str, holds: bool) -> ClaimFunction:
-    """The claim that the statement of a function holds, or fails, for the objects varied."""
+    """The claim that the statement of a function holds, or fails, for the varied objects."""
 
     def cell(o: PaperObjects) -> Pairs:
         pairs = list(function(varied(name, o)))
         if holds or not pairs:
             yield from pairs
-        else:  # one of them has to differ
+        else:  # some pair has to differ
             yield tuple(o.K.column([e for pair in pairs for e in entries(pair[side])]) for side in (0, 1))
 
     cell.__name__ = f"{function.__name__}_{name}"

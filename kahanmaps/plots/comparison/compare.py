@@ -399,7 +399,7 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
     for row in rows:
         starts.append(tuple(exact(float(x)) if isinstance(x, float) and isfinite(x) else rational(x) for x in row))
         if len(row) != system.dim:
-            raise InputError(f"found a start with {counted(len(row), 'coordinate')}, expected {system.dim}")
+            raise InputError(f"found an initial point with {counted(len(row), 'coordinate')}, expected {system.dim}")
     return tuple(starts)
 
 
@@ -457,9 +457,9 @@ def _initial(
 def _references(
     system: QuadraticSystem, starts: Sequence[Sequence[fmpq]], eps: fmpq, progress: Callable[[str], None]
 ) -> tuple[fmpq | None, FloatArray | None]:
-    """Return a time, a power of 2 times the step, in which the solutions move by about their size, and its end points.
+    """Return a time, after which the solutions have changed by about their own norm, and their values at that time.
 
-    The direction of time is the sign of eps.
+    The time is the step times a power of 2, and has the sign of eps.
     """
     speeds = [max(abs(entry) for entry in system.over(QQ).value(start)) for start in starts]
     times = [max(abs(entry) for entry in x) / v for x, v in zip(starts, speeds, strict=True) if v != 0]

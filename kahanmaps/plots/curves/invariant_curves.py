@@ -114,10 +114,10 @@ def find_invariant_curves(
     True
     """
     if not 1 <= len(starts) <= MAX_STARTS:
-        raise InputError(f"found {len(starts)} starts, expected 1 to {MAX_STARTS}")
+        raise InputError(f"found {len(starts)} initial points, expected 1 to {MAX_STARTS}")
     if steps < 0 or (steps + 1) * len(starts) > MAX_POINTS:
         raise InputError(
-            f"found {steps} steps from {counted(len(starts), 'start')}, expected 0 or more steps and at most "
+            f"found {steps} steps from {counted(len(starts), 'initial point')}, expected 0 or more steps and at most "
             f"{MAX_POINTS} points"
         )
     normal_form = file.normal_form

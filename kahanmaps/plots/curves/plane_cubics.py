@@ -67,7 +67,7 @@ class PlaneCubic:
         u, v = np.moveaxis(points, -1, 0)
         return np.asarray(self.denominator * self.h_at(u, v) - self.numerator * (1 + self.eps**2 * self.D_at(u, v)))
 
-    def value_in_space(self, angles: Floats, length: float) -> Floats:
+    def value_on_sphere(self, angles: Floats, length: float) -> Floats:
         """Return values at points (..., 2) of a half sphere, which represents the projective plane.
 
         The first angle is the direction in the plane, the second the angle from the axis, pi/2 at infinity:

@@ -255,7 +255,7 @@ class Disc:
     def curves(self, cubic: PlaneCubic) -> tuple[Floats, ...]:
         """Return the pieces (n, 2) of a curve in the panel, closed or from the rim to the rim."""
         turn = ((_CUT, _CUT + 2 * np.pi), (0.0, np.pi / 2))
-        pieces = zero_curves(lambda angles: cubic.value_in_space(angles, self.length), turn)
+        pieces = zero_curves(lambda angles: cubic.value_on_sphere(angles, self.length), turn)
         return tuple(
             np.sin(rows[:, 1:]) * np.stack([np.cos(rows[:, 0]), np.sin(rows[:, 0])], axis=1) for rows in pieces
         )

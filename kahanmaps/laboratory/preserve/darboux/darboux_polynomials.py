@@ -46,7 +46,7 @@ from kahanmaps.maps.kahan import SystemLike
 
 _MAX_TERMS = 2000  # of a polynomial: the number of unknowns
 _MAX_PRODUCTS = 2000
-Law = tuple[CofactorProduct, int]  # a product of cofactors and its numerical factor modulo a prime
+ScaledProduct = tuple[CofactorProduct, int]  # a product of cofactors and its numerical factor modulo a prime
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def darboux_polynomials(
     if len(candidates) > _MAX_PRODUCTS:
         reason = f"{len(candidates)} products of cofactors, of which the first {_MAX_PRODUCTS} were tried"
         candidates = candidates[:_MAX_PRODUCTS]
-    all_spaces = dict[Law, DarbouxSpace]()
+    all_spaces = dict[ScaledProduct, DarbouxSpace]()
     try:
         sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
         for product in candidates:
@@ -179,19 +179,19 @@ def darboux_polynomials(
                 break
             progress(f"cofactor {product.text(cofactors)}")
             all_spaces |= {(product, c): space for c, space in cofactor_spaces(sample, product, degree)}
-        nonconstant = dict[Law, DarbouxSpace]()
-        for law, space in all_spaces.items():
+        nonconstant = dict[ScaledProduct, DarbouxSpace]()
+        for C, space in all_spaces.items():
             basis = [vector for vector in space.basis if any(vector[1:])]  # without constants, which have C = 1
             if basis:
-                nonconstant[law] = DarbouxSpace(space.dim, space.degree, basis)
+                nonconstant[C] = DarbouxSpace(space.dim, space.degree, basis)
         # Different products of cofactors may be the same function. If products span the space of one of them, the equal
         # spaces of the others are left out as well.
-        listed = [space for law, space in nonconstant.items() if _is_spanned_by_products(nonconstant, law, map_.prime)]
-        for law, space in nonconstant.items():
+        listed = [space for C, space in nonconstant.items() if _is_spanned_by_products(nonconstant, C, map_.prime)]
+        for C, space in nonconstant.items():
             if space not in listed:
                 listed.append(space)
-                others = [other for key, other in all_spaces.items() if key[0] == law[0] and key != law]
-                result = _closed_form(laboratory, cofactors, law[0], [all_spaces[law], *others], budget)
+                others = [other for key, other in all_spaces.items() if key[0] == C[0] and key != C]
+                result = _closed_form(laboratory, cofactors, C[0], [all_spaces[C], *others], budget)
                 if isinstance(result, str):
                     reason = result
                 else:
@@ -202,10 +202,10 @@ def darboux_polynomials(
     return DarbouxSearch(*laboratory.request, requested, names, tuple(spaces), reason, flow=flow)
 
 
-def _is_spanned_by_products(spaces: dict[Law, DarbouxSpace], law: Law, prime: int) -> bool:
-    """Whether products P Q of elements of other spaces, with cofactors of product `law`, span the space of `law`."""
-    space, (product, c) = spaces[law], law
-    others = {(key[0].powers, key[1]): other for key, other in spaces.items() if key != law}
+def _is_spanned_by_products(spaces: dict[ScaledProduct, DarbouxSpace], C: ScaledProduct, prime: int) -> bool:
+    """Whether products P Q of elements of other spaces, whose cofactors multiply to `C`, span the space of `C`."""
+    space, (product, c) = spaces[C], C
+    others = {(key[0].powers, key[1]): other for key, other in spaces.items() if key != C}
     rows = []
     for (powers, number), space_of_P in others.items():
         quotient = tuple(a - b for a, b in zip(product.powers, powers, strict=True)), c * pow(number, -1, prime) % prime

@@ -98,8 +98,8 @@ class Numbers(NamedTuple):
 class _Search:
     """The search modulo primes for the sections of each curve, for each group of coordinates that is new on it.
 
-    `earlier` contains for each curve, in turn, and each of its groups the index of the group one step before of which
-    it is a copy; None if it is new.
+    `earlier` has a row for each of the curves, which alternate. An entry is None for a new group of coordinates, and
+    for a copy of a group at the previous step the index of that group.
     """
 
     def __init__(self, factors: Sequence[ElementaryMap], start: IntegerPoint, stride: int) -> None:

@@ -24,8 +24,8 @@ _PRIME = 2**61 - 1
 class EllipticSteps:
     """The steps of an orbit by Somos sequences.
 
-    `groups` contains, for the curves in turn, a row with the Coordinates of each group, or the index of the group one
-    step before of which it is a copy. The forms are used from `first` steps of factors on. The sequences begin after
+    `groups` has a row for each of the curves, which alternate: the Coordinates of each group, or for a copy of a group
+    at the previous step its index there. The forms are used from `first` steps of factors on. The sequences begin after
     the first `skipped` points of the orbit.
     """
 
@@ -52,7 +52,7 @@ class EllipticSteps:
 
     @property
     def degree(self) -> int:
-        """The largest degree of a group of coordinates on its curve."""
+        """The largest degree, on their curve, of coordinates computed together."""
         return max(group.degree for row in self._groups for group in row if isinstance(group, Coordinates))
 
     def step(self, last: Sequence[IntegerPoint], number: int) -> IntegerPoint | None:

@@ -54,7 +54,7 @@ _ACCURACY = 1e-15  # of rotation numbers
 class OrbitCurve(PrintableResult):
     """The curve of an orbit, and the map on it; everything but the balls is exact and proved.
 
-    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers are about
+    The k-th iterate, k = `iterate`, maps the curve to itself; `curve`, `point` and the numbers refer to
     this iterate. For genus 1 it is the translation by `point` on `curve`, y^2 = x^3 + A x + B; `degree` is that of the
     coordinates on it. For genus 0 `trace` = kappa + 1/kappa, kappa the multiplier, and trace = 2 for a parabolic map.
     """
@@ -104,7 +104,7 @@ class OrbitCurve(PrintableResult):
 
     @property
     def steps(self) -> int:
-        """1, or 2 if the iterate exchanges two real components; then `rotation` is about its square."""
+        """1, or 2 if the iterate exchanges two real components; then `rotation` is that of its square."""
         return self._rotation[1]
 
     @cached_property
@@ -169,7 +169,7 @@ class OrbitCurve(PrintableResult):
     def to_json(self) -> dict[str, Any]:
         """Return plain data; exact numbers and balls are text."""
 
-        def exact(x: fmpq | None) -> str | None:
+        def text(x: fmpq | None) -> str | None:
             return None if x is None else format_number(x)
 
         return {
@@ -177,7 +177,7 @@ class OrbitCurve(PrintableResult):
             "iterate": self.iterate,
             "A": None if self.curve is None else format_number(self.curve.a4),
             "B": None if self.curve is None else format_number(self.curve.a6),
-            "j": exact(self.j),
+            "j": text(self.j),
             "discriminant": None if self.curve is None else format_number(16 * self.curve.discriminant),
             "bad_primes": None if self.bad_primes is None else self.bad_primes.to_json(),
             "components": self.components,
@@ -185,7 +185,7 @@ class OrbitCurve(PrintableResult):
             "point": None if self.point is None else [format_number(x) for x in self.point],
             "order": self.order,
             "height": None if self.height is None else self.height.str(15),
-            "trace": exact(self.trace),
+            "trace": text(self.trace),
             "rotation": None if self.rotation is None else self.rotation.str(15),
             "steps": self.steps,
             "height_constant": self.height_constant,

@@ -33,7 +33,7 @@ class Relations(Protocol):
         """Return the point with this number from the last ones; None if the relations do not determine it."""
 
     def skip(self, number: int) -> bool:
-        """Return whether the orbit certainly has a point with this number, and later points do not need it."""
+        """Return whether the point with this number certainly exists, and can be skipped: later ones do not need it."""
 
     def point(self, number: int) -> IntegerPoint | None:
         """Return the point with this number if it can be computed directly, otherwise None."""
