@@ -299,7 +299,7 @@ def certificate_of(result: Any, checker: str, *, command: str = "") -> Certifica
                     raise
                 skipped.append(f"{name}: {error}")
     if not claims:
-        raise InputError(f"nothing is proved in this result about {file.name}: no certificate can be written")
+        raise InputError("nothing was found that is proved: no certificate can be written")
     return Certificate.of(checker, claims, formulas.header(command), skipped, limits.terms)
 
 

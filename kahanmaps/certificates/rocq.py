@@ -585,7 +585,9 @@ def rocq_certificate(claims: Sequence[Claim], header: Sequence[str] = ()) -> str
         header: the lines of the initial comment.
     """
     # Nothing in a comment may end it, or begin another one or a string.
-    safe_lines = (line.replace("(*", "( *").replace("*)", "* )").replace('"', "'") for line in header)
+    # Commands quote ' as '"'"', which is written without the quotation marks of strings.
+    quoted = (line.replace("'\"'\"'", "'\\''").replace('"', "'") for line in header)
+    safe_lines = (line.replace("(*", "( *").replace("*)", "* )") for line in quoted)
     lines = ["(*", *(f"   {line}" for line in safe_lines), "   Check: coqc FILE", "*)"]
     lines += ["Require Import Reals.", "Open Scope R_scope.", "", _LEMMA]
     lines += [LIBRARY] if any(isinstance(claim, PositiveEntropy) for claim in claims) else []

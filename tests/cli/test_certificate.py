@@ -17,6 +17,12 @@ def test_the_command_in_the_comment_writes_the_same_certificate_again(kahanmaps)
     assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == first.out
 
 
+def test_the_command_in_a_comment_of_coq_keeps_its_quotes(kahanmaps):
+    text = kahanmaps("""certificate "x' = y^2; y' = 0" --for rocq --integral I1=y""").out
+    (line,) = [line for line in text.splitlines() if "kahanmaps certificate" in line]
+    assert kahanmaps(line.split("kahanmaps ", 2)[2]).out == text
+
+
 def test_a_false_claim_is_refuted_with_status_1_and_writes_nothing(kahanmaps, tmp_path):
     outcome = kahanmaps("certificate euler_top --for rocq --integral x1^2+x2^2 -o", tmp_path / "top.v")
     assert (outcome.status, outcome.out) == (1, "")
@@ -134,7 +140,7 @@ def test_checks_and_searches_write_a_certificate_of_what_they_prove(command, sta
     [
         ("check-integrals euler_top --integral x1", ".gp", 1, "is not written: I1 is not conserved"),
         ("check-poisson henon_heiles", ".gp", 1, "is not written: Pi is no Poisson tensor"),
-        ("find-integrals lorenz", ".v", 3, "is not written: nothing is proved in this result about lorenz"),
+        ("find-integrals lorenz", ".v", 3, "is not written: nothing was found that is proved"),
         ("check-integrals euler_top", ".txt", 2, "expected a file that ends with .v, .gp or .py"),
         ("analyze euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),
         ("check-integrals euler_top --eps 1/10", ".gp", 2, "give --certificate or --eps, not both"),

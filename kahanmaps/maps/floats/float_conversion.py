@@ -24,7 +24,8 @@ def to_float(value: fmpq) -> float:
         nearest = int(value.p) / int(value.q)
     except OverflowError as error:
         raise InputError(
-            "found a number beyond the range of floating-point numbers (1.8e308): use exact arithmetic"
+            "found a number beyond the range of floating-point numbers, expected one below 1.8e308 (exact orbits have "
+            "no such limit)"
         ) from error
     return nearest
 
