@@ -210,6 +210,8 @@ def certificate(
                 skipped.append(f"{name}: {error}")
         if skipped and not proved:
             raise InputError(f"no certificate of {file.name} can be written: {skipped[0]}")
+        if not proved and is_required:
+            raise InputError("found an empty list of claims, expected names, or None for all that need no search")
         if not proved:
             raise InputError(
                 f"no integral or invariant volume form of {file.name} is known: give --integral NAME=EXPR, "

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 _ASPECT = 0.62
 _SPACING = 0.05  # of marked resonances, relative to the height of the axes
 _LEAST, _MAX_DENOMINATOR = 3, 1000  # of them
+_MAX_POINTS = 10_000
 
 
 def plot_rotation(
@@ -51,10 +52,11 @@ def plot_rotation(
     map, dashed lines to an iterate of it, such as the second one where the map exchanges two real components, dotted
     lines to the flow at the time step 2 eps, modulo 1 and up to sign. Horizontal lines mark resonances p/q.
 
-    Raises InputError if no point has a rotation number, for fewer than two points, and for an unknown integral.
+    Raises InputError if no point has a rotation number, for fewer than 2 or more than 10,000 points, and for an
+    unknown integral.
     """
-    if integer(points, "points") < 2:
-        raise InputError(f"found {points} points, expected at least 2")
+    if not 2 <= integer(points, "points") <= _MAX_POINTS:
+        raise InputError(f"found {points} points, expected 2 to {_MAX_POINTS}")
     map_over, integrals, normal_form = file.at(eps), file.integrals, file.normal_form
     require_rational(map_over)
     if against is not None and against not in integrals:

@@ -511,6 +511,7 @@ def test_a_density_that_is_not_invariant_has_no_certificate():
     [
         ("lorenz", {"checker": "gp"}, "no integral or invariant volume form of lorenz is known: give --integral"),
         ("euler_top", {"checker": "coq"}, "expected the checker rocq, gp, sympy, got 'coq'"),
+        ("euler_top", {"checker": "gp", "claims": []}, "found an empty list of claims, expected names"),
         ("euler_top", {"checker": "gp", "claims": ["F9"]}, "expected one of F1, F2, volume"),
         ("zander_120", {"checker": "gp", "claims": ["F"]}, "no claim 'F' of zander_120"),
         ("lyness", {"checker": "gp", "claims": ["darboux"]}, "the search for 'darboux' proves nothing about lyness"),

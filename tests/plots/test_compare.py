@@ -180,6 +180,7 @@ def test_points_and_functions_may_be_text_and_others_are_refused():
     for start, message in (
         (1, "found the initial point 1"),
         ([float("nan"), 0], "found the floating-point number nan"),
+        ("x=0:1:2,y=0:1:100000", "found 200000 initial points, expected at most 100000"),
         ([[1, 0], [1]], "found an initial point with 1 coordinate, expected 2"),
     ):
         refuses(message, compare, CIRCLE, start, **how)

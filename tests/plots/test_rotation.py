@@ -39,7 +39,8 @@ def test_a_segment_of_fixed_points_has_no_rotation_number():
 @pytest.mark.parametrize(
     ("last", "points", "message"),
     [
-        ([2, 2, 3, 5], 1, "found 1 points, expected at least 2"),
+        ([2, 2, 3, 5], 1, "found 1 points, expected 2 to 10000"),
+        ([2, 2, 3, 5], 10**8, "found 100000000 points, expected 2 to 10000"),
         ([2, 2, 3, 5], "5", "found points = '5', expected an integer"),
         ([2, 2, 3], 5, "found a point with 3 coordinates, expected 4"),
     ],

@@ -42,6 +42,7 @@ DEFAULT_METHODS = ("kahan", "midpoint", "rk4", "gauss4", "suzuki4", "yoshida6")
 BINS = 200
 MAX_STEPS = 10**9
 MAX_FUNCTIONS = 12
+MAX_STARTS = 100_000
 _RANDOM_STARTS = 40
 _OF_ONE_SIZE = 5  # of them; the next ones are half as large
 _PROBE_STEPS = 1000
@@ -395,6 +396,8 @@ def _starts(system: QuadraticSystem, given: Any, eps: fmpq, seed: int) -> tuple[
         raise InputError(f"found the initial point {given!r}, expected a sequence of numbers, or several")
     rows = given.tolist() if isinstance(given, np.ndarray) else given
     rows = rows if len(rows) and isinstance(rows[0], list | tuple | np.ndarray) else [rows]
+    if len(rows) > MAX_STARTS:
+        raise InputError(f"found {len(rows)} initial points, expected at most {MAX_STARTS}")
     starts = []
     for row in rows:
         starts.append(tuple(exact(float(x)) if isinstance(x, float) and isfinite(x) else rational(x) for x in row))
