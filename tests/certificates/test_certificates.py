@@ -196,7 +196,7 @@ EQUIVALENT = System("x' = y + 1; y' = 24*(x - 2)^2 - 8")  # to weierstrass at g2
 FASTER = System("x' = 3*x - 3*x*y; y' = 3*x*y - 3*y")  # lotka_volterra at eps/c with c = 1/3
 
 
-@pytest.mark.parametrize("checker", PROGRAMS)
+@pytest.mark.parametrize("checker", ["gp", "sympy", pytest.param("rocq", marks=pytest.mark.slow)])
 def test_an_equivalence_is_accepted_and_refused_with_one_coefficient_changed(checker, tmp_path):
     result = equivalent_system(EQUIVALENT)
     text = result.certificate(checker)
@@ -255,7 +255,9 @@ POSITIVE = ["lotka_volterra", "fibonacci", "zander_120", "lotka_volterra_symplec
 
 
 @pytest.mark.parametrize("checker", ["gp", "sympy"])
-@pytest.mark.parametrize("name", ["lotka_volterra", "fibonacci", "hietarinta_viallet"])
+@pytest.mark.parametrize(
+    "name", ["fibonacci", *(pytest.param(n, marks=pytest.mark.slow) for n in ("lotka_volterra", "hietarinta_viallet"))]
+)
 def test_positive_entropy_is_accepted_and_refused_with_one_number_changed(name, checker, tmp_path):
     (claim,) = claims_of(name, "entropy")
     done = run(checker, CHECKERS[checker]([claim]), tmp_path)

@@ -157,7 +157,7 @@ def test_the_table_of_drift_agrees_with_independent_code(name):
         assert curve.errors == pytest.approx(np.array(errors)[curve.steps - 1], rel=1e-9, abs=1e-13), method
 
 
-@pytest.mark.parametrize("name", ["henon_heiles", "paper_m2"])
+@pytest.mark.parametrize("name", ["henon_heiles", pytest.param("paper_m2", marks=pytest.mark.slow)])
 def test_both_kernels_give_the_same_numbers(name):
     pytest.importorskip("llvmlite")
     results = [compare(name, eps=EPS, steps=300, methods=list(METHODS), kernel=kernel) for kernel in ("numpy", "numba")]
