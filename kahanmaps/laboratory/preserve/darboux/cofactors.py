@@ -257,7 +257,7 @@ def cofactor_spaces(
         return [(1, space)] if space.basis else []
     # As many points as unknowns determine the matrix M with C M P = P(x~) at these points. An eigenvector P of M must #
     # satisfy the equations K P = 0 of the other points, and so must M P, M^2 P, ... A few of the equations K M^j P = 0
-    # # usually suffice.
+    # usually suffice.
     count = len(places)
     at_points, at_images = _values(sample, product, degree, places)
     count_work(count**3 / 500)

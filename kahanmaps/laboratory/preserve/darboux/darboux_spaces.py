@@ -22,8 +22,7 @@ relations as monomials do, and the same null spaces give the combinations with a
 
 If the s functions F of a space satisfy s - 2 independent relations along every orbit, ratios of two functions need not
 be integrals, but the ratios of minors (F_a F_b~ - F_b F_a~)/(F_c F_d~ - F_d F_c~) are integrals (F~ is F one step
-later). For the values of F along an orbit lie in a plane with these minors as Pluecker coordinates. Source:
-petrera-suris-2018.
+later). For the values of F on an orbit lie in a plane with these Pluecker coordinates. Source: petrera-suris-2018.
 """
 
 from __future__ import annotations

@@ -89,8 +89,7 @@ class Pencil:
     def motion(self, growth: Growth) -> str:
         """Return a sentence on the restriction of the map to these curves, given the growth of its degrees.
 
-        It is empty if nothing can be concluded. An automorphism of a curve of genus 1 is a translation or has finite
-        order.
+        Empty if nothing can be concluded. An automorphism of a curve of genus 1 is a translation or has finite order.
         """
         if self.genus > 1:
             return "the map has finite order, since such a curve has only finitely many automorphisms"
