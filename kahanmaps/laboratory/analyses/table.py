@@ -185,8 +185,7 @@ ANALYSES = (
         lambda context, effort, **_: equivalent_system(context.result.file, context.result.fixed_points, effort),
         key="equivalent",
     ),
-    # Degrees use the singularities. Above dimension 4 singularities are slow, run last, and are not used by the
-    # degrees.
+    # Degrees use the singularities. Above dimension 4 singularities are slow and run last, not used by degrees.
     AnalysisStep(
         "singularities",
         _singularities,

@@ -5,10 +5,10 @@ factors. The equation of a factor (maps/equation.py) is an n x (n + 1) matrix of
 of the curve, is the image of the curve. The kernel is computed in one of two ways:
 
     minors  up to dimension 5: the maximal minors, divided by the gcd of two random combinations of them;
-    series in higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as many
-    terms as the image needs. A random quotient of two affine functions on the image is a power series whose shortest
-    recurrence (massey-1969) gives the common denominator of the coordinates. All further terms of all coordinates must
-    satisfy this recurrence.
+    series  in higher dimensions, where there are many minors: M(x) x~ = r(x) is solved in power series in t, to as
+            many terms as the image needs. A random quotient of two affine functions on the image is a power series
+            whose shortest recurrence (massey-1969) gives the common denominator of the coordinates. All further
+            terms of all coordinates must satisfy this recurrence.
 
 An explicit map is evaluated by its forms, without a kernel, in any dimension. In the plane minors are five to ten times
 as fast as series; in dimension 6 the two ways take the same time.

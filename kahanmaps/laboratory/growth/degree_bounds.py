@@ -7,14 +7,14 @@ line, e . f^n e = deg f^n = D_n. The translation length is log lambda, where lam
     2 cosh(n log lambda) + 2 >= (D_2n - 1) / (D_n - 1),    and    lambda <= D_n^(1/n).
 
 The first inequality says, for u = f^n e - e, that |(f^n u) . u| <= cosh(n log lambda) |u . u|. For lambda = 1 it is
-D_2n - 1 <= 4 (D_n - 1). The lower bound is computed for f_p, the map modulo a prime p at a residue eps. Since deg f_p^n
-<= deg f^n for every n, it follows that lambda(f_p) <= lambda(f). For f_p
+D_2n - 1 <= 4 (D_n - 1). The lower bound is computed for f_p, the map modulo a prime p at a residue eps. Since
+deg f_p^n <= deg f^n for every n, it follows that lambda(f_p) <= lambda(f). For f_p
 
 * the degree along one line, computed exactly, is a lower bound of deg f_p^2n;
 * the degrees along K tangents of a conic give an upper bound of D = deg f_p^n. The degree along a line is D minus the
-sum of the multiplicities m_i of the base points on the line, including infinitely near ones. No point lies on more than
-two of the tangents, and the sum of all m_i is 3 (D - 1) (Noether). So if all degrees along the tangents are at most u,
-then K (D - u) <= 6 (D - 1).
+  sum of the multiplicities m_i of the base points on the line, including infinitely near ones. No point lies on more
+  than two of the tangents, and the sum of all m_i is 3 (D - 1) (Noether). So if all degrees along the tangents are at
+  most u, then K (D - u) <= 6 (D - 1).
 
 Only p, eps and the conic are chosen at random. docs/mathematics.md has the proofs.
 """

@@ -106,7 +106,7 @@ def monomial_degree(matrix: fmpz_mat) -> int:
 def monomial_growth(matrix: fmpz_mat) -> GrowthProof | None:
     """Return how the degrees of a monomial map with this exponent matrix grow; None in dimensions above 8.
 
-    Proof: deg(Phi^n) divided by the largest modulus of the entries of A^n lies between two positive constants.
+    The reason: deg(Phi^n) divided by the largest modulus of the entries of A^n lies between two positive constants.
     """
     if matrix.nrows() > _MAX_DIMENSION:
         return None

@@ -103,8 +103,8 @@ def sweep(
         units: the units of work that are counted for one member.
         seed: the random seed.
         jobs: as for `Family.degrees`.
-        check: called repeatedly; may raise TimeOver. progress: called with the number of measured members and the
-            number of all members.
+        check: called repeatedly; may raise TimeOver.
+        progress: called with the number of measured members and the number of all members.
 
     Raises:
         InputError: if the map is nowhere defined, or the degrees are too large.

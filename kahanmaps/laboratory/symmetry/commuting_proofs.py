@@ -2,11 +2,11 @@
 
 The lemmas are the splitting lemma of checks/theorems.py and the following two; all hypotheses are verified exactly.
 
-affine One of the fields, with linear part B, is affine. Its Kahan map is affine, x -> P x + q, and commutes with the
-map of the other field g for every eps if P g(x) = g(P x + q). Times det(I - eps B)^2 this is an identity of degree at
-most 2n in eps, so it is tested at 2n + 1 values of eps. It is linear in g. dimension 1 The Kahan map of a x^2 + b x + c
-is the Moebius map of I + eps M with M = [[b, 2c], [-2a, -b]]. Since M is linear in the field, proportional fields have
-commuting maps.
+affine       One of the fields, with linear part B, is affine. Its Kahan map is affine, x -> P x + q, and commutes with
+             the map of the other field g for every eps if P g(x) = g(P x + q). Times det(I - eps B)^2 this is an
+             identity of degree at most 2n in eps, so it is tested at 2n + 1 values of eps. It is linear in g.
+dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M with M = [[b, 2c], [-2a, -b]]. Since M is
+             linear in the field, proportional fields have commuting maps.
 """
 
 from __future__ import annotations

@@ -70,8 +70,7 @@ class Symmetry(ResultPart):
 class Infinitesimal(ResultPart):
     """A field S x + s with f'(x)(S x + s) - S f(x) = weight f(x).
 
-    The flow T_t of the field satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps). For weight 0 it is a
-    symmetry.
+    Its flow T_t satisfies T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps); for weight 0 each T_t is a symmetry.
     """
 
     variables: tuple[str, ...]

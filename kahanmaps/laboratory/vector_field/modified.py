@@ -215,7 +215,7 @@ def _integrals_of_flow(file: SystemFile, progress: Callable[[str], None]) -> lis
         if function is not None and function.denominator.is_constant():
             candidates.append(function.numerator.project_to_context(context))
     f, integrals, gradients = file.system.rhs, list[fmpq_mpoly](), list[list[fmpq]]()
-    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a chance dependence only omits an integral
+    point = [fmpq(k + 2, k * k + 3) for k in range(file.dim)]  # a dependence by chance omits an integral
     for candidate in candidates:
         primitive = primitive_part(candidate - candidate[(0,) * file.dim])[1]
         slope = [evaluate(p, QQ, point) for p in gradient(primitive)]

@@ -5,7 +5,7 @@ Jacobi determinant of Phi vanishes or has poles on the zeros and poles of C, whi
 contracts. For Kahan maps det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)), and the candidates are the products of
 
     D_i(x~, -eps)/D_i(x, eps)   for the irreducible factors D_i of det(I - eps f'(x)) over Q,
-    l(x~)/l(x) for the affine l with l' = l L along the flow, which are discrete Darboux polynomials.
+    l(x~)/l(x)                  for the affine l with l' = l L along the flow, which are discrete Darboux polynomials.
 
 The cofactor of a polynomial that is even in eps satisfies C(x, eps) C(x~, -eps) = 1, and so do these products. For
 other maps the candidates are the products of the irreducible factors of det dPhi(x) and of 1/det M(x), times a number

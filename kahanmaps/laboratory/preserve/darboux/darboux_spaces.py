@@ -5,9 +5,9 @@ along the orbits on which P/Q = c. The search reverses this:
 
 1. All relations of degree d of all orbits (hirota_kimura.py) span a space W of polynomials, which contains P and Q.
 2. Let w_a be a basis of W. The antisymmetric matrices A with sum A_ab (w_a(x~) w_b(x) - w_b(x~) w_a(x)) = 0 for all x
-form a linear space. It contains all antisymmetric matrices on U for every space U with a common cofactor. 3. The
-matrices E with E A = A E^T for all these A are scalars on each U, so each U is an eigenspace of a random E. If the sum
-of the spaces U is not direct, the search looks for matrices A of rank 2, whose 4 x 4 Pfaffians vanish.
+   form a linear space. It contains all antisymmetric matrices on U for every space U with a common cofactor.
+3. The matrices E with E A = A E^T for all these A are scalars on each U, so each U is an eigenspace of a random E. If
+   the sum of the spaces U is not direct, the search looks for matrices A of rank 2, whose 4 x 4 Pfaffians vanish.
 
 Multiples of known spaces of lower degree form a subspace W_T, which is split off first. A matrix A that comes from
 multiples has entries on W_T only. The entries of A between a complement of W_T and W_T are the corrections that turn

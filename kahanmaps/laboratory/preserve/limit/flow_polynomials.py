@@ -355,8 +355,7 @@ class _Line:
         """Return, for each special factor of a polynomial in t, its degree and its space.
 
         The space consists of the polynomials that vanish along the solutions from the zeros of the factor. A factor is
-        special if this space is larger than for equally many random points (which have products of I - c, I an
-        integral).
+        special if this space is larger than for equally many random points, where products of integrals I - c vanish.
         """
         points = []
         count_work(max(0, int(on_line.degree())) ** 2)

@@ -1,11 +1,11 @@
 """Limits of integrals of a map as eps -> 0: the integrals of its flow that the map conserves, deforms or loses.
 
 An integral of a map x + 2 eps f(x) + ... has an expansion eps^v (I_0 + eps^k I_1 + ...), and its leading term I_0 is
-an integral of the flow: f . grad I_0 = 0. If I_0 depends on the leading terms J_0, ... of other integrals, R(I_0, J_0,
-...) = 0 with a polynomial R, then R(I, J, ...) is an integral of the map that tends to 0 with eps. Divided by a power
-of eps it replaces I. (If I_0 is constant, R contains only I.) If all integrals of the map are functions of integrals
-with independent leading terms I_0, then an integral of the flow that is not a function of these I_0 is not a limit of
-integrals of the map.
+an integral of the flow: f . grad I_0 = 0. If I_0 depends on the leading terms J_0, ... of other integrals by a relation
+R(I_0, J_0, ...) = 0, R a polynomial, then R(I, J, ...) is an integral of the map that tends to 0 with eps. Divided by a
+power of eps it replaces I. (If I_0 is constant, R contains only I.) If all integrals of the map are functions of
+integrals with independent leading terms I_0, then an integral of the flow that is not a function of these I_0 is not a
+limit of integrals of the map.
 """
 
 from __future__ import annotations

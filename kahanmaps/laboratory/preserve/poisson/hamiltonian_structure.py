@@ -54,8 +54,8 @@ class ConstantStructures(PrintableResult):
 
     forms: a basis of the skew K for which K f is a gradient (invertible or not), with coprime integer entries.
     functions: for each form K the H of degree at most 3 with grad H = K f and H(0) = 0; the flow conserves H.
-    hamiltonian: H and J with f = J grad H, or None; the gradients of `casimirs` span the kernel of J. reason: why
-    `hamiltonian` is None, else empty; `proved` says whether it is proved that there is none.
+    hamiltonian: H and J with f = J grad H, or None; the gradients of `casimirs` span the kernel of J.
+    reason: why `hamiltonian` is None, else empty; `proved` says whether it is proved that there is none.
     """
 
     system: QuadraticSystem
