@@ -76,10 +76,10 @@ class DensitySearch(Search):
     """The result of `find_densities`.
 
     `densities` is a basis of all phi of the least degree in which any exist, with two exceptions. If no phi of this
-    basis is proved, a known proved phi of another degree comes first. For a Hamiltonian system the list has only det(I
-    - eps f'), whose degree need not be the least. `degree` is the largest degree that was tried; `cut` says why the
-    search stopped before the requested degree, and is empty if it did not stop. `period` is the period of the map, if
-    orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
+    basis is proved, a known proved phi of another degree comes first. For a Hamiltonian system the list has only
+    det(I - eps f'), whose degree need not be the least. `degree` is the largest degree that was tried; `cut` says why
+    the search stopped before the requested degree, and is empty if it did not stop. `period` is the period of the map,
+    if orbits close. `anti_invariant` is a phi with phi(x~) = -det dPhi(x) phi(x): the map takes dx/phi to -dx/phi, and
     |dx/phi| is invariant.
     """
 

@@ -273,7 +273,7 @@ class _Resolved:
         nu, largest = fmpq_mat(len(self.keys), 1), max(orders_of_forms.entries())
         if largest == 0:
             return nu
-        # Equal orders of forms often have the same multiplicities. If not, surfaces with the fewest terms that suffice.
+        # Equal orders of forms often have the same multiplicities. If not, take the fewest terms that suffice.
         known = [column for column in self.multiplicities.values() if self.exponents * column == orders_of_forms]
         if len(known) >= _REPEATED and all(column == known[0] for column in known):
             return known[0]

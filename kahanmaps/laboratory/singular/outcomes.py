@@ -116,8 +116,8 @@ def critical_points(
         degrees[power] = degrees.get(power, 0) + int(part.degree())
         for s in roots_modulo(part):
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
-            # The gradient of F up to a factor, where E = F^power G: on x + t v + d w the form E is (t F_v + d
-            # F_w)^power G + ... A power of t that is higher than all relevant ones replaces d.
+            # The gradient of F up to a factor, where E = F^power G: on x + t v + d w the form E is
+            # (t F_v + d F_w)^power G + ... A power of t that is higher than all relevant ones replaces d.
             gap = power + 1
             curve = [nmod_poly([x, rng.randrange(p)], p) for x in point]
             t_to_gap = nmod_poly([0] * gap + [1], p)

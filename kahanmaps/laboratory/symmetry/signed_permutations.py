@@ -2,9 +2,9 @@
 
 With (S x)_{p(i)} = s_i x_i the condition f(S x) = sign S f(x) is a set of equations between single coefficients. Take
 scaled variables y_i = e_i x_i, e_i > 0, for which the logarithms of the coefficients have the least sum of squares. In
-these the s_i are 1 or -1: S maps the scaling to another one with this property, which is unique up to scalings that do
-not change f. So the search is for signed permutations that preserve the scaled coefficients. The logarithms of these
-are rational combinations of logarithms of coprime integers. An S that is not rational in x is dropped.
+these the s_i are 1 or -1: S maps the scaling to one with the same property, and there is only one such scaling, up to
+scalings that do not change f. So the search is for signed permutations that preserve the scaled coefficients, whose
+logarithms are rational combinations of logarithms of coprime integers. An S that is not rational in x is dropped.
 
 The search is a backtracking over images of the variables, and drops a choice at the first equation that fails.
 """

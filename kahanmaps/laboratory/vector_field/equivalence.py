@@ -1,7 +1,7 @@
 """Search for a system of the catalogue that a vector field is affinely equivalent to: g(P x + q) = c P f(x).
 
 With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's method is equivariant under affine changes of
-variables: the map of f at eps is the map of g at eps/c, in the variables y. In the plane all P are tried. In higher
+variables: the map of f at eps is the map of g at eps/c, in the variables y. In the plane all P are tried. In other
 dimensions P is a permutation of the variables, scaled up to dimension 5, after a change to a frame that f determines
 (invariant hyperplanes, lines of fixed points). Parameters of g are unknowns too. Every equivalence is verified exactly;
 if none is found, one may still exist.
