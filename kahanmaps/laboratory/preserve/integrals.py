@@ -160,7 +160,7 @@ class IntegralSearch(Search):
 
     @property
     def codimension(self) -> int:
-        """The number of independent integrals: the largest one that orbits show, theorems give or formulas prove."""
+        """The largest number of independent integrals that orbits show, theorems give or formulas prove."""
         return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.formula_count)
 
     @property

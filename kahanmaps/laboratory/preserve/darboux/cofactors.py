@@ -255,7 +255,7 @@ def cofactor_spaces(
         merged = DarbouxSpace(sample.map.dim, degree, [v for model in models for v in model.basis]) if models else None
         space = cofactor_space(sample, product, degree, merged)
         return [(1, space)] if space.basis else []
-    # As many points as unknowns determine the matrix M with C M P = P(x~) at these points. An eigenvector P of M must #
+    # As many points as unknowns determine the matrix M with C M P = P(x~) at these points. An eigenvector P of M must
     # satisfy the equations K P = 0 of the other points, and so must M P, M^2 P, ... A few of the equations K M^j P = 0
     # usually suffice.
     count = len(places)

@@ -108,7 +108,7 @@ def flow_polynomials(
     rng = random.Random(f"flow polynomials {derive_seed(seed, field.rhs)}")
     known: dict[str, fmpq_mpoly] = {}
     # Factors of the right-hand sides come first: the search does not find a common factor of all, whose zeros are fixed
-    # points; and if there are infinitely many P, as for x' = x, y' = y, # formulas need these factors.
+    # points; and if there are infinitely many P, as for x' = x, y' = y, formulas need these factors.
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             known.setdefault(str(P), P)
@@ -244,7 +244,7 @@ class _Search:
         if darboux_cofactor(self.field, P) is None:
             return False
         # Test that P is special: along the solution from a zero of P, modulo a new prime, more polynomials vanish than
-        # along a generic solution. If not, P may be an arbitrary member of a pencil, since every residue of its #
+        # along a generic solution. If not, P may be an arbitrary member of a pencil, since every residue of its
         # parameter lifts: for example a product of conjugate lines of two special members, x^2 + y^2 - 1 + 2 i y.
         is_special = None
         while is_special is None:

@@ -212,8 +212,8 @@ def flow_and_map(
 
     Args:
         search: the integrals of the map, for every eps.
-        densities: the densities of the map, if known. If the limit of one of them is a density of the flow, there is no
-            search for densities of the flow.
+        densities: the densities of the map, if known. A limit of one of them that is a density of the flow replaces a
+            density that the search finds.
         flow: the integrals of the flow. By default they are searched for up to a low degree, unless the limits of the
             integrals of the map are already the largest possible number.
         known: the number of integrals that the map is known to have, if `search` shows fewer.
