@@ -126,7 +126,7 @@ def _poisson(context: AnalysisContext, effort: Budget, **options: Any) -> Poisso
 
 
 def _densities(context: AnalysisContext, **options: Any) -> DensitySearch:
-    """Return a search with polynomial densities, or with a product of powers of factors of the integrals."""
+    """Search for densities: polynomials, or products of powers of factors of the integrals."""
     return with_factors(
         find_densities(context.file_without_claims, **context.settings, integrals=(), **options), context.integrals
     )
@@ -185,7 +185,7 @@ ANALYSES = (
         lambda context, effort, **_: equivalent_system(context.result.file, context.result.fixed_points, effort),
         key="equivalent",
     ),
-    # Degrees use the singularities. Above dimension 4 singularities are slow and run last, not used by degrees.
+    # Degrees use the singularities. Above dimension 4 these are slow and run last, without degrees using them.
     AnalysisStep(
         "singularities",
         _singularities,

@@ -117,8 +117,8 @@ class CommutingSystems(PrintableResult):
     """The quadratic g whose Kahan maps commute with that of f; if `complete`, there are no others of this shape.
 
     `dimension` is the dimension of the space of all g with [f, g] = 0; `irrational` describes solutions that are not
-    rational; `discarded` counts solutions of the equations whose maps do not commute; `every_g_commutes` is True if f =
-    0, and then no g is listed; `undecided` has a message on each open question.
+    rational; `discarded` counts solutions of the equations whose maps do not commute; `every_g_commutes` is True for
+    f = 0, and then no g is listed; `undecided` has a message on each open question.
     """
 
     _parts, _noun = "nontrivial", ("commuting system", "commuting systems")
